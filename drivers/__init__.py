@@ -1,0 +1,1 @@
+"""Hardware in, typed samples out: joints, insoles, IMUs, and the bus and port they share."""

@@ -1,0 +1,1 @@
+"""The CANopen bus that joints and other devices share."""

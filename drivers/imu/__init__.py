@@ -1,0 +1,1 @@
+"""Trunk IMUs on serial ports."""

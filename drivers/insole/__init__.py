@@ -1,0 +1,1 @@
+"""Plantar-pressure insoles on serial ports."""

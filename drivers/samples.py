@@ -1,0 +1,49 @@
+"""What the drivers give: channels, samples, quality. SI units, robot's monotonic time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class State(StrEnum):
+    """How far a component's values can be trusted."""
+
+    OK = "ok"
+    STALE = "stale"  # silent for longer than stale_after_s: values are null
+    LOST = "lost"  # silent for longer than lost_after_s, or not there at all
+    FAULT = "fault"  # it talks, and says that it is in fault
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One named quantity of one component, in one unit."""
+
+    name: str  # component.quantity, unique on the robot
+    component: str
+    quantity: str
+    unit: str  # SI symbol, "" for a pure number, "°C" for temperatures
+    enum: Mapping[int, str] | None = None  # words for a state's numbers
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Values of one component that were received together.
+
+    `indices` are positions in the component's `channels`; `values` stand in the same order, `None`
+    where the device said that it has no value. `stamp_ns` is the robot's monotonic clock on reception.
+    """
+
+    component: str
+    stamp_ns: int
+    indices: tuple[int, ...]
+    values: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """What is known about a component now."""
+
+    state: State
+    age_ms: float | None  # since its last sample; None before the first
+    problem: str | None = None  # in words, with what to check
+    counters: Mapping[str, int] = field(default_factory=dict)

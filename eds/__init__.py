@@ -1,0 +1,1 @@
+"""EDS and DCF files: loading, checking, finding."""

@@ -1,0 +1,1 @@
+"""The robot side: on-demand daemon, its modules, its client."""

@@ -1,0 +1,1 @@
+"""The commands of the robot side: one file for serving, one for asking."""

@@ -1,0 +1,95 @@
+"""The `gwrms` command: finds the subcommand and imports only what it needs.
+
+Exit codes: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr; `--debug`
+shows the traceback.
+"""
+
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+
+# name → (where it lives, what it does). A module here is imported only when its command runs.
+COMMANDS: dict[str, tuple[str, str]] = {
+    "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
+    "describe": ("gateway.cli.ask:describe", "what a robot is made of, and what is wrong with it"),
+    "snapshot": ("gateway.cli.ask:snapshot", "one look at resources, components or status"),
+    "watch": ("gateway.cli.ask:watch", "follow channels live"),
+    "get": ("gateway.cli.ask:get", "read parameters from the devices"),
+    "set": ("gateway.cli.ask:set_", "change parameters, all or none, read back"),
+    "stop": ("gateway.cli.ask:stop", "quick stop on every drive (not a safety-rated stop)"),
+    "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
+    "sim": ("hil_sim.cli:main", "the simulated robot, ready for a gateway"),
+}
+
+OUR_PACKAGES = frozenset({"gateway", "drivers", "eds", "server_gui", "ml", "hil_sim"})
+
+
+def usage() -> str:
+    """The manual's first page."""
+    width = max(map(len, COMMANDS))
+    lines = [
+        "usage: gwrms COMMAND [ARGUMENTS]",
+        "",
+        "GWRMS watches and tunes a lower-limb exoskeleton: a light daemon on the robot,",
+        "a live view on the desk, and a whole simulated robot for the bench.",
+        "",
+        "commands:",
+        *(f"  {name:<{width}}  {what}" for name, (_, what) in COMMANDS.items()),
+        "",
+        "gwrms COMMAND --help explains a command. --debug anywhere shows tracebacks.",
+        "A first look without hardware: gwrms demo",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def find(name: str) -> Callable[[list[str]], int]:
+    """Import the function behind a command; it takes its arguments and returns the exit code."""
+    module_name, _, function_name = COMMANDS[name][0].partition(":")
+    function: Callable[[list[str]], int] = getattr(importlib.import_module(module_name), function_name)
+    return function
+
+
+def explain(error: Exception) -> str:
+    """An exception as the sentences a user can act on."""
+    if isinstance(error, ModuleNotFoundError) and error.name is not None:
+        return f"this command needs the package {error.name!r}; install gwrms[server] or gwrms[sim]"
+    ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
+    if ours or isinstance(error, OSError):
+        return str(error)
+    return f"internal error, {type(error).__name__}: {error} (run again with --debug and report it)"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `gwrms` with `argv` (default: the process's own arguments) and return its exit code."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in arguments
+    arguments = [argument for argument in arguments if argument != "--debug"]
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        sys.stdout.write(usage())
+        return 0 if arguments else 2
+    name, *rest = arguments
+    if name == "--version":
+        sys.stdout.write(f"gwrms {importlib.import_module('importlib.metadata').version('gwrms')}\n")
+        return 0
+    if name not in COMMANDS:
+        sys.stderr.write(f"gwrms: there is no command {name!r}; gwrms --help lists them\n")
+        return 2
+    try:
+        return find(name)(rest)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader left; no second error at exit
+        return 1
+    except Exception as error:  # noqa: BLE001 - the one place where errors become words
+        if debug:
+            traceback.print_exc()
+        else:
+            sys.stderr.write(f"gwrms {name}: {explain(error)}\n")
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The paper's robot modules: resource, component, control, status."""

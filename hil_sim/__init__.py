@@ -1,0 +1,1 @@
+"""A whole exoskeleton without hardware, spoken from the standards and manuals."""

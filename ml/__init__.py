@@ -1,0 +1,1 @@
+"""Windows, features, training, evaluation and prediction of the robot's status."""

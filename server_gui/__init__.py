@@ -1,0 +1,1 @@
+"""The desk side: server core, views, application."""

@@ -1,0 +1,1 @@
+"""The server without Qt: links to robots and what is made of their data."""

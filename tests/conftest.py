@@ -1,0 +1,43 @@
+"""Rules for every test: a leaked thread, child process or socket file descriptor fails the test that leaked it."""
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+
+def _descriptors() -> set[str]:
+    open_files: set[str] = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            target = str(entry.readlink())
+        except OSError:
+            continue
+        if target.startswith(("socket:", "/dev/pt", "/dev/ttyS", "/dev/ttyUSB")):
+            open_files.add(f"{entry.name} → {target}")
+    return open_files
+
+
+@pytest.fixture(autouse=True)
+def nothing_leaks() -> Iterator[None]:
+    """Fail a test that leaves a thread, a child process, a socket or a terminal behind."""
+    threads = set(threading.enumerate())
+    children = {child.pid for child in psutil.Process().children(recursive=True)}
+    descriptors = _descriptors()
+    yield
+    deadline = time.monotonic() + 5.0
+    while True:
+        leaked = [
+            *(thread.name for thread in threading.enumerate() if thread not in threads),
+            *(str(child) for child in psutil.Process().children(recursive=True) if child.pid not in children),
+            *sorted(_descriptors() - descriptors),
+        ]
+        if not leaked:
+            return
+        if time.monotonic() > deadline:
+            pytest.fail(f"leaked by {os.environ.get('PYTEST_CURRENT_TEST', 'this test')}: {leaked}")
+        time.sleep(0.02)
