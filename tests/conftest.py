@@ -1,4 +1,4 @@
-"""Rules for every test: a leaked thread, child process or socket file descriptor fails the test that leaked it."""
+"""Rules for every test: a leaked thread, child process, socket or terminal fails the test that leaked it."""
 
 import os
 import threading
