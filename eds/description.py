@@ -1,0 +1,58 @@
+"""What an EDS or DCF file says about a device, and what had to be repaired to read it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import canopen
+    from canopen.objectdictionary import ODVariable
+
+
+class EdsError(Exception):
+    """A file that cannot be used; the message names file, section or line, and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing in a file that was repaired, left out, or that a person should look at."""
+
+    severity: Literal["info", "warning"]
+    where: str  # section or line
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A device as its EDS or DCF describes it.
+
+    `vendor_id` and `product_code` are those of object 1018h where the file gives them.
+    """
+
+    path: Path
+    object_dictionary: canopen.ObjectDictionary
+    vendor: str
+    product: str
+    vendor_id: int | None
+    product_code: int | None
+    findings: tuple[Finding, ...]
+
+    def has(self, index: int, subindex: int = 0) -> bool:
+        """Whether the file describes this object."""
+        return self.variable(index, subindex) is not None
+
+    def variable(self, index: int, subindex: int = 0) -> ODVariable | None:
+        """The description of one object, `None` where the file has none."""
+        return self.object_dictionary.get_variable(index, subindex)
+
+    def require(self, objects: Iterable[tuple[int, str]], purpose: str) -> None:
+        """Raise `EdsError` that names every one of `objects` (index, name) that the file lacks."""
+        missing = [f"0x{index:04X} ({name})" for index, name in objects if not self.has(index)]
+        if missing:
+            raise EdsError(
+                f"{self.path}: {', '.join(missing)} missing, which {purpose} needs; "
+                "take the EDS of this device and firmware from its vendor"
+            )

@@ -1,0 +1,169 @@
+"""Loads an EDS or DCF: read, repair, import with canopen, check for another node's values."""
+
+import configparser
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import canopen
+from canopen.objectdictionary import ODVariable
+
+from eds.datatypes import DATA_TYPES
+from eds.description import Description, EdsError
+from eds.ini import IniText, Sections, read_ini
+from eds.numbers import parse_integer
+from eds.repair import repair
+
+MAX_BYTES = 8 * 1024 * 1024
+
+# Base identifiers of the predefined connection set that carry a node id (CiA 301 §7.3.3).
+_CONNECTION_SET = frozenset(range(0x080, 0x600, 0x080)) | {0x600, 0x700}
+_COB_ID_VALID_BITS = 0x1FFF_FFFF
+
+
+class _EdsText(io.StringIO):
+    """The repaired text under a name that the importer recognises as an EDS."""
+
+    name = "repaired.eds"
+
+
+@dataclass(frozen=True, slots=True)
+class _Owner:
+    """Whom the file was made for, and for whom it is loaded."""
+
+    file_node_id: int | None
+    node_id: int
+
+
+def load_file(path: Path, node_id: int) -> Description:
+    """See `eds.load`."""
+    if not 1 <= node_id <= 127:
+        raise EdsError(f"{path}: node id {node_id} is outside 1–127")
+    ini = read_ini(_read_text(path))
+    sections, file_node_id = repair(ini)
+    if not any(len(name) == 4 for name in sections):
+        raise EdsError(f"{path}: there is no object section like [1000]; this is no EDS or DCF file")
+    owner = _Owner(file_node_id, node_id)
+    if file_node_id not in (None, 0, node_id):
+        ini.warn(
+            "[DeviceComissioning] NodeID",
+            f"the file is for node {file_node_id}; {node_id} is configured and counts",
+        )
+    _readdress(ini, sections, owner)
+    dictionary = _import(path, sections, node_id)
+    dictionary.node_id = node_id
+    _set_limits(ini, sections, dictionary)
+    information = dictionary.device_information
+    return Description(
+        path=path,
+        object_dictionary=dictionary,
+        vendor=information.vendor_name or "",
+        product=information.product_name or "",
+        vendor_id=_identity(dictionary, 1, information.vendor_number),
+        product_code=_identity(dictionary, 2, information.product_number),
+        findings=tuple(ini.findings),
+    )
+
+
+def _read_text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise EdsError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(data) > MAX_BYTES:
+        raise EdsError(f"{path}: is larger than {MAX_BYTES // 2**20} MiB; this is no EDS or DCF file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def _import(path: Path, sections: Sections, node_id: int) -> canopen.ObjectDictionary:
+    lines = []
+    for name, keys in sections.items():
+        lines.append(f"[{name}]")
+        lines.extend(f"{key}={value}" for key, value in keys.items())
+    try:
+        return canopen.import_od(_EdsText("\n".join(lines)), node_id)
+    except (configparser.Error, ValueError, KeyError) as error:
+        raise EdsError(f"{path}: {error}; the file is broken in a way that is not known here") from error
+
+
+def _readdress(ini: IniText, sections: Sections, owner: _Owner) -> None:
+    """Make COB-IDs that a file gives for another node those of the configured one."""
+    for name, keys in sections.items():
+        for key in ("DefaultValue", "ParameterValue"):
+            cob_id = parse_integer(keys.get(key, "")) if _is_cob_id(name) else None
+            if cob_id is not None:
+                keys[key] = _readdressed(ini, f"[{name}] {key}", cob_id, owner)
+
+
+def _is_cob_id(section: str) -> bool:
+    """EMCY (1014h), and the COB-IDs of SDO servers, RPDOs and TPDOs (1200h.., 1400h.., 1800h..)."""
+    index, _, subindex = section.partition("sub")
+    if section == "1014":
+        return True
+    if subindex not in ("1", "2"):
+        return False
+    number = int(index, 16)
+    is_pdo = 0x1400 <= number < 0x1600 or 0x1800 <= number < 0x1A00
+    return 0x1200 <= number < 0x1280 or (is_pdo and subindex == "1")
+
+
+def _readdressed(ini: IniText, where: str, cob_id: int, owner: _Owner) -> str:
+    base = cob_id & 0x780
+    belongs_to = cob_id & 0x7F
+    unchanged = str(cob_id)
+    extended = cob_id & _COB_ID_VALID_BITS > 0x7FF
+    if extended or base not in _CONNECTION_SET or belongs_to in (0, owner.node_id):
+        return unchanged
+    if belongs_to != owner.file_node_id:
+        ini.warn(
+            where,
+            f"COB-ID 0x{cob_id & 0x7FF:03X} is fixed and belongs to node {belongs_to}, not {owner.node_id}",
+        )
+        return unchanged
+    ini.warn(
+        where, f"0x{cob_id & 0x7FF:03X} belongs to node {belongs_to}; read as 0x{base:03X} + {owner.node_id}"
+    )
+    return f"$NODEID+0x{cob_id - belongs_to:X}"
+
+
+def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDictionary) -> None:
+    """Limits that the importer drops (reals, odd widths), and those that contradict themselves."""
+    for name, keys in sections.items():
+        if "LowLimit" not in keys and "HighLimit" not in keys:
+            continue
+        index, _, subindex = name.partition("sub")
+        variable = dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
+        if variable is not None:
+            variable.min = _limit(variable, keys.get("LowLimit"))
+            variable.max = _limit(variable, keys.get("HighLimit"))
+            if variable.min is not None and variable.max is not None and variable.min > variable.max:
+                ini.warn(
+                    f"[{name}]", f"LowLimit {variable.min} is above HighLimit {variable.max}; both left out"
+                )
+                variable.min = variable.max = None
+
+
+def _limit(variable: ODVariable, text: str | None) -> int | None:
+    data_type = DATA_TYPES[variable.data_type or 0]
+    if text is None or data_type.kind not in ("signed", "unsigned", "real"):
+        return None
+    if data_type.kind == "real":
+        # The importer's annotation knows integers only; what it stores has no type.
+        return float(text)  # type: ignore[return-value]
+    number = parse_integer(text)
+    if number is not None and data_type.kind == "signed" and number >= 1 << (data_type.bits or 64) - 1:
+        number -= 1 << (data_type.bits or 64)  # files write -1 as 0xFFFFFFFF
+    return number
+
+
+def _identity(
+    dictionary: canopen.ObjectDictionary, subindex: int, from_device_info: int | None
+) -> int | None:
+    """Vendor and product of 1018h; [DeviceInfo] where the object has no default."""
+    variable = dictionary.get_variable(0x1018, subindex)
+    default = None if variable is None else variable.default
+    return default if isinstance(default, int) and default else from_device_info
