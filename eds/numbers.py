@@ -2,6 +2,7 @@
 
 import re
 
+_MAX_DIGITS = 40  # a 64-bit number in any spelling is far shorter
 _DECIMAL = re.compile(r"[+-]?(?:0|[1-9][0-9]*)")
 _HEX = re.compile(r"[+-]?0[xX][0-9A-Fa-f]+")
 _HEX_SUFFIX = re.compile(r"([0-9][0-9A-Fa-f]*)[hH]")
@@ -15,7 +16,9 @@ def parse_integer(text: str) -> int | None:
     CiA 306 reads a leading zero as octal; many tools write it meaning decimal. Where both readings
     agree (`007`) there is no doubt; where they do not (`0010`) the number is unknown.
     """
-    text = text.replace(" ", "").replace("_", "").rstrip("uUlL")
+    text = text.replace(" ", "").rstrip("uUlL")
+    if len(text) > _MAX_DIGITS:
+        return None
     if _DECIMAL.fullmatch(text):
         return int(text)
     if _HEX.fullmatch(text):
@@ -35,10 +38,3 @@ def parse_relative(text: str) -> int | None:
         return None
     rest = _NODE_ID.sub("", text, count=1).replace(" ", "").strip("+")
     return parse_integer(rest) if rest else 0
-
-
-def parse_real(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

@@ -1,0 +1,1 @@
+"""The EDS loader."""
