@@ -1,0 +1,357 @@
+"""What each method of the wire takes and gives, as typed structs; the names are a contract.
+
+Parameters forbid unknown fields. Results may grow: a reader ignores fields it does not know.
+"""
+
+from typing import Annotated, Any, Final, Literal
+
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from gateway.wire import PROTOCOL
+
+Globs = list[str]
+Number = int | float
+Seconds = Annotated[float, Meta(gt=0, le=300)]
+ModuleName = Literal["component", "status", "resource"]
+Include = Literal["disk", "network", "thermal", "kernel", "cmdline"]
+
+
+class Params(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of a method; as it stands, of one that takes none."""
+
+
+class HelloParams(Params, frozen=True):
+    """`hello`."""
+
+    client: str
+    protocol: int = PROTOCOL
+    token: str | None = None
+
+
+class ResourceSnapshotParams(Params, frozen=True):
+    """`resource.snapshot`; by default the processes come in order of CPU, highest first."""
+
+    processes: bool = True
+    include: list[Include] = []
+    sort: Literal["cpu", "memory", "name", "pid"] = "cpu"
+    descending: bool | None = None  # None: highest first for cpu and memory, lowest first for name and pid
+    limit: Annotated[int, Meta(ge=0)] | None = None
+
+
+class SnapshotParams(Params, frozen=True):
+    """`component.snapshot`; `channels` are globs such as `left_*.position`, none means all."""
+
+    channels: Globs | None = None
+
+
+class StreamStartParams(Params, frozen=True):
+    """`stream.start`; `rate_hz` 0 sends every source's own samples."""
+
+    modules: Annotated[list[ModuleName], Meta(min_length=1)]
+    rate_hz: Annotated[float, Meta(ge=0, le=1000)]
+    channels: Globs | None = None
+
+
+class StreamStopParams(Params, frozen=True):
+    """`stream.stop`."""
+
+    stream: int
+
+
+class AcquireParams(Params, frozen=True):
+    """`control.acquire`."""
+
+    ttl_s: Seconds
+
+
+class ReleaseParams(Params, frozen=True):
+    """`control.release`; a lease belongs to its connection, naming it is a check."""
+
+    lease: str | None = None
+
+
+class ParameterParams(Params, frozen=True):
+    """`parameter.list` and `parameter.read`; no names means all."""
+
+    names: Globs | None = None
+
+
+class ParameterWriteParams(Params, frozen=True):
+    """`parameter.write`: values in the parameter's own unit."""
+
+    changes: Annotated[dict[str, Number], Meta(min_length=1)]
+    trial_s: Seconds | None = None
+
+
+class StopParams(Struct, frozen=True):
+    """`robot.stop`; takes whatever it is given, because a stop is never refused for its form."""
+
+    reason: Any = ""
+
+
+class Done(Struct, frozen=True):
+    """The result of a method that has nothing to tell."""
+
+
+class Hello(Struct, frozen=True):
+    """Result of `hello`."""
+
+    protocol: int
+    robot: str
+    role: str
+    boot_id: str
+
+
+class Clock(Struct, frozen=True):
+    """Result of `clock.read`: one instant on both clocks."""
+
+    monotonic_ns: int
+    utc_ns: int
+    boot_id: str
+
+
+class ComponentInfo(Struct, frozen=True, omit_defaults=True):
+    """One component of `robot.describe`; `problem` says in words what is wrong."""
+
+    name: str
+    kind: str
+    state: str
+    problem: str | None = None
+    device: dict[str, str | int] | None = None  # vendor, product, file and findings, where it has an EDS
+
+
+class ChannelInfo(Struct, frozen=True, omit_defaults=True):
+    """One channel of `robot.describe`; `enum` gives a state's numbers their words."""
+
+    name: str
+    unit: str = ""
+    component: str = ""
+    quantity: str = ""
+    enum: dict[str, str] | None = None
+
+
+class ParameterInfo(Struct, frozen=True):
+    """One parameter of `robot.describe`; `states` are the drive states it may be written in, `None` any."""
+
+    name: str
+    unit: str
+    min: float | None
+    max: float | None
+    max_step: float | None
+    live: bool
+    states: list[str] | None
+    component: str
+    object: str
+    access: str
+    store: bool
+    problem: str | None = None
+
+
+class DriveReaction(Struct, frozen=True):
+    """What one drive does by itself: option codes as the drive holds them, `None` where they are unknown."""
+
+    quick_stop_option: int | None = None  # 605Ah
+    abort_connection_option: int | None = None  # 6007h
+    armed: bool = False  # whether it stops by itself when the gateway dies
+    warning: str | None = None
+
+
+class StopInfo(Struct, frozen=True):
+    """How a stop acts on this robot, and whether one is held now."""
+
+    held: bool
+    reason: str | None
+    since_ns: int | None
+    drives: dict[str, DriveReaction]
+
+
+class GuardInfo(Struct, frozen=True):
+    """The always-on watch."""
+
+    configured: bool = False
+
+
+class Description(Struct, frozen=True):
+    """Result of `robot.describe`."""
+
+    robot: str
+    boot_id: str
+    role: str  # of the gateway on the bus
+    components: list[ComponentInfo]
+    channels: list[ChannelInfo]
+    parameters: list[ParameterInfo]
+    modules: dict[str, str]  # module → off, starting, running, stopping
+    clock: Clock
+    stop: StopInfo
+    guard: GuardInfo
+
+
+class CpuUse(Struct, frozen=True):
+    """Percent of all cores together and of each, since this connection's last request.
+
+    `load` is the mean run queue over 1, 5 and 15 minutes.
+    """
+
+    percent: float | None
+    per_core: list[float | None]
+    load: list[float]
+
+
+class MemoryUse(Struct, frozen=True):
+    """Bytes."""
+
+    total: int
+    available: int
+    used: int
+    swap_used: int
+
+
+class ProcessUse(Struct, frozen=True):
+    """One process; `cpu_percent` is of one core, `memory_bytes` its resident set."""
+
+    pid: int
+    name: str
+    cpu_percent: float | None
+    memory_bytes: int
+    cmdline: str | UnsetType = UNSET
+
+
+class GatewayUse(Struct, frozen=True):
+    """What the gateway itself costs; `cpu_percent` is of one core."""
+
+    cpu_percent: float | None
+    rss_bytes: int
+
+
+class DiskUse(Struct, frozen=True):
+    """Bytes per second over all disks since this connection's last request."""
+
+    read_bytes_per_s: float | None
+    write_bytes_per_s: float | None
+
+
+class NetworkUse(Struct, frozen=True):
+    """Bytes per second over all interfaces since this connection's last request."""
+
+    received_bytes_per_s: float | None
+    sent_bytes_per_s: float | None
+
+
+class KernelFacts(Struct, frozen=True):
+    """The operating system's kernel."""
+
+    system: str
+    release: str
+    version: str
+    preempt_rt: bool | None
+
+
+class ResourceSnapshot(Struct, frozen=True):
+    """Result of `resource.snapshot`; what was not asked for is not there."""
+
+    stamp_ns: int
+    cpu: CpuUse
+    memory: MemoryUse
+    gateway: GatewayUse
+    processes: list[ProcessUse] | UnsetType = UNSET
+    disk: DiskUse | UnsetType = UNSET
+    network: NetworkUse | UnsetType = UNSET
+    thermal: dict[str, float | None] | UnsetType = UNSET  # sensor → °C
+    kernel: KernelFacts | UnsetType = UNSET
+
+
+QualityInfo = dict[str, str | int | float | None]  # state, age_ms, problem, and the component's own counters
+
+
+class Snapshot(Struct, frozen=True):
+    """Result of `component.snapshot` and `status.snapshot`."""
+
+    stamp_ns: int
+    values: dict[str, float | None]
+    stamps_ns: dict[str, int | None]
+    quality: dict[str, QualityInfo]
+
+
+class StreamStarted(Struct, frozen=True):
+    """Result of `stream.start`."""
+
+    stream: int
+
+
+class StreamData(Struct, frozen=True):
+    """Parameters of the notification `stream.data`: row i of every column was taken at `stamp_ns[i]`."""
+
+    stream: int
+    seq: int
+    dropped: int
+    stamp_ns: list[int]
+    columns: dict[str, list[float | None]]
+
+
+class Lease(Struct, frozen=True):
+    """Result of `control.acquire`."""
+
+    lease: str
+    expires_s: float
+
+
+class ParameterValue(Struct, frozen=True):
+    """One parameter's value; `None` with the reason in `problem` where it is not known."""
+
+    value: float | None
+    unit: str
+    min: float | None
+    max: float | None
+    stamp_ns: int | None
+    problem: str | None = None
+
+
+class ParameterValues(Struct, frozen=True):
+    """Result of `parameter.list` and `parameter.read`."""
+
+    values: dict[str, ParameterValue]
+
+
+class Written(Struct, frozen=True):
+    """Result of `parameter.write`: values as the device holds them."""
+
+    write: int
+    before: dict[str, float]
+    after: dict[str, float]
+
+
+StopOutcome = Literal["confirmed", "unconfirmed", "unreachable"]
+
+
+class Stopped(Struct, frozen=True):
+    """Result of `robot.stop`."""
+
+    drives: dict[str, StopOutcome]
+    held: bool
+
+
+class Method(Struct, frozen=True):
+    """What a method takes and gives. An urgent one overtakes everything its connection has queued."""
+
+    params: type[Struct]
+    result: type[Struct]
+    urgent: bool = False
+
+
+METHODS: Final[dict[str, Method]] = {
+    "hello": Method(HelloParams, Hello),
+    "clock.read": Method(Params, Clock),
+    "robot.describe": Method(Params, Description),
+    "robot.stop": Method(StopParams, Stopped, urgent=True),
+    "resource.snapshot": Method(ResourceSnapshotParams, ResourceSnapshot),
+    "component.snapshot": Method(SnapshotParams, Snapshot),
+    "status.snapshot": Method(Params, Snapshot),
+    "stream.start": Method(StreamStartParams, StreamStarted),
+    "stream.stop": Method(StreamStopParams, Done),
+    "control.acquire": Method(AcquireParams, Lease),
+    "control.release": Method(ReleaseParams, Done),
+    "parameter.list": Method(ParameterParams, ParameterValues),
+    "parameter.read": Method(ParameterParams, ParameterValues),
+    "parameter.write": Method(ParameterWriteParams, Written),
+}
+STREAM_DATA: Final = "stream.data"

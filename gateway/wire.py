@@ -1,0 +1,286 @@
+"""The wire: JSON-RPC 2.0, one UTF-8 message a line; framing, envelopes, errors. Pure, no I/O.
+
+The parameters and results of each method are in `gateway.messages`. Numbers that are not finite never reach
+the wire: msgspec encodes NaN and infinities as `null`.
+"""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, Final, Literal, TypeVar
+
+import msgspec
+from msgspec import UNSET, Raw, Struct, UnsetType
+
+PROTOCOL: Final = 1
+LINE_LIMIT: Final = 64 * 1024  # bytes of one inbound line at the gateway, without its newline
+ANSWER_LIMIT: Final = 16 * 1024 * 1024  # what a client accepts as one line
+
+Id = int | str | None
+
+PARSE_ERROR: Final = -32700
+INVALID_REQUEST: Final = -32600
+METHOD_NOT_FOUND: Final = -32601
+INVALID_PARAMS: Final = -32602
+INTERNAL_ERROR: Final = -32603
+
+
+class Kind(StrEnum):
+    """What an error means, for programs; the message is for people."""
+
+    BAD_PARAMS = "bad_params"
+    UNKNOWN_NAME = "unknown_name"
+    NO_LEASE = "no_lease"
+    LEASE_HELD = "lease_held"
+    NOT_ALLOWED = "not_allowed"
+    OUT_OF_LIMIT = "out_of_limit"
+    WRONG_STATE = "wrong_state"
+    READ_ONLY = "read_only"
+    TRIAL_PENDING = "trial_pending"
+    DEVICE_ABORT = "device_abort"
+    DEVICE_TIMEOUT = "device_timeout"
+    MISMATCH = "mismatch"
+    ROLLED_BACK = "rolled_back"
+    ROLLBACK_FAILED = "rollback_failed"
+    UNAVAILABLE = "unavailable"
+    STOPPED = "stopped"
+
+
+CODES: Final[Mapping[Kind, int]] = {
+    Kind.BAD_PARAMS: INVALID_PARAMS,
+    Kind.UNKNOWN_NAME: -32001,
+    Kind.NO_LEASE: -32002,
+    Kind.LEASE_HELD: -32003,
+    Kind.NOT_ALLOWED: -32004,
+    Kind.OUT_OF_LIMIT: -32005,
+    Kind.WRONG_STATE: -32006,
+    Kind.READ_ONLY: -32007,
+    Kind.TRIAL_PENDING: -32008,
+    Kind.DEVICE_ABORT: -32010,
+    Kind.DEVICE_TIMEOUT: -32011,
+    Kind.MISMATCH: -32012,
+    Kind.ROLLED_BACK: -32013,
+    Kind.ROLLBACK_FAILED: -32014,
+    Kind.UNAVAILABLE: -32015,
+    Kind.STOPPED: -32016,
+}
+
+
+class ErrorData(Struct, frozen=True, omit_defaults=True):
+    """The `data` of an error. `object` is written `"0x6065:0"`; `outcome` says what became of each name."""
+
+    kind: Kind
+    component: str | None = None
+    object: str | None = None
+    abort_code: int | None = None
+    limit: float | None = None
+    outcome: dict[str, str] | None = None
+
+
+class ErrorBody(Struct, frozen=True):
+    """The `error` of a response."""
+
+    code: int
+    message: str
+    data: ErrorData | None = None
+
+
+class RpcError(Exception):
+    """A request that is answered with an error; its text says what to do about it."""
+
+    def __init__(self, message: str, data: ErrorData, code: int | None = None) -> None:
+        super().__init__(message)
+        self.data = data
+        self.code = CODES[data.kind] if code is None else code
+
+    @property
+    def kind(self) -> Kind:
+        return self.data.kind
+
+    @property
+    def body(self) -> ErrorBody:
+        return ErrorBody(self.code, str(self), self.data)
+
+
+def refuse(kind: Kind, message: str, **data: Any) -> RpcError:
+    """An error of that kind; `data` are further fields of `ErrorData`."""
+    return RpcError(message, ErrorData(kind, **data))
+
+
+def unknown_method(name: str) -> RpcError:
+    """What a method that does not exist is answered with (−32601)."""
+    return RpcError(f"there is no method {name!r}", ErrorData(Kind.UNKNOWN_NAME), METHOD_NOT_FOUND)
+
+
+class BadLine(RpcError):
+    """A line that holds no request; `id` is what could still be read of it."""
+
+    def __init__(self, message: str, code: int = INVALID_REQUEST, id: Id = None) -> None:  # noqa: A002
+        super().__init__(message, ErrorData(Kind.BAD_PARAMS), code)
+        self.id = id
+
+
+class LineSplitter:
+    """Cuts a byte stream into lines and never holds more than `limit` bytes of one.
+
+    A longer line is dropped up to its newline and reported once, in its place, as a `BadLine`.
+    Empty lines are skipped; a carriage return before the newline belongs to the newline.
+    """
+
+    def __init__(self, limit: int = LINE_LIMIT) -> None:
+        self.limit = limit
+        self.too_long = 0  # lines dropped for their length
+        self._rest = bytearray()
+        self._skipping = False
+
+    def feed(self, data: bytes) -> list[bytes | BadLine]:
+        """The lines that `data` completes, in order."""
+        lines: list[bytes | BadLine] = []
+        *ended, rest = data.split(b"\n")
+        for piece in ended:
+            self._add(piece, lines)
+            self._end_line(lines)
+        self._add(rest, lines)
+        return lines
+
+    def end(self) -> list[bytes | BadLine]:
+        """The last line, where the stream ended without a newline."""
+        lines: list[bytes | BadLine] = []
+        self._end_line(lines)
+        return lines
+
+    def _add(self, piece: bytes, lines: list[bytes | BadLine]) -> None:
+        if self._skipping:
+            return
+        self._rest += piece
+        # The one byte more is room for a carriage return.
+        if len(self._rest) > self.limit + self._rest.endswith(b"\r"):
+            self._rest.clear()
+            self._skipping = True
+            self.too_long += 1
+            lines.append(
+                BadLine(f"a line may be {self.limit} bytes long; this one is longer and was dropped")
+            )
+
+    def _end_line(self, lines: list[bytes | BadLine]) -> None:
+        line = bytes(self._rest).removesuffix(b"\r")
+        self._rest.clear()
+        self._skipping = False
+        if line:
+            lines.append(line)
+
+
+class Request(Struct, frozen=True, forbid_unknown_fields=True):
+    """A request, or a notification where `id` is unset. `params` stay undecoded until the method is known."""
+
+    jsonrpc: Literal["2.0"]
+    method: str
+    params: Raw | UnsetType = UNSET
+    id: Id | UnsetType = UNSET
+
+
+class Response(Struct, frozen=True):
+    """An answer as a client reads it: exactly one of `result` and `error` is set."""
+
+    jsonrpc: Literal["2.0"]
+    id: Id
+    result: Raw | UnsetType = UNSET
+    error: ErrorBody | UnsetType = UNSET
+
+
+class Notification(Struct, frozen=True):
+    """A message that nobody answers, as a client reads it."""
+
+    jsonrpc: Literal["2.0"]
+    method: str
+    params: Raw = Raw(b"{}")
+
+
+class _Outgoing(Struct, frozen=True):
+    id: Id | UnsetType = UNSET
+    method: str | UnsetType = UNSET
+    params: Any = UNSET
+    result: Any = UNSET
+    error: ErrorBody | UnsetType = UNSET
+    jsonrpc: Literal["2.0"] = "2.0"
+
+
+_encoder = msgspec.json.Encoder()
+_request_decoder = msgspec.json.Decoder(Request)
+
+
+def _line(message: _Outgoing) -> bytes:
+    return _encoder.encode(message) + b"\n"
+
+
+def encode_request(id: Id, method: str, params: object = UNSET) -> bytes:  # noqa: A002
+    """One request as a line."""
+    return _line(_Outgoing(id=id, method=method, params=params))
+
+
+def encode_result(id: Id, result: object) -> bytes:  # noqa: A002
+    """One successful answer as a line."""
+    return _line(_Outgoing(id=id, result=result))
+
+
+def encode_error(id: Id, error: RpcError) -> bytes:  # noqa: A002
+    """One error as a line."""
+    return _line(_Outgoing(id=id, error=error.body))
+
+
+def encode_notification(method: str, params: object) -> bytes:
+    """One notification as a line."""
+    return _line(_Outgoing(method=method, params=params))
+
+
+def decode_request(line: bytes) -> Request:
+    """One line as a request.
+
+    Raises:
+        BadLine: what the line holds is no JSON (−32700) or no single request (−32600).
+
+    """
+    try:
+        if not line.isascii():
+            line.decode()
+        return _request_decoder.decode(line)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise _explain(line, error) from error
+
+
+def _explain(line: bytes, error: Exception) -> BadLine:
+    """The slow way, taken only by what is no request: find out why, and whose it was."""
+    try:
+        found = msgspec.json.decode(line.decode())
+    except RecursionError:
+        return BadLine("the message is nested too deeply", PARSE_ERROR)
+    except (msgspec.DecodeError, UnicodeDecodeError) as reason:
+        return BadLine(f"this is not UTF-8 JSON: {reason}", PARSE_ERROR)
+    if isinstance(found, list):
+        return BadLine("batches are not supported: send one request a line")
+    if not isinstance(found, dict):
+        return BadLine('a request is an object: {"jsonrpc": "2.0", "id": 1, "method": "…", "params": {…}}')
+    known = found.get("id")
+    usable = isinstance(known, str) or (isinstance(known, int) and not isinstance(known, bool))
+    return BadLine(f"not a JSON-RPC 2.0 request: {error}", id=known if usable else None)
+
+
+_Params = TypeVar("_Params", bound=Struct)
+
+
+def decode_params(raw: Raw | UnsetType, type: type[_Params]) -> _Params:  # noqa: A002
+    """The parameters of a request as the method's own struct.
+
+    Raises:
+        RpcError: −32602; the message names the field and what is allowed.
+
+    """
+    encoded = b"{}" if raw is UNSET else bytes(raw)
+    if encoded == b"null":
+        encoded = b"{}"
+    if encoded.startswith(b"["):
+        raise refuse(Kind.BAD_PARAMS, "parameters go by name: send an object, not a list")
+    try:
+        return msgspec.json.decode(encoded, type=type)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        allowed = ", ".join(type.__struct_encode_fields__) or "none"
+        raise refuse(Kind.BAD_PARAMS, f"{error} (parameters here: {allowed})") from error
