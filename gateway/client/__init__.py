@@ -1,0 +1,42 @@
+"""How servers and scripts reach a robot: `Client` for asyncio, `Robot` for blocking scripts.
+
+connection (one TCP connection) → link (reconnection, clock, streams) → client (the methods) → blocking (a
+thread).
+"""
+
+from gateway.client.address import Address
+from gateway.client.blocking import Robot
+from gateway.client.client import Client
+from gateway.client.clock import ClockOffset
+from gateway.client.errors import (
+    BadAddress,
+    CallTimeout,
+    ClientError,
+    LinkLost,
+    NotConnected,
+    ProtocolError,
+    RemoteError,
+    Unreachable,
+)
+from gateway.client.link import ConnectionState, LinkSettings
+from gateway.client.subscription import Batch, StreamCounters, Subscription
+
+__all__ = [
+    "Address",
+    "BadAddress",
+    "Batch",
+    "CallTimeout",
+    "Client",
+    "ClientError",
+    "ClockOffset",
+    "ConnectionState",
+    "LinkLost",
+    "LinkSettings",
+    "NotConnected",
+    "ProtocolError",
+    "RemoteError",
+    "Robot",
+    "StreamCounters",
+    "Subscription",
+    "Unreachable",
+]

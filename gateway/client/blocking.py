@@ -1,0 +1,129 @@
+"""A robot for scripts: the same client behind plain blocking calls."""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Coroutine, Generator, Iterable, Mapping
+from typing import Any, Self, TypeVar
+
+from gateway.client.address import Address
+from gateway.client.client import Client
+from gateway.client.link import LinkSettings
+from gateway.client.subscription import Batch
+from gateway.messages import (
+    Description,
+    ModuleName,
+    ParameterValues,
+    ResourceSnapshot,
+    ResourceSnapshotParams,
+    Snapshot,
+    Stopped,
+    Written,
+)
+
+Result = TypeVar("Result")
+THREAD_NAME = "robot link"
+
+
+class Robot:
+    """One robot, asked with blocking calls from any thread; connects at once or raises.
+
+        with Robot("127.0.0.1:7420") as robot:
+            print(robot.read("gait.*").values)
+            for batch in robot.watch("left_knee.position", rate_hz=50): ...
+
+    The link lives in a thread of its own, which `close` joins. A call that is interrupted (Ctrl-C) forgets
+    its answer, as in `Client`.
+    """
+
+    def __init__(self, address: Address | str = "", settings: LinkSettings | None = None) -> None:
+        self._client = Client(address, settings)
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name=THREAD_NAME)
+        self._thread.start()
+        try:
+            self._wait(self._client.__aenter__())
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the link, its streams and its thread. Idempotent."""
+        if self._loop.is_closed():
+            return
+        try:
+            self._wait(self._client.close())
+        finally:
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+            self._loop.close()
+
+    def describe(self) -> Description:
+        """What the robot is made of."""
+        return self._wait(self._client.describe())
+
+    def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
+        """CPU, memory and processes; percentages are None the first time."""
+        return self._wait(self._client.resources(params))
+
+    def components(self, *channels: str) -> Snapshot:
+        """The newest value of the channels (globs; none means all)."""
+        return self._wait(self._client.components(*channels))
+
+    def status(self) -> Snapshot:
+        """The merged set that status prediction needs."""
+        return self._wait(self._client.status())
+
+    def watch(
+        self,
+        *channels: str,
+        rate_hz: float = 50.0,
+        modules: Iterable[ModuleName] = ("component",),
+        depth: int = 1024,
+    ) -> Generator[Batch, None, None]:
+        """Batches of these channels for as long as the caller iterates, over dropped links too."""
+        subscribed = self._client.subscribe(*channels, rate_hz=rate_hz, modules=modules, depth=depth)
+        stream = self._wait(subscribed.__aenter__())
+        try:
+            with contextlib.suppress(StopAsyncIteration):
+                while True:
+                    yield self._wait(stream.__anext__())
+        finally:
+            if not self._loop.is_closed():
+                self._wait(subscribed.__aexit__(None, None, None))
+
+    def read(self, *names: str) -> ParameterValues:
+        """Parameters (globs; none means all) as the devices hold them now."""
+        return self._wait(self._client.read(*names))
+
+    def write(self, changes: Mapping[str, float]) -> Written:
+        """Take the lease, change parameters (all or none, read back), give the lease back.
+
+        Raises:
+            RemoteError: refused or rolled back; `kind` and `data` say why.
+
+        """
+
+        async def write() -> Written:
+            async with self._client.writing():
+                return await self._client.write(changes)
+
+        return self._wait(write())
+
+    def stop(self, reason: str) -> Stopped:
+        """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed."""
+        return self._wait(self._client.stop(reason))
+
+    def _wait(self, work: Coroutine[Any, Any, Result]) -> Result:
+        future = asyncio.run_coroutine_threadsafe(work, self._loop)
+        try:
+            return future.result()
+        except BaseException:
+            future.cancel()
+            raise

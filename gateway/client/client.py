@@ -1,0 +1,150 @@
+"""A robot, asked over asyncio: every method of the wire with its types."""
+
+import contextlib
+from collections.abc import AsyncIterator, Iterable, Mapping
+from typing import Self
+
+from gateway.client.address import Address
+from gateway.client.errors import LinkLost, NotConnected
+from gateway.client.link import Link, LinkSettings, OnState
+from gateway.client.subscription import Subscription
+from gateway.messages import (
+    AcquireParams,
+    Description,
+    Done,
+    Lease,
+    ModuleName,
+    ParameterParams,
+    ParameterValues,
+    ParameterWriteParams,
+    Params,
+    ReleaseParams,
+    ResourceSnapshot,
+    ResourceSnapshotParams,
+    Snapshot,
+    SnapshotParams,
+    StopParams,
+    Stopped,
+    StreamStartParams,
+    Written,
+)
+
+WRITE_TIMEOUT_S = 30.0  # a transaction over several drives, verified and perhaps rolled back
+STOP_TIMEOUT_S = 5.0
+
+
+class Client:
+    """One robot.
+
+    `async with Client("127.0.0.1:7420") as robot` connects or raises; afterwards the link is made again
+    whenever it drops. A server that must not fail because a robot is off calls `link.start()` instead and
+    watches `link.state`.
+
+    Ordering: requests are sent in the order of the calls; answers may come in another. Loss: a call is sent
+    at once and once, or raises; one that fails with `LinkLost` or `CallTimeout` may have been carried out.
+    Cancellation: forgets the answer, undoes nothing.
+    """
+
+    def __init__(
+        self,
+        address: Address | str = "",
+        settings: LinkSettings | None = None,
+        on_state: OnState | None = None,
+    ) -> None:
+        where = Address.parse(address) if isinstance(address, str) else address
+        self.link = Link(where, settings or LinkSettings(), on_state)
+
+    async def __aenter__(self) -> Self:
+        self.link.start()
+        try:
+            await self.link.first_attempt()
+        except BaseException:
+            await self.close()
+            raise
+        return self
+
+    async def __aexit__(self, *exc: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """End the link and every stream. Idempotent."""
+        await self.link.close()
+
+    async def describe(self) -> Description:
+        """What the robot is made of."""
+        return await self.link.call("robot.describe", Params(), Description)
+
+    async def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
+        """CPU, memory and processes; percentages are None the first time on a link."""
+        return await self.link.call("resource.snapshot", params or ResourceSnapshotParams(), ResourceSnapshot)
+
+    async def components(self, *channels: str) -> Snapshot:
+        """The newest value of the channels (globs; none means all)."""
+        return await self.link.call("component.snapshot", SnapshotParams(list(channels) or None), Snapshot)
+
+    async def status(self) -> Snapshot:
+        """The merged set that status prediction needs."""
+        return await self.link.call("status.snapshot", Params(), Snapshot)
+
+    @contextlib.asynccontextmanager
+    async def subscribe(
+        self,
+        *channels: str,
+        rate_hz: float = 50.0,
+        modules: Iterable[ModuleName] = ("component",),
+        depth: int = 1024,
+    ) -> AsyncIterator[Subscription]:
+        """A stream of these channels (globs; none means all), started again on every new link.
+
+        `rate_hz` 0 gives every sample of every source. At most `depth` notifications wait to be taken.
+        """
+        request = StreamStartParams(list(modules), rate_hz, list(channels) or None)
+        subscription = await self.link.subscribe(request, depth)
+        try:
+            yield subscription
+        finally:
+            await self.link.unsubscribe(subscription)
+
+    async def read(self, *names: str) -> ParameterValues:
+        """Parameters (globs; none means all) as the devices hold them now."""
+        return await self.link.call(
+            "parameter.read", ParameterParams(list(names) or None), ParameterValues, WRITE_TIMEOUT_S
+        )
+
+    async def acquire(self, ttl_s: float = 60.0) -> Lease:
+        """Become the one writer for `ttl_s` seconds (at most 300); again to stay it."""
+        return await self.link.call("control.acquire", AcquireParams(ttl_s), Lease)
+
+    async def release(self) -> None:
+        """Let others write."""
+        await self.link.call("control.release", ReleaseParams(), Done)
+
+    async def write(self, changes: Mapping[str, float]) -> Written:
+        """Change parameters, all or none, read back. Needs the lease.
+
+        Raises:
+            RemoteError: refused or rolled back; `kind` and `data` say why.
+
+        """
+        return await self.link.call(
+            "parameter.write", ParameterWriteParams(dict(changes)), Written, WRITE_TIMEOUT_S
+        )
+
+    @contextlib.asynccontextmanager
+    async def writing(self, ttl_s: float = 60.0) -> AsyncIterator[None]:
+        """Hold the lease for a block: `async with robot.writing(): await robot.write(…)`."""
+        await self.acquire(ttl_s)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(NotConnected, LinkLost):  # the lease went with the connection
+                await self.release()
+
+    async def stop(self, reason: str) -> Stopped:
+        """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed.
+
+        Raises:
+            ClientError: the robot did not answer; consider it NOT stopped.
+
+        """
+        return await self.link.call("robot.stop", StopParams(reason), Stopped, STOP_TIMEOUT_S)

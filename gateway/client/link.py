@@ -1,0 +1,304 @@
+"""A link to one robot that is made again whenever it drops, with the streams that hang on it."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeVar
+
+import msgspec
+
+from gateway.client.address import Address
+from gateway.client.backoff import Backoff
+from gateway.client.clock import ClockTracker
+from gateway.client.connection import Connection
+from gateway.client.errors import CallTimeout, ClientError, LinkLost, NotConnected, ProtocolError, RemoteError
+from gateway.client.subscription import Subscription
+from gateway.messages import (
+    STREAM_DATA,
+    Clock,
+    Done,
+    Hello,
+    HelloParams,
+    Params,
+    StreamData,
+    StreamStarted,
+    StreamStartParams,
+    StreamStopParams,
+)
+from gateway.wire import PROTOCOL
+
+Answer = TypeVar("Answer")
+
+
+class ConnectionState(Enum):
+    """Where a link stands."""
+
+    IDLE = "idle"  # not started
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    WAITING = "waiting"  # for the next attempt
+    CLOSED = "closed"
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSettings:
+    """How a link behaves: times in seconds."""
+
+    client: str = "gwrms"  # the name that the robot's journal shows
+    token: str | None = None
+    connect_timeout_s: float = 3.0
+    call_timeout_s: float = 5.0
+    silence_s: float = 3.0  # a link on which nothing came for so long is given up
+    reconnect: bool = True
+
+
+OnState = Callable[[ConnectionState], None]
+
+
+class Link:
+    """Keeps one connection to a robot alive from `start` to `close`.
+
+    Nothing is queued while there is no connection: a call is sent at once or raises `NotConnected`, so that
+    no write and no stop can come out later than it was meant. Streams are started again on each new
+    connection. The robot is asked for its clock three times in `silence_s`, which finds a peer that
+    vanished without closing.
+    """
+
+    def __init__(self, address: Address, settings: LinkSettings, on_state: OnState | None = None) -> None:
+        self.address = address
+        self.settings = settings
+        self.state = ConnectionState.IDLE
+        self.problem: ClientError | None = None
+        self.hello: Hello | None = None
+        self.clock = ClockTracker()
+        self.connections = 0
+        self._on_state = on_state
+        self._connection: Connection | None = None
+        self._supervisor: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        self._subscriptions: list[Subscription] = []
+        self._streams: dict[int, Subscription] = {}
+        self._decode_data = msgspec.json.Decoder(StreamData).decode
+
+    # --- life
+
+    def start(self) -> None:
+        """Begin to connect, in a task of this event loop. Idempotent."""
+        if self._supervisor is None:
+            self._supervisor = asyncio.create_task(self._supervise(), name=f"link to {self.address}")
+
+    async def close(self) -> None:
+        """End the link and its streams; what waits for an answer fails with `LinkLost`. Idempotent."""
+        if self._supervisor is None:
+            return
+        self._supervisor.cancel()
+        await asyncio.wait([self._supervisor])
+        if not self._supervisor.cancelled():
+            self._supervisor.result()
+
+    async def first_attempt(self) -> None:
+        """Wait until the first attempt has ended.
+
+        Raises:
+            ClientError: it failed, for this reason; later attempts go on until `close`.
+
+        """
+        while self.state in (ConnectionState.IDLE, ConnectionState.CONNECTING):
+            await self._next_change()
+        if self.state is not ConnectionState.CONNECTED and self.problem is not None:
+            raise self.problem
+
+    async def connected(self) -> Hello:
+        """Wait for a connection, for as long as it takes.
+
+        Raises:
+            NotConnected: the link was closed, or it is not to reconnect and dropped.
+
+        """
+        while self.state is not ConnectionState.CONNECTED or self.hello is None:
+            if self.state is ConnectionState.CLOSED:
+                raise NotConnected(f"the link to {self.address} is closed")
+            await self._next_change()
+        return self.hello
+
+    # --- use
+
+    async def call(
+        self, method: str, params: object, answer: type[Answer], timeout_s: float | None = None
+    ) -> Answer:
+        """One request and its result as `answer`; see `Connection.call`.
+
+        Raises:
+            NotConnected: there is no connection now, and nothing was sent.
+
+        """
+        if self._connection is None:
+            why = f" ({self.problem})" if self.problem is not None else ""
+            raise NotConnected(f"there is no link to {self.address} now{why}; {method} was not sent")
+        return await self._ask(self._connection, method, params, answer, timeout_s)
+
+    async def subscribe(self, request: StreamStartParams, depth: int) -> Subscription:
+        """Start a stream now, or as soon as there is a connection.
+
+        Raises:
+            RemoteError: the robot refuses it.
+
+        """
+        subscription = Subscription(request, depth)
+        self._subscriptions.append(subscription)
+        if self._connection is not None:
+            try:
+                await self._start_stream(self._connection, subscription)
+            except (NotConnected, LinkLost):
+                pass  # it is started with the next connection
+            except ClientError:
+                self._subscriptions.remove(subscription)
+                raise
+        return subscription
+
+    async def unsubscribe(self, subscription: Subscription) -> None:
+        """Stop a stream on the robot and end its iterator. Idempotent."""
+        subscription.end()
+        if subscription not in self._subscriptions:
+            return
+        self._subscriptions.remove(subscription)
+        if subscription.stream is not None and self._streams.pop(subscription.stream, None) is not None:
+            # Without a connection there is no stream either.
+            with contextlib.suppress(NotConnected, LinkLost):
+                await self.call("stream.stop", StreamStopParams(subscription.stream), Done)
+
+    # --- supervision
+
+    async def _supervise(self) -> None:
+        backoff = Backoff()
+        reason: ClientError | None = None
+        try:
+            while True:
+                self._set(ConnectionState.CONNECTING)
+                try:
+                    await self._session(backoff)
+                except ClientError as error:
+                    self.problem = error
+                if not self.settings.reconnect:
+                    reason = self.problem
+                    return
+                self._set(ConnectionState.WAITING)
+                await asyncio.sleep(backoff.next_s())
+        finally:
+            self._set(ConnectionState.CLOSED)
+            self._end_streams(reason)
+
+    async def _session(self, backoff: Backoff) -> None:
+        """One connection from beginning to end; returns only by raising why it ended."""
+        connection = await Connection.open(self.address, self._notified, self.settings.connect_timeout_s)
+        try:
+            await self._greet(connection)
+            await self._beat(connection)
+            self._connection = connection
+            self.connections += 1
+            for subscription in tuple(self._subscriptions):
+                await self._restart(connection, subscription)
+            self.problem = None
+            self._set(ConnectionState.CONNECTED)
+            while True:
+                await asyncio.wait([connection.closed], timeout=self.settings.silence_s / 3)
+                if connection.closed.done():
+                    raise connection.closed.result()
+                await self._beat(connection)
+                backoff.reset()  # it lived: not one that closes whatever connects
+        finally:
+            self._connection = None
+            self._streams.clear()
+            connection.close()
+
+    async def _greet(self, connection: Connection) -> None:
+        params = HelloParams(self.settings.client, PROTOCOL, self.settings.token)
+        hello = await self._ask(connection, "hello", params, Hello)
+        if hello.protocol != PROTOCOL:
+            raise ProtocolError(
+                f"{self.address} speaks protocol {hello.protocol}, this program speaks {PROTOCOL}; "
+                "update the older of the two"
+            )
+        if self.hello is not None and self.hello.boot_id != hello.boot_id:
+            self.clock.clear()
+        self.hello = hello
+
+    async def _beat(self, connection: Connection) -> None:
+        """Ask for the robot's clock; silence for too long ends the connection."""
+        sent_ns = time.monotonic_ns()
+        try:
+            clock = await self._ask(connection, "clock.read", Params(), Clock, self.settings.silence_s)
+        except CallTimeout as error:
+            silent_s = (time.monotonic_ns() - connection.received_ns) / 1e9
+            if silent_s < self.settings.silence_s:
+                return  # it is busy, not gone
+            raise LinkLost(
+                f"nothing came from {self.address} for {silent_s:.1f} s; the link is given up"
+            ) from error
+        self.clock.feed(sent_ns, clock.monotonic_ns, connection.received_ns)
+
+    async def _restart(self, connection: Connection, subscription: Subscription) -> None:
+        try:
+            await self._start_stream(connection, subscription)
+        except RemoteError as error:
+            # The robot changed while we were away: this stream cannot go on, the others can.
+            self._subscriptions.remove(subscription)
+            subscription.end(error)
+
+    async def _start_stream(self, connection: Connection, subscription: Subscription) -> None:
+        def named(result: msgspec.Raw) -> None:
+            stream = self._read(result, StreamStarted, "stream.start").stream
+            self._streams[stream] = subscription
+            subscription.restarted(stream, self.connections)
+
+        await connection.call("stream.start", subscription.request, self.settings.call_timeout_s, named)
+
+    def _notified(self, method: str, params: msgspec.Raw) -> None:
+        if method != STREAM_DATA:
+            return  # a newer gateway may tell more than we know
+        try:
+            data = self._decode_data(params)
+        except msgspec.MsgspecError as error:
+            raise ProtocolError(f"{self.address} sent stream data that cannot be read: {error}") from error
+        subscription = self._streams.get(data.stream)
+        if subscription is not None:
+            subscription.feed(data, time.monotonic_ns())
+
+    # --- small things
+
+    async def _ask(
+        self,
+        connection: Connection,
+        method: str,
+        params: object,
+        answer: type[Answer],
+        timeout_s: float | None = None,
+    ) -> Answer:
+        result = await connection.call(method, params, timeout_s or self.settings.call_timeout_s)
+        return self._read(result, answer, method)
+
+    def _read(self, result: msgspec.Raw, answer: type[Answer], method: str) -> Answer:
+        try:
+            return msgspec.json.decode(result, type=answer)
+        except msgspec.MsgspecError as error:
+            raise ProtocolError(f"{self.address} answered {method} with something else: {error}") from error
+
+    def _end_streams(self, reason: ClientError | None) -> None:
+        for subscription in self._subscriptions:
+            subscription.end(reason)
+        self._subscriptions.clear()
+
+    def _set(self, state: ConnectionState) -> None:
+        if state is self.state:
+            return
+        self.state = state
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+        if self._on_state is not None:
+            self._on_state(state)
+
+    async def _next_change(self) -> None:
+        await self._changed.wait()

@@ -1,0 +1,79 @@
+"""The face for scripts: five lines, one thread, nothing left behind."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from gateway.client import BadAddress, LinkSettings, RemoteError, Robot, Unreachable
+from tests.fake_robot import FakeRobot
+
+PATIENT = LinkSettings(silence_s=30.0)
+
+
+@pytest.fixture
+def fake() -> Iterator[FakeRobot]:
+    with FakeRobot() as robot:
+        yield robot
+
+
+def test_script_connects_reads_watches_writes_and_stops(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot:
+        assert robot.read("gait.*").values["gait.step_length"].value == 0.40
+        batch = next(robot.watch("left_knee.position", rate_hz=50))
+        written = robot.write({"gait.step_length": 0.42})
+        stopped = robot.stop("script has ended")
+    assert list(batch.columns) == ["left_knee.position"]
+    assert (written.before, written.after) == ({"gait.step_length": 0.40}, {"gait.step_length": 0.42})
+    assert set(stopped.drives.values()) == {"confirmed"}
+    assert fake.called("robot.stop") == [{"reason": "script has ended"}]
+
+
+def test_lease_is_given_back_after_a_refused_write(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot, pytest.raises(RemoteError, match="above"):
+        robot.write({"gait.step_length": 9.0})
+    order = [name for name, _ in fake.calls if name.startswith(("control.", "parameter."))]
+    assert order == ["control.acquire", "parameter.write", "control.release"]
+
+
+def test_watching_ends_its_stream_when_the_loop_is_left(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot:
+        for _, _batch in zip(range(3), robot.watch("*.force", rate_hz=100), strict=False):
+            pass
+        robot.describe()
+        assert len(fake.called("stream.stop")) == 1
+
+
+def test_unreachable_robot_leaves_no_thread() -> None:
+    with FakeRobot() as gone:
+        address = gone.address
+    before = threading.active_count()
+    with pytest.raises(Unreachable):
+        Robot(address, PATIENT)
+    with pytest.raises(BadAddress):
+        Robot("host:port:more")
+    assert threading.active_count() == before
+
+
+def test_closing_twice_is_harmless(fake: FakeRobot) -> None:
+    robot = Robot(fake.address, PATIENT)
+    robot.close()
+    robot.close()
+
+
+def test_watch_goes_on_over_a_dropped_link(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot:
+        stream = robot.watch("left_knee.position", rate_hz=100)
+        first = next(stream)
+        fake.cut()
+        assert next(batch for batch in stream if batch.link > first.link).columns
+        stream.close()
+
+
+def test_snapshots_come_typed(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot:
+        assert robot.resources().cpu.percent is None
+        assert robot.resources().cpu.percent == 21.5
+        assert set(robot.components("left_insole.*").values) == {"left_insole.force"}
+        assert robot.status().quality["trunk"]["state"] == "ok"
+        assert robot.describe().robot == "exo-fake"
