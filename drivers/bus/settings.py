@@ -1,0 +1,59 @@
+"""What an integrator says about a CAN bus and the devices on it: `[can.NAME]` and `[device.NAME]`."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Annotated, Any
+
+import msgspec
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NodeId = Annotated[int, msgspec.Meta(ge=1, le=127)]
+CobId = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
+
+
+class Role(StrEnum):
+    """Who the gateway is on its buses."""
+
+    OBSERVER = "observer"  # another controller owns the bus; only SDO requests that were asked for
+    MASTER = "master"  # a bench: NMT start, SYNC and a heartbeat are ours
+
+
+class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One bus. `more` holds python-can's own further keys, as they stand in the table."""
+
+    interface: str  # python-can's name: "socketcan", "socketcand", "virtual", "slcan", …
+    channel: str | int
+    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000)] | None = None
+    sync_period_s: Positive | None = None  # master only
+    node_id: NodeId | None = None  # our own, for our heartbeat; master only
+    heartbeat_s: Positive | None = None  # how often we send it
+    more: dict[str, Any] = {}
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> "CanSettings":
+        """The settings in a TOML table whose further keys are python-can's.
+
+        Raises `msgspec.ValidationError`, which names the key and what is allowed.
+        """
+        ours = {key: value for key, value in table.items() if key in cls.__struct_fields__ and key != "more"}
+        more = {key: value for key, value in table.items() if key not in ours}
+        return msgspec.convert({**ours, "more": more}, cls)
+
+
+class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How long one node is waited for, and by which SDO channel it is asked."""
+
+    sdo_timeout_s: Positive = 0.5
+    sdo_cob_ids: tuple[CobId, CobId] | None = None  # request, response; None: 600h and 580h + node id
+    heartbeat_timeout_s: Positive | None = None  # None: 2.5 times what the device says in 1017h
+    guard_time_s: Positive | None = None  # node guarding by us, for a device without heartbeat; master only
+
+
+class DeviceSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A CANopen device that is no joint, such as a gait controller with parameters."""
+
+    bus: str
+    node_id: NodeId
+    eds: str
+    stale_after_s: Positive = 0.5
+    lost_after_s: Positive = 2.0

@@ -1,0 +1,36 @@
+"""What an integrator says about a joint: the table `[joint.NAME]` of the robot's file."""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from drivers.bus.settings import NodeId, NodeTimes, Positive
+
+VelocityUnit = Literal["counts/s", "rpm", "0.1rpm", "0.01rpm", "0.001rpm"]
+
+
+class JointSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One axis of a CiA 402 drive, and how its counts become the joint's angle.
+
+    angle = direction · counts / (counts_per_revolution · gear_ratio) · 2π + zero_offset
+    """
+
+    bus: str
+    node_id: NodeId
+    eds: str
+    axis: Annotated[int, msgspec.Meta(ge=0, le=7)] = 0  # of a multi-axis drive: its objects lie 800h apart
+    counts_per_revolution: Positive  # of the encoder that 6064h counts
+    gear_ratio: Positive  # its revolutions per revolution of the joint
+    direction: Literal[1, -1] = 1
+    zero_offset: float = 0.0  # rad: the joint's angle where the drive counts 0
+    velocity_unit: VelocityUnit = "counts/s"  # of 606Ch, at the encoder
+    rated_torque: Positive | None = None  # N·m at the joint; None: 6076h times gear_ratio
+    rated_current: Positive | None = None  # A; None: 6075h
+    poll_hz: Annotated[float, msgspec.Meta(ge=0, le=200)] = (
+        20.0  # position and state no TPDO brings; 0: never
+    )
+    slow_poll_hz: Annotated[float, msgspec.Meta(ge=0, le=50)] = 4.0  # all else no TPDO brings; 0: never
+    configure_pdos: bool = False  # may the gateway change the drive's PDO mapping?
+    stop_timeout_s: Positive = 1.0  # how long a quick stop may take to be confirmed
+    stale_after_s: Positive = 0.5
+    lost_after_s: Positive = 2.0
