@@ -8,6 +8,7 @@ import asyncio
 import fnmatch
 import json
 import math
+import socket
 import threading
 import time
 from collections.abc import Callable, Coroutine
@@ -48,7 +49,8 @@ class FakeRobot:
         self._resource_asked = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="fake-robot")
-        self._server: asyncio.Server | None = None
+        self._acceptor: asyncio.Task[None] | None = None
+        self._last_guest: object = None
         self._sessions: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self._methods: dict[str, Answer] = {
             "hello": self._hello,
@@ -79,7 +81,6 @@ class FakeRobot:
 
     def __exit__(self, *exc: object) -> None:
         self.refuse()
-        self._run(self._loop.shutdown_asyncgens())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
@@ -114,14 +115,32 @@ class FakeRobot:
 
     # --- the server
 
+    # asyncio's own server loses sockets that it has just accepted when it is closed; this one does not.
     async def _listen(self) -> None:
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, limit=1 << 20)
-        self.port = self._server.sockets[0].getsockname()[1]
+        listener = socket.create_server(("127.0.0.1", self.port))
+        listener.setblocking(False)
+        self.port = listener.getsockname()[1]
+        self._acceptor = asyncio.create_task(self._accept(listener))
+
+    async def _accept(self, listener: socket.socket) -> None:
+        with listener:
+            while True:
+                sock, peer = await self._loop.sock_accept(listener)
+                if peer == self._last_guest:
+                    sock.close()
+                    return
+                reader, writer = await asyncio.open_connection(sock=sock)
+                task = asyncio.create_task(self._serve(reader, writer))
+                self._sessions[task] = writer
 
     async def _close(self) -> None:
-        if self._server is not None:
-            self._server.close()
-            self._server = None
+        if self._acceptor is not None:
+            with socket.socket() as guest:
+                guest.bind(("127.0.0.1", 0))
+                self._last_guest = guest.getsockname()
+                guest.connect(("127.0.0.1", self.port))
+                await self._acceptor
+            self._acceptor = None
         await self._cut()
 
     async def _cut(self) -> None:
@@ -130,12 +149,9 @@ class FakeRobot:
             writer.transport.abort()
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        await asyncio.sleep(0)  # the transports close their sockets in the loop's next turn
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        if task is None:
-            raise RuntimeError("not in a task")
-        self._sessions[task] = writer
         streams: list[asyncio.Task[None]] = []
         try:
             while line := await reader.readline():
@@ -156,8 +172,8 @@ class FakeRobot:
             for stream in streams:
                 stream.cancel()
             await asyncio.gather(*streams, return_exceptions=True)
-            del self._sessions[task]
             writer.close()
+            self._sessions = {task: known for task, known in self._sessions.items() if known is not writer}
 
     def _answer(self, method: str, params: Params) -> Params:
         answer = self.overrides.get(method) or self._methods.get(method)
