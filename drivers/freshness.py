@@ -1,0 +1,37 @@
+"""How old a component's last sample is, and what that makes of its state."""
+
+from drivers.samples import State
+
+
+class Freshness:
+    """Turns silence into `stale`, then `lost`; counts how often it was silent for too long."""
+
+    def __init__(self, stale_after_s: float, lost_after_s: float) -> None:
+        self.stale = 0
+        self._stale_after_ns = round(stale_after_s * 1e9)
+        self._lost_after_ns = round(lost_after_s * 1e9)
+        self._last_ns: int | None = None
+        self._connected = False
+
+    def reset(self) -> None:
+        """Nothing has come yet."""
+        self._last_ns, self._connected, self.stale = None, False, 0
+
+    def seen(self, stamp_ns: int) -> None:
+        """A sample came at `stamp_ns`."""
+        if self._last_ns is not None and stamp_ns - self._last_ns > self._stale_after_ns:
+            self.stale += 1
+        self._last_ns, self._connected = stamp_ns, True
+
+    def disconnected(self) -> None:
+        """Nothing can come until the next sample: lost at once, whatever the age."""
+        self._connected = False
+
+    def state(self, now_ns: int) -> tuple[State, float | None]:
+        """State by age alone, and the age in ms (`None` before the first sample)."""
+        if self._last_ns is None:
+            return State.LOST, None
+        age_ns = max(0, now_ns - self._last_ns)
+        if age_ns > self._lost_after_ns or not self._connected:
+            return State.LOST, age_ns / 1e6
+        return (State.STALE if age_ns > self._stale_after_ns else State.OK), age_ns / 1e6

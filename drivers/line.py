@@ -1,0 +1,90 @@
+"""One serial port with one format on it, shared by every component whose frames come over it."""
+
+from collections.abc import Callable
+from typing import Generic, Protocol, TypeVar
+
+from drivers.parsing import Parser
+from drivers.port import SerialPort
+
+F = TypeVar("F")
+Listening = TypeVar("Listening", contravariant=True)
+
+SILENCE_S = 1.0  # a sensor that streams says something within this time
+
+
+class User(Protocol[Listening]):
+    """A component that takes frames; called in the port's thread."""
+
+    def received(self, frame: Listening, stamp_ns: int) -> None: ...
+
+    def disconnected(self) -> None: ...
+
+
+class Line(Generic[F]):
+    """A port and a parser; open while at least one user is started.
+
+    `start` and `stop` belong to one thread. Everything else may be read from any.
+    """
+
+    def __init__(
+        self, path: str, baudrate: int, format_name: str, make_parser: Callable[[], Parser[F]]
+    ) -> None:
+        self.path = path
+        self.format_name = format_name
+        self.parser = make_parser()
+        self.reconnects = 0
+        self._make_parser = make_parser
+        self._port = SerialPort(path, baudrate, self._received, self._opened, self._closed)
+        self._users: tuple[User[F], ...] = ()
+        self._bytes = 0  # since the port was opened
+        self._frames = 0
+        self._last_byte_ns: int | None = None
+
+    def start(self, user: User[F]) -> None:
+        if user in self._users:
+            return
+        self._users = (*self._users, user)
+        if len(self._users) == 1:
+            self.parser = self._make_parser()
+            self.reconnects = -1
+            self._port.start()
+
+    def stop(self, user: User[F]) -> None:
+        self._users = tuple(known for known in self._users if known is not user)
+        if not self._users:
+            self._port.stop()
+
+    def problem(self, now_ns: int) -> str | None:
+        """What is wrong with the line, in words with what to check; `None` while frames come."""
+        opened_ns = self._port.opened_ns
+        if opened_ns is None:
+            return self._port.problem or f"{self.path} is being opened"
+        if self._bytes and not self._frames:
+            return (
+                f"{self._bytes} bytes came from {self.path} at {self._port.baudrate} baud and "
+                f"no {self.format_name} frame among them: wrong baud rate, wrong format or another device "
+                f"(gwrms sensor {self.path} finds out)"
+            )
+        silent_s = (now_ns - max(opened_ns, self._last_byte_ns or 0)) / 1e9
+        if silent_s > SILENCE_S:
+            return f"no byte from {self.path} for {silent_s:.1f} s: check the sensor's power and its TX wire"
+        return None
+
+    def _opened(self) -> None:
+        self.reconnects += 1
+        self._bytes = self._frames = 0
+        self._last_byte_ns = None
+        self.parser.finish()
+
+    def _closed(self) -> None:
+        for user in self._users:
+            user.disconnected()
+
+    def _received(self, data: bytes, stamp_ns: int) -> None:
+        self._bytes += len(data)
+        self._last_byte_ns = stamp_ns
+        frames = self.parser.feed(data)
+        self._frames += len(frames)
+        for frame in frames:
+            for user in self._users:
+                user.received(frame, stamp_ns)

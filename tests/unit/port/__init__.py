@@ -1,0 +1,1 @@
+"""Tests: the serial port and what shares it."""

@@ -1,0 +1,55 @@
+"""A pseudo-terminal behind a stable path, that can be unplugged and plugged in again."""
+
+import os
+import pty
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+DEADLINE_S = 20.0
+
+
+class Terminal:
+    """The device's end of a serial line; `path` is what the driver opens."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._master: int | None = None
+
+    def plug_in(self) -> None:
+        self._master, slave = pty.openpty()
+        tty.setraw(slave)
+        self.path.symlink_to(os.ttyname(slave))
+        os.close(slave)
+
+    def unplug(self) -> None:
+        if self._master is None:
+            return
+        self.path.unlink()
+        os.close(self._master)
+        self._master = None
+
+    def send(self, data: bytes) -> None:
+        if self._master is None:
+            raise RuntimeError("the terminal is not plugged in")
+        os.write(self._master, data)
+
+
+def wait_until(condition: Callable[[], bool], what: str) -> None:
+    """Return as soon as `condition` holds; the deadline is far beyond any slow machine."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"waited {DEADLINE_S} s for {what}")
+        time.sleep(0.005)
+
+
+def send_until(terminal: Terminal, data: bytes, condition: Callable[[], bool], what: str) -> None:
+    """Send `data` again and again, as a sensor does, until `condition` holds."""
+
+    def sent() -> bool:
+        terminal.send(data)
+        return condition()
+
+    wait_until(sent, what)
