@@ -1,0 +1,154 @@
+"""Insoles on pseudo-terminals: values, both feet on one port, and what is wrong in words."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.component import Component, Kind
+from drivers.insole import layout as layouts
+from drivers.insole.device import Insole, insoles
+from drivers.insole.settings import InsoleSettings
+from drivers.samples import Quality, State
+from tests.unit.insole.encode import CALIBRATED, MISSING, RIGHT, cobs_frame
+from tests.unit.port.terminals import Terminal, send_until, wait_until
+
+LOADED = [200] * 16  # 20 kPa everywhere
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[Terminal]:
+    terminal = Terminal(tmp_path / "insole")
+    terminal.plug_in()
+    yield terminal
+    terminal.unplug()
+
+
+@pytest.fixture
+def insole(terminal: Terminal) -> Iterator[Insole]:
+    insole = Insole("left_insole", InsoleSettings(port=str(terminal.path)))
+    insole.start()
+    yield insole
+    insole.stop()
+
+
+def values(insole: Insole) -> dict[str, float | None]:
+    now_ns = insole.latest.updated_ns or 0
+    return {
+        channel.quantity: insole.latest.read(index, now_ns)[0]
+        for index, channel in enumerate(insole.channels)
+    }
+
+
+def quality(insole: Insole) -> Quality:
+    return insole.quality(time.monotonic_ns())
+
+
+def send(terminal: Terminal, insole: Insole, frame: bytes) -> None:
+    """Send `frame` until the insole has taken one."""
+    before = insole.latest.updated_ns
+    wait_until(lambda: insole.line.problem(time.monotonic_ns()) is None, "the port to open")
+    send_until(terminal, frame, lambda: insole.latest.updated_ns != before, "a sample")
+
+
+def rising(make_flags: int = CALIBRATED, cells: list[int] | None = None) -> bytes:
+    """Three frames in order: whatever was sent before, the last ones are not late."""
+    return b"".join(cobs_frame(cells or LOADED, flags=make_flags, sequence=s) for s in range(3))
+
+
+def test_channels_are_force_cop_and_cells_in_si(insole: Insole) -> None:
+    component: Component = insole
+    assert component.kind is Kind.INSOLE
+    assert [(channel.name, channel.unit) for channel in component.channels[:4]] == [
+        ("left_insole.force", "N"),
+        ("left_insole.cop_x", "m"),
+        ("left_insole.cop_y", "m"),
+        ("left_insole.cell_0", "Pa"),
+    ]
+    assert len(component.channels) == 19
+
+
+def test_even_pressure_gives_the_whole_soles_force_at_its_centre(insole: Insole, terminal: Terminal) -> None:
+    send(terminal, insole, rising())
+    got, layout = values(insole), layouts.load("insole-16")
+    area = sum(layout.areas)
+    assert got["cell_7"] == pytest.approx(20_000.0)
+    assert got["force"] == pytest.approx(20_000.0 * area)
+    assert got["cop_x"] == pytest.approx(sum(layout.moments_x) / area)
+    assert quality(insole).state is State.OK
+
+
+def test_foot_in_the_air_has_no_centre_of_pressure(insole: Insole, terminal: Terminal) -> None:
+    send(terminal, insole, rising(cells=[1] * 16))
+    got = values(insole)
+    assert got["force"] == pytest.approx(100.0 * sum(layouts.load("insole-16").areas))
+    assert (got["cop_x"], got["cop_y"]) == (None, None)
+
+
+def test_missing_cells_are_a_fault_and_null(insole: Insole, terminal: Terminal) -> None:
+    send(terminal, insole, rising(CALIBRATED | MISSING, [200] * 15 + [0xFFFF]))
+    got = values(insole)
+    assert (got["cell_15"], got["force"]) == (None, None)
+    assert got["cell_0"] == pytest.approx(20_000.0)
+    assert quality(insole).state is State.FAULT
+    assert "missing cells" in str(quality(insole).problem)
+
+
+def test_counts_without_a_calibration_are_no_pressure(insole: Insole, terminal: Terminal) -> None:
+    send(terminal, insole, rising(0))
+    assert set(values(insole).values()) == {None}
+    assert quality(insole).state is State.FAULT
+    assert "no calibration" in str(quality(insole).problem)
+
+
+def test_other_number_of_cells_is_named(insole: Insole, terminal: Terminal) -> None:
+    send(terminal, insole, rising(cells=[200] * 8))
+    assert set(values(insole).values()) == {None}
+    assert "sends 8 cells and the layout insole-16 has 16" in str(quality(insole).problem)
+
+
+def test_swapped_ports_are_named(insole: Insole, terminal: Terminal) -> None:
+    send_until(
+        terminal, rising(CALIBRATED | RIGHT), lambda: "swapped" in str(quality(insole).problem), "the words"
+    )
+    assert quality(insole).state is State.LOST
+    assert set(values(insole).values()) == {None}
+
+
+def test_late_frame_changes_nothing(insole: Insole, terminal: Terminal) -> None:
+    send(terminal, insole, rising())
+    terminal.send(cobs_frame([0] * 16, sequence=1))
+    wait_until(lambda: quality(insole).counters["out_of_order"] > 0, "the late frame")
+    assert values(insole)["cell_0"] == pytest.approx(20_000.0)
+
+
+def test_both_feet_on_one_port_share_it_and_get_their_own_frames(terminal: Terminal) -> None:
+    settings = InsoleSettings(port=str(terminal.path))
+    left, right = insoles({"left_insole": settings, "right_insole": settings})
+    assert left.line is right.line
+    assert [y for _, y, _ in left.layout.cells] == [-y for _, y, _ in right.layout.cells]
+    left.start()
+    right.start()
+    try:
+        both = rising(CALIBRATED) + rising(CALIBRATED | RIGHT, [100] * 16)
+        wait_until(lambda: left.line.problem(time.monotonic_ns()) is None, "the port to open")
+        send_until(
+            terminal, both, lambda: None not in (left.latest.updated_ns, right.latest.updated_ns), "samples"
+        )
+        assert values(left)["cell_0"] == pytest.approx(20_000.0)
+        assert values(right)["cell_0"] == pytest.approx(10_000.0)
+        left.stop()
+        before = right.latest.updated_ns
+        send_until(terminal, both, lambda: right.latest.updated_ns != before, "the right foot alone")
+        assert values(left)["cell_0"] is None
+    finally:
+        left.stop()
+        right.stop()
+
+
+def test_insoles_on_two_ports_do_not_share() -> None:
+    left, right = insoles(
+        {"left_insole": InsoleSettings(port="/dev/a"), "right_insole": InsoleSettings(port="/dev/b")}
+    )
+    assert left.line is not right.line
