@@ -1,0 +1,84 @@
+"""Format `witmotion`: WitMotion's 11-byte serial frames (WT901, HWT905 and relatives).
+
+55h · type · four little-endian words · low byte of the sum of all before. A type a frame: what belongs to one
+moment comes in several frames. (WitMotion, "WIT standard communication protocol".)
+"""
+
+import math
+import struct
+
+from drivers.imu.frame import ImuFrame
+from drivers.imu.rotation import Vector
+from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
+
+LENGTH = 11
+STANDARD_GRAVITY = 9.80665
+FULL_SCALE = 32768
+ACCELERATION = 16 * STANDARD_GRAVITY / FULL_SCALE  # m/s² a count
+RATE = math.radians(2000) / FULL_SCALE  # rad/s a count
+ANGLE = math.pi / FULL_SCALE  # rad a count
+QUATERNION = 1 / FULL_SCALE
+CENTI = 0.01  # °C a count of the last word
+
+TIME, ACCELERATIONS, RATES, ANGLES, MAGNETIC, QUATERNIONS = 0x50, 0x51, 0x52, 0x53, 0x54, 0x59
+OTHERS = {0x55: "port", 0x56: "barometer", 0x57: "position", 0x58: "ground_speed", 0x5A: "satellites"}
+KINDS = frozenset({TIME, ACCELERATIONS, RATES, ANGLES, MAGNETIC, QUATERNIONS, *OTHERS})
+
+_WORDS = struct.Struct("<4h")
+_TIME = struct.Struct("<6BH")
+
+
+class WitmotionParser(FrameScanner[ImuFrame]):
+    """Parser of `witmotion`."""
+
+    sync = b"\x55"
+
+    def _length(self, buffer: bytearray, start: int) -> int:
+        if len(buffer) < start + 2:
+            return UNKNOWN
+        return LENGTH if buffer[start + 1] in KINDS else IMPOSSIBLE
+
+    def _decode(self, raw: bytes) -> ImuFrame | None:
+        if sum(raw[:10]) & 0xFF != raw[10]:
+            self.counters.bad_checksums += 1
+            return None
+        frame, saturated = decode(raw[1], raw[2:10])
+        self.counters.saturated += saturated
+        return frame
+
+
+def decode(kind: int, data: bytes) -> tuple[ImuFrame, bool]:
+    """The frame of type `kind` with eight bytes of `data`, and whether a value is at the end of its range."""
+    if kind == TIME:
+        return _time(data), False
+    a, b, c, last = _WORDS.unpack(data)
+    saturated = kind in (ACCELERATIONS, RATES) and not -32768 < min(a, b, c) <= max(a, b, c) < 32767
+    if kind == ACCELERATIONS:
+        frame = ImuFrame(
+            "acceleration", acceleration=_scaled(a, b, c, ACCELERATION), temperature=last * CENTI
+        )
+    elif kind == RATES:
+        frame = ImuFrame(
+            "angular_velocity", angular_velocity=_scaled(a, b, c, RATE), temperature=last * CENTI
+        )
+    elif kind == ANGLES:
+        frame = ImuFrame("angle", roll_pitch_yaw=_scaled(a, b, c, ANGLE), more={"version": last & 0xFFFF})
+    elif kind == QUATERNIONS:
+        frame = ImuFrame(
+            "quaternion", orientation=(a * QUATERNION, b * QUATERNION, c * QUATERNION, last * QUATERNION)
+        )
+    elif kind == MAGNETIC:  # the unit depends on the model's magnetometer
+        frame = ImuFrame("magnetic", more={"magnetic_raw_x": a, "magnetic_raw_y": b, "magnetic_raw_z": c})
+    else:
+        frame = ImuFrame(OTHERS[kind], more={"data": data.hex()})
+    return frame, saturated
+
+
+def _scaled(a: int, b: int, c: int, scale: float) -> Vector:
+    return (a * scale, b * scale, c * scale)
+
+
+def _time(data: bytes) -> ImuFrame:
+    year, month, day, hour, minute, second, ms = _TIME.unpack(data)
+    parts = {"year": 2000 + year, "month": month, "day": day, "hour": hour, "minute": minute}
+    return ImuFrame("time", more={**parts, "second": second + ms / 1000})
