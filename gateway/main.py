@@ -13,12 +13,12 @@ from collections.abc import Callable, Sequence
 # name → (where it lives, what it does). A module here is imported only when its command runs.
 COMMANDS: dict[str, tuple[str, str]] = {
     "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
-    "describe": ("gateway.cli.ask:describe", "what a robot is made of, and what is wrong with it"),
-    "snapshot": ("gateway.cli.ask:snapshot", "one look at resources, components or status"),
-    "watch": ("gateway.cli.ask:watch", "follow channels live"),
-    "get": ("gateway.cli.ask:get", "read parameters from the devices"),
-    "set": ("gateway.cli.ask:set_", "change parameters, all or none, read back"),
-    "stop": ("gateway.cli.ask:stop", "quick stop on every drive (not a safety-rated stop)"),
+    "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
+    "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),
+    "watch": ("gateway.cli.watch:main", "follow channels live"),
+    "get": ("gateway.cli.parameters:get", "read parameters from the devices"),
+    "set": ("gateway.cli.parameters:set_", "change parameters, all or none, read back"),
+    "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
     "sim": ("hil_sim.cli:main", "the simulated robot, ready for a gateway"),
 }

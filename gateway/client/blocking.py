@@ -8,7 +8,7 @@ from typing import Any, Self, TypeVar
 
 from gateway.client.address import Address
 from gateway.client.client import Client
-from gateway.client.link import LinkSettings
+from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
 from gateway.messages import (
     Description,
@@ -32,12 +32,17 @@ class Robot:
             print(robot.read("gait.*").values)
             for batch in robot.watch("left_knee.position", rate_hz=50): ...
 
-    The link lives in a thread of its own, which `close` joins. A call that is interrupted (Ctrl-C) forgets
-    its answer, as in `Client`.
+    The link lives in a thread of its own, which `close` joins; `on_state` is called there. A call that is
+    interrupted (Ctrl-C) forgets its answer, as in `Client`.
     """
 
-    def __init__(self, address: Address | str = "", settings: LinkSettings | None = None) -> None:
-        self._client = Client(address, settings)
+    def __init__(
+        self,
+        address: Address | str = "",
+        settings: LinkSettings | None = None,
+        on_state: OnState | None = None,
+    ) -> None:
+        self._client = Client(address, settings, on_state)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name=THREAD_NAME)
         self._thread.start()

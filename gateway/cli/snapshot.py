@@ -1,0 +1,132 @@
+"""`gwrms snapshot`: one look at resources, components or status."""
+
+import argparse
+import time
+from collections.abc import Iterator
+
+import msgspec
+
+from gateway.cli.reach import channel_names, check_names, parser, reach
+from gateway.cli.text import NONE, age, measured, percent, say, say_json, size, table
+from gateway.client import Robot
+from gateway.messages import Description, QualityInfo, ResourceSnapshot, ResourceSnapshotParams, Snapshot
+
+BETWEEN_LOOKS_S = 0.5  # what CPU percentages are taken over
+INCLUDE = ("disk", "network", "thermal", "kernel", "cmdline")
+
+EPILOG = """examples:
+  gwrms snapshot resource --sort memory --limit 10
+  gwrms snapshot component 'left_*.position' trunk.tilt_forward
+  gwrms snapshot status --json"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms snapshot`."""
+    arguments = _parse(argv)
+    with reach(arguments, "snapshot") as robot:
+        if arguments.module == "resource":
+            return _resource(robot, arguments)
+        return _values(robot, arguments)
+
+
+def _parse(argv: list[str]) -> argparse.Namespace:
+    made = parser("snapshot", "One look at a robot: what it has now, asked once.", EPILOG)
+    made.add_argument("module", choices=("resource", "component", "status"), help="what to look at")
+    made.add_argument("channels", metavar="GLOB", nargs="*", help="component: only these channels")
+    group = made.add_argument_group("resource")
+    group.add_argument("--sort", choices=("cpu", "memory", "name", "pid"), default="cpu", help="default: cpu")
+    order = group.add_mutually_exclusive_group()
+    order.add_argument("--ascending", dest="descending", action="store_const", const=False)
+    order.add_argument("--descending", dest="descending", action="store_const", const=True)
+    group.add_argument("--limit", type=_count, metavar="N", help="only the first N processes")
+    group.add_argument(
+        "--include", choices=INCLUDE, action="append", default=[], help="ask for more; repeatable"
+    )
+    arguments = made.parse_args(argv)
+    if arguments.channels and arguments.module != "component":
+        made.error(f"{arguments.module} takes no channels")
+    return arguments
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes")
+    return int(text)
+
+
+def _resource(robot: Robot, arguments: argparse.Namespace) -> int:
+    params = ResourceSnapshotParams(
+        include=arguments.include,
+        sort=arguments.sort,
+        descending=arguments.descending,
+        limit=arguments.limit,
+    )
+    # Percentages are over the time since this connection's last request, so the first look only begins it.
+    robot.resources(params)
+    time.sleep(BETWEEN_LOOKS_S)
+    snapshot = robot.resources(params)
+    if arguments.json:
+        say_json(snapshot)
+    else:
+        say(_resource_text(snapshot))
+    return 0
+
+
+def _resource_text(snapshot: ResourceSnapshot) -> str:
+    facts = "".join(f"{name:<8} {text}\n" for name, text in _facts(snapshot))
+    if not isinstance(snapshot.processes, list):
+        return facts
+    rows = [
+        (str(found.pid), percent(found.cpu_percent), size(found.memory_bytes), found.cmdline or found.name)
+        for found in snapshot.processes
+    ]
+    return facts + "\n" + table(("PID", "CPU", "MEMORY", "NAME"), rows, right=(0, 1, 2))
+
+
+def _facts(snapshot: ResourceSnapshot) -> Iterator[tuple[str, str]]:
+    cpu, memory = snapshot.cpu, snapshot.memory
+    cores = ", ".join(percent(core) for core in cpu.per_core)
+    load = " ".join(f"{average:.2f}" for average in cpu.load)
+    yield "CPU", f"{percent(cpu.percent)} of {len(cpu.per_core)} cores ({cores}), load {load}"
+    used, total, available = size(memory.used), size(memory.total), size(memory.available)
+    yield "memory", f"{used} used of {total}, {available} available, swap {size(memory.swap_used)}"
+    yield "gateway", f"{percent(snapshot.gateway.cpu_percent)} of a core, {size(snapshot.gateway.rss_bytes)}"
+    # What --include asked for, as the robot names it.
+    for name in ("disk", "network", "thermal", "kernel"):
+        found = getattr(snapshot, name)
+        if found is not msgspec.UNSET:
+            yield name, ", ".join(f"{key} {value}" for key, value in msgspec.to_builtins(found).items())
+
+
+def _values(robot: Robot, arguments: argparse.Namespace) -> int:
+    description = robot.describe()
+    check_names("channel", arguments.channels, channel_names(description))
+    snapshot = robot.components(*arguments.channels) if arguments.module == "component" else robot.status()
+    if arguments.json:
+        say_json(snapshot)
+    else:
+        say(_values_text(snapshot, description))
+    return 0
+
+
+def _values_text(snapshot: Snapshot, description: Description) -> str:
+    channels = {channel.name: channel for channel in description.channels}
+    rows = []
+    for name, value in snapshot.values.items():
+        channel = channels.get(name)
+        stamp_ns = snapshot.stamps_ns.get(name)
+        old_s = None if stamp_ns is None else (snapshot.stamp_ns - stamp_ns) / 1e9
+        unit = channel.unit if channel is not None else ""
+        rows.append((name, measured(value, channel), unit, age(old_s)))
+    quality = [(name, *_quality(found)) for name, found in snapshot.quality.items()]
+    return (
+        table(("CHANNEL", "VALUE", "UNIT", "AGE"), rows, right=(1, 3))
+        + "\n"
+        + table(("COMPONENT", "STATE", "AGE", "PROBLEM"), quality, right=(2,))
+    )
+
+
+def _quality(found: QualityInfo) -> tuple[str, str, str]:
+    age_ms = found.get("age_ms")
+    seconds = age_ms / 1000 if isinstance(age_ms, int | float) else None
+    return str(found.get("state", NONE)), age(seconds), str(found.get("problem") or "")

@@ -1,0 +1,46 @@
+"""`gwrms stop`: quick stop on every drive."""
+
+from gateway.cli.reach import parser, reach
+from gateway.cli.text import say, say_json, table, warn
+from gateway.client import ClientError
+from gateway.messages import Stopped
+
+WARNING = (
+    "This is a software stop over the network, not a safety-rated stop: keep the hardware one within reach."
+)
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms stop`; 0 only when every drive has confirmed."""
+    made = parser(
+        "stop",
+        "Quick stop on every drive. Needs no lease. Exit status 0 only when every drive has confirmed.",
+        WARNING,
+    )
+    made.add_argument("--reason", default="gwrms stop", help="what the robot's journal shall say")
+    arguments = made.parse_args(argv)
+    try:
+        with reach(arguments, "stop") as robot:
+            stopped = robot.stop(arguments.reason)
+    except ClientError as error:
+        warn("stop", f"NOT CONFIRMED, take it that the robot still moves. {error}")
+        return 1
+    if arguments.json:
+        say_json(stopped)
+    else:
+        say(_text(stopped))
+    return _verdict(stopped)
+
+
+def _text(stopped: Stopped) -> str:
+    held = "The stop is held until it is reset.\n" if stopped.held else ""
+    return table(("DRIVE", "STOP"), stopped.drives.items()) + f"\n{held}{WARNING}\n"
+
+
+def _verdict(stopped: Stopped) -> int:
+    missing = [name for name, outcome in stopped.drives.items() if outcome != "confirmed"]
+    if not stopped.drives:
+        warn("stop", "NOT CONFIRMED: the robot has no drive that can be stopped")
+    elif missing:
+        warn("stop", f"NOT CONFIRMED by {', '.join(missing)}: take it that they still move")
+    return 0 if stopped.drives and not missing else 1

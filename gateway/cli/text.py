@@ -1,0 +1,86 @@
+"""What the commands print: aligned tables for people, one JSON line for machines."""
+
+import difflib
+import sys
+from collections.abc import Iterable, Sequence
+
+import msgspec
+
+from gateway.messages import ChannelInfo
+
+NONE = "–"
+PRECISION = 4  # decimals of a measured value; a written parameter is shown whole
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Iterable[int] = ()) -> str:
+    """Aligned columns two spaces apart; the columns in `right` (by index) are right-aligned."""
+    lines = [tuple(header), *(tuple(row) for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    numeric = frozenset(right)
+    return "".join(
+        "  ".join(
+            cell.rjust(width) if index in numeric else cell.ljust(width)
+            for index, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        + "\n"
+        for line in lines
+    )
+
+
+def say(text: str) -> None:
+    """Print for people."""
+    sys.stdout.write(text)
+    sys.stdout.flush()
+
+
+def say_json(answer: object) -> None:
+    """Print for machines: one line, flushed, so that a pipe sees it at once."""
+    sys.stdout.write(msgspec.json.encode(answer).decode() + "\n")
+    sys.stdout.flush()
+
+
+def warn(command: str, text: str) -> None:
+    """A sentence on stderr."""
+    sys.stderr.write(f"gwrms {command}: {text}\n")
+
+
+def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
+    """A channel's value: a state as its word, a number with few decimals, a dash where there is none."""
+    if value is None:
+        return NONE
+    pure = channel is not None and not channel.unit and value.is_integer()
+    if channel is None or not pure:
+        return f"{value:.{PRECISION}f}"
+    return (channel.enum or {}).get(str(int(value)), str(int(value)))
+
+
+def exact(value: float | None) -> str:
+    """A parameter's value, with every digit that it has."""
+    return NONE if value is None else f"{value:.10g}"
+
+
+def percent(value: float | None) -> str:
+    """A share of one hundred."""
+    return NONE if value is None else f"{value:.1f} %"
+
+
+def size(count: float) -> str:
+    """Bytes in the unit that fits."""
+    for unit in ("B", "KiB", "MiB"):
+        if count < 1024:
+            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
+        count /= 1024
+    return f"{count:.2f} GiB"
+
+
+def age(seconds: float | None) -> str:
+    """How old something is."""
+    if seconds is None:
+        return NONE
+    return f"{seconds * 1000:.0f} ms" if seconds < 10 else f"{seconds:.0f} s"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Names that come close to one that does not exist, as the end of a sentence."""
+    close = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    return f"; did you mean {', '.join(close)}?" if close else ""

@@ -1,0 +1,225 @@
+"""The asking commands, as a person and as a script meet them, against a gateway that speaks the contract."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from gateway.main import main
+from tests.fake_robot import JOINTS, FakeRobot, Refusal
+
+
+@pytest.fixture
+def robot() -> Iterator[FakeRobot]:
+    with FakeRobot() as robot:
+        yield robot
+
+
+def run(robot: FakeRobot, *arguments: str) -> int:
+    return main([*arguments, "--robot", robot.address])
+
+
+def printed(capsys: pytest.CaptureFixture[str]) -> str:
+    return capsys.readouterr().out
+
+
+def test_describe_names_what_is_wrong(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.lost.add("trunk")
+    assert run(robot, "describe") == 0
+    text = printed(capsys)
+    assert "exo-fake" in text
+    assert any("trunk" in line and "lost" in line and "cable" in line for line in text.splitlines())
+    assert "gait.step_length" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        (("describe",), "components"),
+        (("snapshot", "resource"), "cpu"),
+        (("snapshot", "component"), "values"),
+        (("snapshot", "status"), "quality"),
+        (("get",), "values"),
+        (("set", "gait.step_length=0.42"), "after"),
+        (("stop",), "drives"),
+    ],
+)
+def test_json_is_one_line_of_the_robots_answer(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], key: str
+) -> None:
+    assert run(robot, *arguments, "--json") == 0
+    (line,) = printed(capsys).splitlines()
+    assert key in json.loads(line)
+
+
+def test_resources_are_asked_twice_so_that_percentages_exist(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "snapshot", "resource", "--sort", "memory", "--limit", "10") == 0
+    asked = robot.called("resource.snapshot")
+    assert [(params["sort"], params["limit"]) for params in asked] == [("memory", 10)] * 2
+    assert "21.5 %" in printed(capsys)
+
+
+def test_missing_value_is_a_dash_and_its_component_is_named(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.lost.add("left_insole")
+    assert run(robot, "snapshot", "component", "*_insole.force") == 0
+    lines = printed(capsys).splitlines()
+    assert any(line.split()[:3] == ["left_insole.force", "–", "N"] for line in lines)
+    assert any("lost" in line and "no heartbeat" in line for line in lines)
+
+
+def test_state_is_shown_as_its_word(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(robot, "snapshot", "component", "left_knee.state") == 0
+    assert "OPERATION ENABLED" in printed(capsys)
+
+
+def test_watch_prints_the_number_of_rows_asked_for(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "watch", "left_knee.position", "--rate", "100", "--count", "5") == 0
+    title, *rows = printed(capsys).splitlines()
+    assert "left_knee.position [rad]" in title
+    assert len(rows) == 5
+    assert robot.called("stream.start")[0]["rate_hz"] == 100.0
+
+
+def test_watch_gives_null_for_what_is_lost(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.lost.add("left_knee")
+    assert run(robot, "watch", "left_knee.position", "--json", "--count", "1", "--rate", "50") == 0
+    assert json.loads(printed(capsys))["values"] == {"left_knee.position": None}
+
+
+def test_watch_says_what_was_lost_on_the_way(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.seq_step = 2
+    assert run(robot, "watch", "left_knee.position", "--count", "3", "--rate", "100") == 0
+    assert "1 notifications were lost" in capsys.readouterr().err
+
+
+def test_set_takes_the_lease_shows_both_values_and_gives_it_back(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "set", "gait.step_length=0.42", "left_knee.max_torque=0.8") == 0
+    lines = printed(capsys).splitlines()
+    assert any(line.split()[:4] == ["gait.step_length", "0.4", "→", "0.42"] for line in lines)
+    assert [name for name, _ in robot.calls if name.startswith("control.")] == [
+        "control.acquire",
+        "control.release",
+    ]
+
+
+def test_get_shows_value_unit_and_range(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(robot, "get", "gait.*") == 0
+    text = printed(capsys)
+    assert "gait.step_length" in text
+    assert "0.2 … 0.6" in text
+    assert "left_knee" not in text
+
+
+def test_parameter_that_no_device_answers_for_fails(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.parameters["left_knee.max_torque"] = None  # type: ignore[assignment]
+    assert run(robot, "get", "left_knee.max_torque") == 1
+    assert "–" in printed(capsys)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("get", "gait.step_lenght"), "did you mean gait.step_length"),
+        (("set", "gait.step_lenght=0.4"), "did you mean gait.step_length"),
+        (("watch", "left_nee.position"), "did you mean left_knee.position"),
+        (("snapshot", "component", "left_nee.position"), "did you mean left_knee.position"),
+        (("set", "gait.step_length=9"), "above 0.6 m"),
+    ],
+)
+def test_refusal_is_a_sentence_and_changes_nothing(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
+) -> None:
+    assert run(robot, *arguments) == 1
+    captured = capsys.readouterr()
+    assert words in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert robot.parameters["gait.step_length"] == 0.40
+
+
+def test_lease_of_another_is_said_in_the_robots_words(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def held(params: dict[str, object]) -> object:
+        raise Refusal(-32003, "bench-2 holds the lease for 12 s more", kind="lease_held")
+
+    robot.overrides["control.acquire"] = held
+    assert run(robot, "set", "gait.step_length=0.42") == 1
+    assert "bench-2 holds the lease" in capsys.readouterr().err
+    assert robot.called("parameter.write") == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("set", "gait.step_length"),
+        ("set", "gait.step_length=nan"),
+        ("set", "gait.step_length=0.4", "gait.step_length=0.5"),
+        ("set",),
+        ("watch",),
+        ("watch", "x", "--rate", "0"),
+        ("watch", "x", "--count", "-1"),
+        ("snapshot", "weather"),
+        ("snapshot", "resource", "left_knee.*"),
+        ("get", "--robot", "host:port"),
+        ("stop", "now"),
+    ],
+)
+def test_wrong_usage_is_2(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    assert ended.value.code == 2
+    assert "usage: gwrms" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["describe", "stop"])
+def test_unreachable_robot_is_a_sentence(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with FakeRobot() as gone:
+        address = gone.address
+    assert main([command, "--robot", address]) == 1
+    captured = capsys.readouterr()
+    assert f"no gateway at {address}" in captured.err
+    assert captured.out == ""
+
+
+def test_stop_is_0_only_when_every_drive_has_confirmed(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "stop", "--reason", "test") == 0
+    assert "not a safety-rated stop" in printed(capsys)
+    assert robot.called("robot.stop") == [{"reason": "test"}]
+
+
+@pytest.mark.parametrize("outcome", ["unconfirmed", "unreachable"])
+def test_stop_that_a_drive_does_not_confirm_is_1_and_names_it(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], outcome: str
+) -> None:
+    drives = dict.fromkeys(JOINTS, "confirmed") | {"left_knee": outcome}
+    robot.overrides["robot.stop"] = lambda params: {"drives": drives, "held": True}
+    assert run(robot, "stop") == 1
+    assert "NOT CONFIRMED by left_knee" in capsys.readouterr().err
+
+
+def test_stop_without_any_drive_is_1(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.overrides["robot.stop"] = lambda params: {"drives": {}, "held": True}
+    assert run(robot, "stop") == 1
+    assert "NOT CONFIRMED" in capsys.readouterr().err
+
+
+def test_stop_that_the_robot_refuses_is_loud(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse(params: dict[str, object]) -> object:
+        raise Refusal(-32015, "the bus is not open", kind="unavailable")
+
+    robot.overrides["robot.stop"] = refuse
+    assert run(robot, "stop") == 1
+    assert "NOT CONFIRMED, take it that the robot still moves. the bus is not open" in capsys.readouterr().err
