@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.imu import rotation
+from drivers.imu import bno08x_rvc, rotation
+from drivers.imu.bno08x_rvc import Bno08xRvcParser
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion
 from drivers.imu.settings import Axis
+from drivers.imu.vectornav import VectornavParser
 from drivers.imu.witmotion import WitmotionParser
+from drivers.imu.xsens import XsensParser
 from drivers.parsing import Parser
 
 
@@ -16,16 +19,17 @@ class ImuFormat:
     """One device's language and conventions.
 
     `axes` are the sensor's axes along the trunk's x (forward), y (left) and z (up) when it is mounted as its
-    maker means it; `angles` makes the orientation (sensor to the device's world) of its roll, pitch and yaw;
-    `world` turns its world into one whose z points up.
+    maker means it; `angles` makes the orientation (sensor to the device's world) of its roll, pitch and yaw.
     """
 
     make_parser: Callable[[], Parser[ImuFrame]]
     axes: tuple[Axis, Axis, Axis] = ("x", "y", "z")
     angles: Callable[[float, float, float], Quaternion] = rotation.from_yaw_pitch_roll
-    world: Quaternion = rotation.IDENTITY
 
 
 FORMATS: dict[str, ImuFormat] = {
     "witmotion": ImuFormat(WitmotionParser),
+    "bno08x-rvc": ImuFormat(Bno08xRvcParser, angles=bno08x_rvc.from_angles),
+    "xsens": ImuFormat(XsensParser),
+    "vectornav": ImuFormat(VectornavParser, axes=("x", "-y", "-z")),
 }

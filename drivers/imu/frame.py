@@ -4,12 +4,13 @@ import msgspec
 
 from drivers.imu.rotation import Quaternion, Vector
 
+More = dict[str, float | int | str]
+
 
 class ImuFrame(msgspec.Struct, frozen=True):
     """What one frame says; `None` for what it does not carry.
 
-    Axes, the order of the angles and the world's frame are the device's own: `drivers.imu.formats` says
-    what they are.
+    Axes and the order of the angles are the device's own: `drivers.imu.formats` says what they are.
     """
 
     kind: str
@@ -17,9 +18,37 @@ class ImuFrame(msgspec.Struct, frozen=True):
     angular_velocity: Vector | None = None  # rad/s
     roll_pitch_yaw: Vector | None = None  # rad
     orientation: Quaternion | None = None  # sensor to world
+    z_down: bool = False  # the world of angles and orientation is north-east-down
     magnetic_field: Vector | None = None  # T
     temperature: float | None = None  # °C
     sequence: int | None = None
     ticks: int | None = None  # the device's clock, in its own unit
     late: bool = False  # repeated, or older than a frame before it
-    more: dict[str, float | int | str] = {}
+    more: More = {}
+
+
+_PARTS = {
+    "acceleration": "xyz",
+    "angular_velocity": "xyz",
+    "orientation": "wxyz",
+    "magnetic_field": "xyz",
+}
+
+
+def flat(frame: ImuFrame) -> dict[str, object]:
+    """What `frame` carries, by the channels' names; angles in rad as `roll`, `pitch`, `yaw`."""
+    line: dict[str, object] = {"frame": frame.kind}
+    for number in ("sequence", "ticks"):
+        if (value := getattr(frame, number)) is not None:
+            line[number] = value
+    if frame.roll_pitch_yaw is not None:
+        line |= zip(("roll", "pitch", "yaw"), frame.roll_pitch_yaw, strict=True)
+    for quantity, parts in _PARTS.items():
+        vector = getattr(frame, quantity)
+        if vector is not None:
+            line |= zip((f"{quantity}_{part}" for part in parts), vector, strict=True)
+    if frame.temperature is not None:
+        line["temperature"] = frame.temperature
+    if frame.late:
+        line["late"] = True
+    return line | frame.more

@@ -32,6 +32,8 @@ ANGULAR_VELOCITY = tuple(_INDEX[f"angular_velocity_{axis}"] for axis in "xyz")
 ORIENTATION = tuple(_INDEX[f"orientation_{axis}"] for axis in "wxyz")
 TEMPERATURE = (_INDEX["temperature"],)
 
+NWU_FROM_NED: Quaternion = (0.0, 1.0, 0.0, 0.0)  # north-east-down to north-west-up: half a turn about x
+
 Values = tuple[tuple[int, ...], tuple[float | None, ...]]
 
 
@@ -100,4 +102,6 @@ class TrunkMotion:
             device = self._format.angles(*frame.roll_pitch_yaw)
         if device is None:
             return None
-        return rotation.multiply(rotation.multiply(self._format.world, device), self._sensor_from_trunk)
+        if frame.z_down:
+            device = rotation.multiply(NWU_FROM_NED, device)
+        return rotation.multiply(device, self._sensor_from_trunk)

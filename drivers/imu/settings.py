@@ -17,7 +17,7 @@ class ImuSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     port: str  # a stable path: /dev/serial/by-id/…
     baudrate: Annotated[int, msgspec.Meta(gt=0)] = 115200
-    format: Literal["witmotion"] = "witmotion"
+    format: Literal["witmotion", "bno08x-rvc", "xsens", "vectornav"] = "witmotion"
     axes: tuple[Axis, Axis, Axis] | None = None  # None: as the format's device defines its own
     mounting: tuple[float, float, float] = (0.0, 0.0, 0.0)
     stale_after_s: Positive = 0.5
