@@ -1,0 +1,50 @@
+"""The socketcand protocol in raw mode: text messages in `< … >`, frames both ways."""
+
+import re
+
+from hil_sim.bus.can_bus import Frame
+
+MAX_PENDING = 4096  # bytes of an unfinished message
+
+_MESSAGE = re.compile(rb"<([^<>]*)>")
+_EXTENDED_DIGITS = 8
+
+
+def frame_message(frame: Frame, stamp_s: float) -> bytes:
+    """A received frame; without data the field is empty, and its two spaces stay."""
+    identifier = f"{frame.cob_id:08X}" if frame.extended else f"{frame.cob_id:03X}"
+    return f"< frame {identifier} {stamp_s:.6f} {frame.data.hex().upper()} >".encode("ascii")
+
+
+def parse_send(words: list[bytes]) -> Frame | None:
+    """The frame in `send ID LENGTH BYTE…`, `None` if that is not what it is."""
+    try:
+        identifier, length, *data = words[1:]
+        frame = Frame(
+            int(identifier, 16), bytes(int(byte, 16) for byte in data), len(identifier) == _EXTENDED_DIGITS
+        )
+        fits = len(data) == int(length, 16) <= 8 and frame.cob_id < (1 << (29 if frame.extended else 11))
+    except ValueError:
+        return None
+    return frame if fits else None
+
+
+class Messages:
+    """Takes the stream of one client apart into messages, each a list of words."""
+
+    def __init__(self) -> None:
+        self._pending = b""
+        self.bytes_dropped = 0
+
+    def feed(self, data: bytes) -> list[list[bytes]]:
+        buffer = self._pending + data
+        end = 0
+        messages = []
+        for match in _MESSAGE.finditer(buffer):
+            messages.append(match[1].split())
+            end = match.end()
+        self._pending = buffer[end:]
+        if len(self._pending) > MAX_PENDING:
+            self.bytes_dropped += len(self._pending)
+            self._pending = b""
+        return messages

@@ -1,0 +1,41 @@
+"""A bridge to a python-can `virtual` channel: programs in the same process join the simulated bus."""
+
+import can
+
+from hil_sim.bus.can_bus import CanBus, Frame
+from hil_sim.clock import MILLISECOND_NS
+
+_POLL_NS = MILLISECOND_NS  # a virtual channel cannot be waited for together with anything else
+
+
+class VirtualBridge:
+    """Carries frames between the simulated bus and the `virtual` channel named `channel`."""
+
+    def __init__(self, bus: CanBus, channel: str) -> None:
+        self._bus = bus
+        self._outside = can.Bus(interface="virtual", channel=channel)
+        self._polling = bus.clock.every(_POLL_NS, self._poll)
+        bus.attach(self, self._receive)
+
+    def close(self) -> None:
+        self._polling.cancel()
+        self._bus.detach(self)
+        self._outside.shutdown()
+
+    def _poll(self) -> None:
+        while (message := self._outside.recv(timeout=0)) is not None:
+            if not message.is_error_frame:
+                data = b"" if message.is_remote_frame else bytes(message.data)
+                frame = Frame(message.arbitration_id, data, message.is_extended_id, message.is_remote_frame)
+                self._bus.send(frame, self)
+
+    def _receive(self, frame: Frame, _sender: object) -> None:
+        self._outside.send(
+            can.Message(
+                arbitration_id=frame.cob_id,
+                data=frame.data,
+                is_extended_id=frame.extended,
+                is_remote_frame=frame.remote,
+                timestamp=self._bus.clock.now_s,
+            )
+        )

@@ -1,0 +1,106 @@
+"""`gwrms sim`: the simulated robot as a process of its own."""
+
+import argparse
+import json
+import math
+import signal
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+
+from hil_sim.exoskeleton import Scenario
+from hil_sim.robot import SimulatedRobot
+
+_DESCRIPTION = """\
+A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen
+bus, two plantar-pressure insoles and a trunk IMU. A gateway, or any other program, meets it where it would meet
+a real robot: on a CAN bus and on serial ports.
+"""
+
+_EPILOG = """\
+what is in DIR
+  robot.toml       the robot, described for a gateway, every line explained. Written once; edit it as you
+                   like, delete it to have it written anew
+  left_insole, right_insole, trunk
+                   links to the sensors' pseudo-terminals (230400, 230400, 115200 baud)
+  hub.port         TCP port of the bus: python-can's "socketcand" interface at 127.0.0.1, channel "sim"
+  The same DIR keeps the same port and paths from start to start, also after a crash. One simulator at a time.
+
+scenarios
+  walk             stands up straight, then walks; three seconds after the start it walks evenly
+  stand            stands
+  sit              sits down from standing, and stays seated
+  The gait follows the controller's objects while it runs: 2001h step length (mm), 2002h cycle time (ms),
+  2003h toe height (mm), 2004h trunk angle (0.001 rad), 2005h activity (0 stand, 1 walk, 2 sit).
+
+the drives
+  Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
+  bus. It keeps commanding "enable operation" until a drive leaves that state. Then it stops all drives and
+  waits for 1 in its object 2000h.
+
+output
+  One line when the robot can be used: {"ready": true, "config": "DIR/robot.toml"}
+  It runs until Ctrl-C, SIGTERM or N seconds. Exit code 0; 1 when it cannot run; 2 for wrong usage.
+
+example
+  gwrms sim --dir /tmp/robot &
+  gwrms gateway /tmp/robot/robot.toml
+"""
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not (math.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text} is no time: give seconds greater than 0")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms sim",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; made if needed"
+    )
+    parser.add_argument(
+        "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
+    )
+    parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds (default: run on)")
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="S",
+        help="of the sensors' noise; same seed, same bytes (default: 0)",
+    )
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """Run the simulator; returns the exit code."""
+    try:
+        arguments = _parser().parse_args(argv)
+    except SystemExit as leave:
+        return 2 if leave.code else 0
+    robot = SimulatedRobot(arguments.dir, Scenario(arguments.scenario), arguments.seed, epoch_s=time.time())
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        robot.stop()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        robot.open()
+        if not robot.config_is_ours:
+            sys.stderr.write(f"gwrms sim: kept {robot.config} as it is; delete it to have it written anew\n")
+        sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")
+        sys.stdout.flush()
+        robot.run(arguments.seconds)
+    finally:
+        robot.close()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 0

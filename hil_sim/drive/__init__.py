@@ -1,0 +1,1 @@
+"""A CiA 402 joint drive with its motor, gear and joint."""

@@ -1,0 +1,1 @@
+"""How the wearer moves: joint angles, load on the feet, trunk."""

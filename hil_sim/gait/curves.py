@@ -1,0 +1,66 @@
+"""Measured joint angles over the gait cycle, as smooth periodic curves (data/joint_angles.csv)."""
+
+import csv
+import math
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from typing import NamedTuple
+
+SPEEDS = ("VerySlow", "Slow", "Free", "Fast", "VeryFast")
+
+
+class Curve:
+    """A periodic function of the phase (0 … 1), cubic between equally spaced values (rad)."""
+
+    def __init__(self, values: Sequence[float]) -> None:
+        self._values = tuple(values)
+        self.mean = sum(values) / len(values)
+        self.range = max(values) - min(values)
+
+    def __call__(self, phase: float) -> float:
+        values = self._values
+        count = len(values)
+        place = phase * count
+        index = math.floor(place)
+        t = place - index
+        a, b, c, d = (values[(index + shift) % count] for shift in (-1, 0, 1, 2))
+        # Catmull-Rom: through every value, with a continuous slope.
+        return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
+
+
+class Leg(NamedTuple):
+    """Flexion of hip and knee, dorsiflexion of the ankle (rad)."""
+
+    hip: float
+    knee: float
+    ankle: float
+
+
+class LegCurves(NamedTuple):
+    """One leg over its own stride, which begins with heel strike."""
+
+    hip: Curve
+    knee: Curve
+    ankle: Curve
+
+
+def _closed(rows: Sequence[float]) -> Curve:
+    """A curve from values at 0 … 100 %; what its ends differ is spread over the cycle."""
+    gap = rows[-1] - rows[0]
+    steps = len(rows) - 1
+    return Curve([math.radians(value - gap * index / steps) for index, value in enumerate(rows[:-1])])
+
+
+@cache
+def measured() -> tuple[LegCurves, ...]:
+    """The measured sets, slowest first."""
+    text = resources.files("hil_sim").joinpath("data/joint_angles.csv").read_text(encoding="ascii")
+    rows = list(csv.DictReader(text.splitlines()))
+    columns = ("hip_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg")
+    return tuple(
+        LegCurves(
+            *(_closed([float(row[column]) for row in rows if row["speed"] == speed]) for column in columns)
+        )
+        for speed in SPEEDS
+    )

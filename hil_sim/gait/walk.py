@@ -1,0 +1,67 @@
+"""Legs in level walking: step length, toe height and phase to joint angles."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+from hil_sim.gait.curves import Curve, Leg, LegCurves, measured
+
+LEG_LENGTH = 0.80  # m, hip to ground of the modelled wearer
+STANCE = 0.62  # share of a stride that the foot is on the ground
+
+_USUAL_TOE_HEIGHT = 0.060  # m: what the measured curves are taken to give
+_KNEE_PER_TOE_HEIGHT = 6.0  # 1/m: share of swing knee flexion that a metre of toe height adds
+_ANKLE_PER_TOE_HEIGHT = 1.5  # rad/m of dorsiflexion in swing
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What an operator can set: lengths in m, time in s, angle in rad."""
+
+    step_length: float
+    cycle_time: float
+    toe_height: float
+    trunk_angle: float
+
+
+def hip_range(step_length: float) -> float:
+    """Range of hip flexion (rad) that a step needs: both legs are the sides of an isosceles triangle."""
+    return 2.0 * math.asin(step_length / (2.0 * LEG_LENGTH))
+
+
+def swing(phase: float) -> float:
+    """0 in stance, rising to 1 in mid-swing."""
+    return math.sin(math.pi * (phase - STANCE) / (1.0 - STANCE)) ** 2 if phase > STANCE else 0.0
+
+
+def leg(phase: float, shape: Shape) -> Leg:
+    """Angles of one leg at its own `phase` (0 … 1, heel strike is 0).
+
+    Longer steps take the curves of faster walkers; the hip is then scaled to exactly the range that the step
+    length needs, and the knee by half as much.
+    """
+    wanted = hip_range(shape.step_length)
+    slower, faster, share = _between(wanted)
+
+    def blend(a: Curve, b: Curve) -> tuple[float, float]:
+        return a(phase) + share * (b(phase) - a(phase)), a.mean + share * (b.mean - a.mean)
+
+    scale = wanted / (slower.hip.range + share * (faster.hip.range - slower.hip.range))
+    hip, hip_mean = blend(slower.hip, faster.hip)
+    knee, _ = blend(slower.knee, faster.knee)
+    ankle, _ = blend(slower.ankle, faster.ankle)
+    lift = (shape.toe_height - _USUAL_TOE_HEIGHT) * swing(phase)
+    return Leg(
+        hip=hip_mean + scale * (hip - hip_mean),
+        knee=knee * (0.5 + 0.5 * scale) * (1.0 + _KNEE_PER_TOE_HEIGHT * lift),
+        ankle=ankle + _ANKLE_PER_TOE_HEIGHT * lift,
+    )
+
+
+def _between(wanted: float) -> tuple[LegCurves, LegCurves, float]:
+    """The two measured sets whose hip ranges stand around `wanted`, and where between them."""
+    sets = measured()
+    pairs = pairwise(sets)
+    slower, faster = next((pair for pair in pairs if wanted < pair[1].hip.range), sets[-2:])
+    share = (wanted - slower.hip.range) / (faster.hip.range - slower.hip.range)
+    return slower, faster, min(max(share, 0.0), 1.0)

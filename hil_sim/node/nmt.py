@@ -1,0 +1,35 @@
+"""NMT states and services of a device (CiA 301 §7.3.2)."""
+
+from enum import IntEnum
+
+
+class NmtState(IntEnum):
+    """The state as a heartbeat carries it; INITIALISING is also the boot-up message."""
+
+    INITIALISING = 0
+    STOPPED = 4
+    OPERATIONAL = 5
+    PRE_OPERATIONAL = 127
+
+
+class NmtService(IntEnum):
+    """What an NMT master may ask for; the first byte of COB-ID 0."""
+
+    START = 1
+    STOP = 2
+    ENTER_PRE_OPERATIONAL = 128
+    RESET_NODE = 129
+    RESET_COMMUNICATION = 130
+
+
+NMT_COB_ID = 0x000
+HEARTBEAT_BASE = 0x700
+
+STATE_AFTER: dict[int, NmtState] = {
+    NmtService.START: NmtState.OPERATIONAL,
+    NmtService.STOP: NmtState.STOPPED,
+    NmtService.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+
+# CiA 301 table 38: SDO, SYNC and EMCY live in PRE-OPERATIONAL and OPERATIONAL, PDOs in OPERATIONAL alone.
+COMMUNICATING = frozenset({NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL})

@@ -1,0 +1,118 @@
+"""The simulated robot with its doors open: bus by hub or virtual channel, sensors on pseudo-terminals."""
+
+import threading
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from hil_sim import robot_file
+from hil_sim.bus.hub import Hub
+from hil_sim.bus.virtual import VirtualBridge
+from hil_sim.exoskeleton import SENSORS, Exoskeleton, Scenario
+from hil_sim.folder import Folder
+from hil_sim.loop import Loop
+from hil_sim.sensors.serial_port import SerialPort
+
+
+class SimulatedRobot:
+    """A robot in a folder, to be run by its caller's thread (`run`) or, in a `with` block, by one of its own.
+
+        with SimulatedRobot(tmp_path, virtual_channel="bench") as robot:
+            bus = can.Bus(interface="virtual", channel="bench")
+
+    With `virtual_channel` the bus is reached in the same process, otherwise through the hub on `port`.
+    `speed` is simulated over real time, `None` as fast as it goes.
+
+    Raises `hil_sim.errors.SimulatorError` where the folder or the port is taken.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        scenario: Scenario = Scenario.WALK,
+        seed: int = 0,
+        virtual_channel: str | None = None,
+        speed: float | None = 1.0,
+        epoch_s: float = 0.0,
+    ) -> None:
+        self.exoskeleton = Exoskeleton(scenario, seed)
+        self.folder = Folder(folder)
+        self.port: int | None = None
+        self.config_is_ours = True
+        self._virtual_channel = virtual_channel
+        self._speed = speed
+        self._epoch_s = epoch_s
+        self._thread: threading.Thread | None = None
+        self._closing = ExitStack()
+        self._loop: Loop | None = None
+        self._stopping = False
+
+    @property
+    def config(self) -> Path:
+        """robot.toml, ready for a gateway (with a virtual channel: for one in this process)."""
+        return self.folder.config
+
+    def open(self) -> None:
+        """Open every door and switch the robot on; all or nothing."""
+        with ExitStack() as closing:
+            self.folder.open()
+            closing.callback(self.folder.close)
+            loop = Loop(self.exoskeleton.clock, self._speed)
+            closing.callback(loop.close)
+            self._open_bus(loop, closing)
+            self._open_sensors(closing)
+            self.exoskeleton.power_on()
+            self._closing = closing.pop_all()
+            self._loop = loop
+
+    def _open_bus(self, loop: Loop, closing: ExitStack) -> None:
+        if self._virtual_channel is not None:
+            closing.callback(VirtualBridge(self.exoskeleton.bus, self._virtual_channel).close)
+            self.config_is_ours = self.folder.write_config(robot_file.virtual_bus(self._virtual_channel))
+            return
+        hub = Hub(loop, self.exoskeleton.bus, self.folder.hub_port(), self._epoch_s)
+        closing.callback(hub.close)
+        self.port = hub.port
+        self.folder.remember_port(hub.port)
+        self.config_is_ours = self.folder.write_config(robot_file.hub_bus(hub.port))
+
+    def _open_sensors(self, closing: ExitStack) -> None:
+        for name in SENSORS:
+            port = SerialPort(self.folder.link(name))
+            closing.callback(port.close)
+            self.exoskeleton.sinks[name] = port.write
+
+    def run(self, seconds: float | None = None) -> None:
+        """Run in this thread until `stop`, or for so many simulated seconds."""
+        if self._loop is None:
+            raise RuntimeError("open() comes before run()")
+        end_ns = None if seconds is None else self.exoskeleton.clock.now_ns + round(seconds * 1e9)
+        if not self._stopping:
+            self._loop.run(end_ns)
+
+    def stop(self) -> None:
+        """End `run` soon, or before it began; from any thread or signal handler."""
+        self._stopping = True
+        if self._loop is not None:
+            self._loop.stop()
+
+    def close(self) -> None:
+        """Stop, and close every door; idempotent."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        self._loop = None
+        self._closing.close()
+
+    def __enter__(self) -> Self:
+        self.open()
+        self._thread = threading.Thread(target=self.run, name="simulated robot")
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,182 @@
+"""The robot's file that a gateway needs for the simulated robot, written as an example to learn from."""
+
+from pathlib import Path
+
+from hil_sim.bus.hub import HOST
+from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_EDS, CONTROLLER_NODE, DRIVE_EDS, JOINTS
+
+CHANNEL = "sim"
+
+_HEAD = """\
+# The simulated exoskeleton, described for its gateway:  gwrms gateway {path}
+# For a robot of your own, copy this file and change what is different. Quantities are SI: rad, m, s, N·m.
+
+[robot]
+name = "simulated-exo"          # how servers and journals call it
+
+[gateway]
+host = "127.0.0.1"              # who may reach the gateway: this machine alone
+port = 7420                     # its TCP port
+role = "observer"               # another controller leads the bus (here: `gait`); we send nothing unasked
+linger_s = 5                    # seconds that a module stays awake after its last client
+
+{bus}
+# Joints: flexion of hip and knee and dorsiflexion of the ankle count positive.
+#   angle = direction · counts / (counts_per_revolution · gear_ratio) · 2π + zero_offset
+"""
+
+_HUB = """\
+[can.main]                      # one CAN bus; its name is what `bus = …` below refers to
+interface = "socketcand"        # python-can's name of the interface; "socketcan" for a real one
+channel = "{channel}"                 # the bus at the hub; "can0" or the like for a real one
+host = "{host}"              # the simulator's hub: it speaks only to this machine
+port = {port}                    # stays the same when the simulator starts again in this folder
+tcp_tune = true                 # send each frame at once
+"""
+
+_VIRTUAL = """\
+[can.main]                      # one CAN bus; its name is what `bus = …` below refers to
+interface = "virtual"           # python-can's bus within one process
+channel = "{channel}"
+"""
+
+_FIRST_JOINT = """
+[joint.{name}]
+bus = "main"                    # the [can.…] table it is wired to
+node_id = {node_id}                     # its CANopen node id (1–127)
+eds = "{eds}"         # beside this file, or one that ships with GWRMS
+counts_per_revolution = 4096    # of the encoder that 6064h counts, here the motor's
+gear_ratio = 100.0              # motor revolutions per revolution of the joint
+direction = 1                   # −1 where counts fall when the joint bends
+zero_offset = 0.0               # rad, the joint's angle where the drive counts 0
+"""
+
+_JOINT = """
+[joint.{name}]
+bus = "main"
+node_id = {node_id}
+eds = "{eds}"
+counts_per_revolution = 4096
+gear_ratio = 100.0
+direction = 1
+zero_offset = 0.0
+"""
+
+_DEVICES = """
+[device.{controller}]                   # any other CANopen device that has parameters
+bus = "main"
+node_id = {controller_node}
+eds = "{controller_eds}"
+
+[insole.left_insole]
+port = "{folder}/left_insole"   # a path that stays: for real ones /dev/serial/by-id/…
+baudrate = 230400               # two feet of 16 cells at 100 Hz need more than 115200
+format = "insole-cobs"          # how the insole talks
+layout = "insole-16"            # where its 16 cells are; a .toml file of your own for another insole
+
+[insole.right_insole]           # the same for the other foot: the layout is mirrored
+port = "{folder}/right_insole"
+baudrate = 230400
+format = "insole-cobs"
+layout = "insole-16"
+
+[imu.trunk]
+port = "{folder}/trunk"
+baudrate = 115200               # 44 bytes at 100 Hz
+format = "witmotion"
+axes = ["x", "y", "z"]          # which sensor axes point forward, left and up along the trunk
+
+# Parameters: what may be changed, within which limits. The name before the dot is the component it belongs
+# to. The stricter of these limits and those of the EDS counts.
+
+[parameter."gait.step_length"]  # heel to heel of the other foot: more makes the hips swing further
+object = "0x2001:0"             # index and sub-index in the device's dictionary
+unit = "m"
+scale = 0.001                   # unit per device count: the device counts millimetres
+min = 0.20
+max = 0.60
+max_step = 0.10                 # the most that one write may change it
+live = true                     # may be changed while the drives are enabled
+
+[parameter."gait.cycle_time"]   # one stride: two steps
+object = "0x2002:0"
+unit = "s"
+scale = 0.001
+min = 1.0
+max = 4.0
+max_step = 0.5
+live = true
+
+[parameter."gait.toe_height"]   # how far the toes clear the ground in swing: bends knee and ankle
+object = "0x2003:0"
+unit = "m"
+scale = 0.001
+min = 0.02
+max = 0.12
+max_step = 0.03
+live = true
+
+[parameter."gait.trunk_angle"]  # lean of the trunk, forward positive
+object = "0x2004:0"
+unit = "rad"
+scale = 0.001
+min = -0.10
+max = 0.30
+max_step = 0.10
+live = true
+"""
+
+_JOINT_PARAMETERS_NOTE = """
+# Per joint: the torque the drive may use at most (6072h, per mille of 40 N·m rated at the joint), and the speed
+# of its own moves in profile position mode (6081h, counts/s; 2π / 409 600 rad each).
+"""
+
+_JOINT_PARAMETERS = """
+[parameter."{name}.max_torque"]
+object = "0x6072:0"
+unit = "N·m"
+scale = 0.04
+min = 8.0
+max = 80.0
+max_step = 40.0
+live = true
+
+[parameter."{name}.profile_velocity"]
+object = "0x6081:0"
+unit = "rad/s"
+scale = 1.5339807878856412e-05
+min = 0.05
+max = 6.0
+max_step = 2.0
+live = true
+"""
+
+
+def hub_bus(port: int) -> str:
+    """The bus's table where it is reached through the hub on `port`."""
+    return _HUB.format(channel=CHANNEL, host=HOST, port=port)
+
+
+def virtual_bus(channel: str) -> str:
+    """The bus's table where it is reached in the same process."""
+    return _VIRTUAL.format(channel=channel)
+
+
+def text(folder: Path, bus: str) -> str:
+    """The file for the simulator in `folder` (absolute), with the table of its bus."""
+    first, *others = JOINTS.items()
+    joints = [(_FIRST_JOINT, first), *((_JOINT, other) for other in others)]
+    return "".join(
+        (
+            _HEAD.format(path=folder / "robot.toml", bus=bus),
+            *(template.format(name=name, node_id=node, eds=DRIVE_EDS) for template, (name, node) in joints),
+            _DEVICES.format(
+                folder=folder,
+                controller=CONTROLLER,
+                controller_node=CONTROLLER_NODE,
+                controller_eds=CONTROLLER_EDS,
+            ),
+            _JOINT_PARAMETERS_NOTE,
+            *(_JOINT_PARAMETERS.format(name=name) for name in JOINTS),
+        )
+    )

@@ -1,0 +1,1 @@
+"""Insoles and trunk IMU, encoded from their manuals."""

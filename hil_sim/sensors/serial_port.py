@@ -1,0 +1,60 @@
+"""A serial device's end of a pseudo-terminal: never waits for whoever reads it."""
+
+import array
+import fcntl
+import os
+import termios
+import tty
+from pathlib import Path
+
+_BACKLOG_BYTES = 2048  # what a reader that is absent or slow may find waiting; older bytes are dropped
+
+
+class SerialPort:
+    """A pseudo-terminal behind a symbolic link with a stable path.
+
+    Both ends stay open here, so that raw mode holds and nobody notices a reader that comes or goes.
+    """
+
+    def __init__(self, link: Path) -> None:
+        self.link = link
+        self.bytes_dropped = 0
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        _point(link, os.ttyname(self._slave))
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; where nobody fetched the earlier ones, those are gone."""
+        waiting = self._waiting()
+        if waiting > _BACKLOG_BYTES:
+            self.bytes_dropped += waiting
+            termios.tcflush(self._slave, termios.TCIFLUSH)
+        try:
+            written = os.write(self._master, data)
+        except BlockingIOError:
+            written = 0
+        self.bytes_dropped += len(data) - written
+
+    def _waiting(self) -> int:
+        count = array.array("i", [0])
+        fcntl.ioctl(self._slave, termios.FIONREAD, count)
+        return count[0]
+
+    def close(self) -> None:
+        """Take the link away and hang up; idempotent."""
+        if self._master < 0:
+            return
+        if self.link.is_symlink() and str(self.link.readlink()) == os.ttyname(self._slave):
+            self.link.unlink()
+        os.close(self._slave)
+        os.close(self._master)
+        self._master = self._slave = -1
+
+
+def _point(link: Path, target: str) -> None:
+    """Make or replace the link in one step: no moment without it."""
+    fresh = link.with_name(f".{link.name}.new")
+    fresh.unlink(missing_ok=True)
+    fresh.symlink_to(target)
+    fresh.replace(link)
