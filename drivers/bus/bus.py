@@ -1,0 +1,199 @@
+"""One supervised CAN bus: opens, hands out frames, names what is wrong, and comes back.
+
+Everything is received in one thread of the bus, which calls each frame's handlers directly. The bus is open
+while somebody holds it: its owner between `start` and `stop`, and every node that is attached.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from drivers.bus.bus_state import BusState, bus_state
+from drivers.bus.frames import ERROR, FrameHandler, Transport
+from drivers.bus.opening import open_transport
+from drivers.bus.settings import CanSettings, Role
+from drivers.bus.switching import FastSwitching
+from drivers.errors import Unavailable
+
+if TYPE_CHECKING:
+    from drivers.bus.node import Node
+
+TICK_S = 0.05  # how long the thread waits for a frame before it looks at the clock
+FIRST_RETRY_S = 0.1
+LAST_RETRY_S = 2.0
+MAX_UNCLAIMED = 2048  # as many as there are 11-bit identifiers
+
+
+class BusUser:
+    """What is told when a bus comes, goes, and that time passes: in the bus's thread, never for long."""
+
+    def bus_opened(self) -> None:
+        """Frames can come from now on. In the caller's thread where the bus was open already."""
+
+    def bus_closed(self) -> None:
+        """No frame comes any more; the bus's `problem` says why."""
+
+    def tick(self, now_ns: int) -> None:
+        """About every `TICK_S`, frames or not."""
+
+
+class CanBus:
+    """A bus by its name in the robot's file."""
+
+    def __init__(self, name: str, settings: CanSettings, role: Role = Role.OBSERVER) -> None:
+        self.name = name
+        self.settings = settings
+        self.role = role
+        self.problem: str | None = None  # why it is not open, or what is wrong with it, in words
+        self.state = BusState.ACTIVE  # as the controller's error frames say, where the interface has them
+        self.frames = 0
+        self.opened = 0  # times
+        self.failed_handlers = 0
+        self.unclaimed: set[int] = set()  # identifiers that came and nobody asked for
+        self.nodes: dict[int, Node] = {}  # one object a node id, whoever uses it
+        self._handlers: dict[int, FrameHandler] = {}
+        self._subscribers: dict[int, tuple[FrameHandler, ...]] = {}
+        self._users: tuple[BusUser, ...] = ()
+        self._owner = BusUser()
+        self._life = threading.Lock()  # the thread's start and end; the thread itself never takes it
+        self._lock = threading.Lock()  # users, subscribers and transport
+        self._send_lock = threading.Lock()
+        self._stopping = threading.Event()
+        self._transport: Transport | None = None
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Keep the bus open, nodes or not; idempotent, returns at once."""
+        self.hold(self._owner)
+
+    def stop(self) -> None:
+        """Let go what `start` held; idempotent."""
+        self.release(self._owner)
+
+    def hold(self, user: BusUser) -> None:
+        """Open the bus for `user`, who is told of everything until `release`; idempotent."""
+        with self._life:
+            with self._lock:
+                if user in self._users:
+                    return
+                self._users = (*self._users, user)
+                is_open = self._transport is not None
+            if is_open:
+                user.bus_opened()
+            elif self._thread is None:
+                self._stopping.clear()
+                self._thread = threading.Thread(target=self._run, name=f"can {self.name}", daemon=True)
+                self._thread.start()
+
+    def release(self, user: BusUser) -> None:
+        """Let go; the last one to do so closes the bus and joins its thread. Not for the bus's own thread."""
+        with self._life:
+            with self._lock:
+                self._users = tuple(known for known in self._users if known is not user)
+            if not self._users and self._thread is not None:
+                self._stopping.set()
+                self._thread.join()
+                self._thread = None
+
+    def subscribe(self, can_id: int, handler: FrameHandler) -> None:
+        """Call `handler` with every frame of this identifier."""
+        with self._lock:
+            self._set_handlers(can_id, (*self._subscribers.get(can_id, ()), handler))
+
+    def unsubscribe(self, can_id: int, handler: FrameHandler) -> None:
+        """End it; a handler that is not subscribed does no harm."""
+        with self._lock:
+            kept = tuple(known for known in self._subscribers.get(can_id, ()) if known != handler)
+            self._set_handlers(can_id, kept)
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Put a frame on the bus; raises `Unavailable`."""
+        with self._send_lock:
+            transport = self._transport
+            if transport is None:
+                raise Unavailable(f"bus {self.name} is not open: {self.problem or 'nobody holds it'}")
+            transport.send(can_id, data)
+
+    def _set_handlers(self, can_id: int, handlers: tuple[FrameHandler, ...]) -> None:
+        self._subscribers[can_id] = handlers
+        if not handlers:
+            self._handlers.pop(can_id, None)
+        else:
+            self._handlers[can_id] = handlers[0] if len(handlers) == 1 else _all(handlers)
+
+    def _run(self) -> None:
+        FastSwitching.begin()
+        retry_s = FIRST_RETRY_S
+        try:
+            while not self._stopping.is_set():
+                try:
+                    transport = open_transport(self.settings)
+                    retry_s = FIRST_RETRY_S
+                    self._serve(transport)
+                except Unavailable as error:
+                    self.problem = str(error)
+                self._stopping.wait(retry_s)
+                retry_s = min(2 * retry_s, LAST_RETRY_S)
+        finally:
+            FastSwitching.end()
+
+    def _serve(self, transport: Transport) -> None:
+        """Hand out frames until told to stop; raises `Unavailable` when the interface goes."""
+        problem = "it was closed"
+        with self._lock:
+            self._transport, self.problem, self.state = transport, None, BusState.ACTIVE
+            self.opened += 1
+            users = self._users
+        try:
+            for user in users:
+                user.bus_opened()
+            self._receive(transport)
+        except Unavailable as error:
+            problem = str(error)
+            raise
+        finally:
+            with self._send_lock:
+                self._transport = None
+            transport.close()
+            self.problem = problem
+            for user in self._users:
+                user.bus_closed()
+
+    def _receive(self, transport: Transport) -> None:
+        tick_ns = round(TICK_S * 1e9)
+        handler_of = self._handlers.get
+        next_tick_ns = time.monotonic_ns()
+        while not self._stopping.is_set():
+            frames = transport.receive(TICK_S)
+            self.frames += len(frames)
+            for stamp_ns, can_id, data in frames:
+                handler = handler_of(can_id)
+                if handler is None:
+                    self._unhandled(can_id, data)
+                    continue
+                try:
+                    handler(stamp_ns, data)
+                except Exception as error:  # noqa: BLE001 - one wrong handler must not silence every joint
+                    self.failed_handlers += 1
+                    self.problem = f"internal error at frame 0x{can_id:X}: {type(error).__name__}: {error}"
+            now_ns = time.monotonic_ns()
+            if now_ns >= next_tick_ns:
+                next_tick_ns = now_ns + tick_ns
+                for user in self._users:
+                    user.tick(now_ns)
+
+    def _unhandled(self, can_id: int, data: bytes) -> None:
+        if can_id & ERROR:
+            self.state = bus_state(can_id, data) or self.state
+        elif len(self.unclaimed) < MAX_UNCLAIMED:
+            self.unclaimed.add(can_id)
+
+
+def _all(handlers: tuple[FrameHandler, ...]) -> FrameHandler:
+    def call_all(stamp_ns: int, data: bytes) -> None:
+        for handler in handlers:
+            handler(stamp_ns, data)
+
+    return call_all

@@ -1,0 +1,99 @@
+"""Which objects a device sends in its TPDOs, read from the device itself (CiA 301 §7.5.2.35, §7.5.2.37)."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.values import unsigned
+from drivers.errors import DeviceAbort, DriverError
+from eds import Description
+
+TPDO_PARAMETER, TPDO_MAPPING = 0x1800, 0x1A00
+MAX_TPDOS = 512
+USUAL_TPDOS = 4  # tried where the EDS names none
+_NOT_VALID = 0x8000_0000
+_EXTENDED = 0x2000_0000
+_MAX_ENTRIES = 64
+_MULTIPLEXED = (0xFE, 0xFF)  # MPDO: the number of entries says so
+
+
+@dataclass(frozen=True, slots=True)
+class MappedObject:
+    """One entry of a mapping: `bits` long, beginning at bit `at` of the frame."""
+
+    index: int
+    subindex: int
+    bits: int
+    at: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tpdo:
+    """One transmit PDO of a device, as it is configured now."""
+
+    number: int  # 1 … 512
+    cob_id: int  # 11 or 29 bits
+    extended: bool
+    enabled: bool
+    transmission_type: int  # 0–240 on SYNC, 252/253 on request, 254/255 on event
+    objects: tuple[MappedObject, ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes that a frame has at least."""
+        return (sum(mapped.bits for mapped in self.objects) + 7) // 8
+
+    @property
+    def trigger(self) -> str:
+        """What makes the device send it, in words."""
+        if self.transmission_type <= 240:
+            return "on SYNC"
+        return "on request" if self.transmission_type in (252, 253) else "by itself"
+
+
+def read_tpdos(sdo: SdoChannel, description: Description) -> tuple[Tpdo, ...]:
+    """Every TPDO that the device has, enabled or not; raises `DriverError`."""
+    return tuple(tpdo for number in _numbers(description) if (tpdo := _read_tpdo(sdo, number)) is not None)
+
+
+def _numbers(description: Description) -> Iterable[int]:
+    known = [n for n in range(MAX_TPDOS) if TPDO_PARAMETER + n in description.object_dictionary]
+    return known or range(USUAL_TPDOS)
+
+
+def _read_tpdo(sdo: SdoChannel, number: int) -> Tpdo | None:
+    parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
+    try:
+        cob_id = unsigned(sdo.upload(parameter, 1))
+    except DeviceAbort:
+        return None  # the EDS knows it, this device does not
+    enabled = not cob_id & _NOT_VALID
+    transmission_type = unsigned(sdo.upload(parameter, 2)[:1])
+    objects = _read_mapping(sdo, mapping) if enabled else ()
+    extended = bool(cob_id & _EXTENDED)
+    return Tpdo(
+        number + 1,
+        cob_id & (0x1FFF_FFFF if extended else 0x7FF),
+        extended,
+        enabled,
+        transmission_type,
+        objects,
+    )
+
+
+def _read_mapping(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...]:
+    count = unsigned(sdo.upload(mapping, 0)[:1])
+    if count in _MULTIPLEXED:
+        return ()
+    objects: list[MappedObject] = []
+    at = 0
+    for subindex in range(1, min(count, _MAX_ENTRIES) + 1):
+        entry = unsigned(sdo.upload(mapping, subindex))
+        objects.append(MappedObject(entry >> 16, entry >> 8 & 0xFF, entry & 0xFF, at))
+        at += entry & 0xFF
+    if at > 64:
+        raise DriverError(
+            f"{sdo.label}: 0x{mapping:04X} maps {at} bits, more than a frame holds: "
+            "correct the device's mapping"
+        )
+    return tuple(objects)

@@ -1,0 +1,146 @@
+"""Blocking SDO transfers over one channel to one node, errors in the drivers' own words.
+
+A read that stays unanswered is repeated; a write never is, because the device may have taken it.
+"""
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from drivers.bus import sdo
+from drivers.bus.aborts import abort_text
+from drivers.errors import DeviceAbort, DeviceTimeout
+
+T = TypeVar("T")
+
+READ_ATTEMPTS = 3
+
+
+class Interrupted(Exception):
+    """An urgent job wants the channel: the running one ends here and, as far as it only read, runs again."""
+
+
+class SdoProtocolBroken(DeviceTimeout):
+    """The device answered, but not as the SDO protocol says: nothing is known about the transfer."""
+
+
+@dataclass(slots=True)
+class SdoCounters:
+    """What happened on one channel."""
+
+    transfers: int = 0
+    timeouts: int = 0
+    aborts: int = 0
+    stale: int = 0  # responses that belonged to no request
+
+
+class SdoChannel:
+    """One SDO channel. `upload` and `download` are for one thread; the rest for any."""
+
+    def __init__(self, label: str, send: Callable[[bytes], None], timeout_s: float) -> None:
+        """`send` puts a request on the bus, or raises `Unavailable`."""
+        self.label = label
+        self.timeout_s = timeout_s
+        self.counters = SdoCounters()
+        self._send = send
+        self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._interrupted = threading.Event()
+
+    def on_response(self, _stamp_ns: int, data: bytes) -> None:
+        """A frame with the identifier of this channel's responses; called in the bus's thread."""
+        if len(data) == 8:
+            self._inbox.put(data)
+
+    def interrupt(self) -> None:
+        """End the transfer in flight, and refuse further ones until `resume`."""
+        self._interrupted.set()
+        self._inbox.put(None)
+
+    def resume(self) -> None:
+        """Allow transfers again."""
+        self._interrupted.clear()
+
+    def upload(self, index: int, subindex: int, attempts: int = READ_ATTEMPTS) -> bytes:
+        """Read an object; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
+        what = f"{self.label}: reading 0x{index:04X}:{subindex:02X}"
+        for _ in range(attempts - 1):
+            try:
+                return self._transfer(sdo.upload(index, subindex), index, subindex, what)
+            except DeviceTimeout:
+                continue
+        return self._transfer(sdo.upload(index, subindex), index, subindex, what)
+
+    def download(self, index: int, subindex: int, data: bytes) -> None:
+        """Write an object, once; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
+        self._check_interrupted()
+        what = f"{self.label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
+        unknown = "whether the device took it is not known, read it back"
+        try:
+            self._transfer(sdo.download(index, subindex, data), index, subindex, what)
+        except Interrupted as error:
+            raise DeviceTimeout(f"{what}: interrupted by an urgent request; {unknown}") from error
+        except DeviceTimeout as error:
+            raise DeviceTimeout(f"{error}; {unknown}") from error
+
+    def _transfer(self, steps: Generator[bytes | None, bytes, T], index: int, subindex: int, what: str) -> T:
+        self._check_interrupted()
+        self._forget_stale()
+        self.counters.transfers += 1
+        try:
+            return self._run(steps)
+        except sdo.SdoAborted as error:
+            self.counters.aborts += 1
+            raise DeviceAbort(f"{what}: refused, {abort_text(error.abort_code)}", error.abort_code) from error
+        except sdo.SdoProtocolError as error:
+            self._send(sdo.abort_request(index, subindex, error.abort_code))
+            raise SdoProtocolBroken(f"{what}: the device {error}, against the SDO protocol") from error
+        except queue.Empty as error:
+            self.counters.timeouts += 1
+            self._send(sdo.abort_request(index, subindex, sdo.TIMED_OUT))
+            raise DeviceTimeout(f"{what}: no answer within {self.timeout_s:g} s") from error
+        except Interrupted:
+            self._send(sdo.abort_request(index, subindex, sdo.GENERAL_ERROR))
+            raise
+
+    def _run(self, steps: Generator[bytes | None, bytes, T]) -> T:
+        try:
+            request = next(steps)
+            while True:
+                if request is None:
+                    self.counters.stale += 1
+                else:
+                    self._send(request)
+                    deadline = time.monotonic() + self.timeout_s
+                request = steps.send(self._response(deadline))
+        except StopIteration as done:
+            result: T = done.value
+            return result
+
+    def _response(self, deadline: float) -> bytes:
+        """The next response; raises `queue.Empty` at the deadline and `Interrupted`."""
+        while True:
+            response = self._inbox.get(timeout=max(0.0, deadline - time.monotonic()))
+            self._check_interrupted()
+            if response is not None:
+                return response
+
+    def _check_interrupted(self) -> None:
+        if self._interrupted.is_set():
+            raise Interrupted
+
+    def _forget_stale(self) -> None:
+        while True:
+            try:
+                response = self._inbox.get_nowait()
+            except queue.Empty:
+                return
+            self.counters.stale += response is not None
+
+
+def value_text(data: bytes) -> str:
+    """Bytes as a number where they can be one: `5000 (88 13)`."""
+    number = f"{int.from_bytes(data, 'little')} " if len(data) in (1, 2, 4, 8) else ""
+    return f"{number}({data[:16].hex(' ')}{' …' if len(data) > 16 else ''})"

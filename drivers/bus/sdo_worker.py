@@ -1,0 +1,150 @@
+"""One node's SDO worker: a thread that does one job after another, urgent ones first.
+
+Two transfers to one node at a time corrupt each other, so everything that is asked of a node goes through
+its worker. A job is a function that is given the channel; an urgent one interrupts what is running. What was
+interrupted runs again afterwards, except that a write in flight fails as unknown.
+"""
+
+import heapq
+import itertools
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from drivers.bus.sdo_channel import Interrupted, SdoChannel
+from drivers.errors import Unavailable
+
+T = TypeVar("T")
+Job = Callable[[SdoChannel], T]
+
+
+@dataclass(order=True, slots=True)
+class _Task:
+    priority: int  # 0 urgent, 1 not
+    number: int  # first come, first served
+    job: Job[Any] = field(compare=False)
+    future: Future[Any] = field(compare=False, default_factory=Future)
+
+
+@dataclass(slots=True)
+class _Repeated:
+    period_s: float
+    job: Job[Any]
+    due: float
+    task: _Task | None = None
+
+
+class SdoWorker:
+    """Does jobs between `start` and `stop`; what is asked outside of that fails with `Unavailable`."""
+
+    def __init__(self, channel: SdoChannel) -> None:
+        self.channel = channel
+        self._changed = threading.Condition()
+        self._tasks: list[_Task] = []
+        self._repeated: list[_Repeated] = []
+        self._numbers = itertools.count()
+        self._running: _Task | None = None
+        self._open = False
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin; idempotent."""
+        with self._changed:
+            if self._open:
+                return
+            self._open = True
+        self._thread = threading.Thread(target=self._run, name=f"sdo {self.channel.label}", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Fail what is left with `Unavailable`, forget what was to be repeated, and end the thread."""
+        with self._changed:
+            self._open = False
+            self._repeated.clear()
+            self.channel.interrupt()
+            self._changed.notify()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def submit(self, job: Job[T], *, urgent: bool = False) -> Future[T]:
+        """Do `job` when its turn comes; the future's callbacks run in the worker's thread."""
+        task = _Task(0 if urgent else 1, next(self._numbers), job)
+        with self._changed:
+            if not self._open:
+                task.future.set_exception(self._closed())
+                return task.future
+            heapq.heappush(self._tasks, task)
+            if urgent and self._running is not None and self._running.priority > 0:
+                self.channel.interrupt()
+            self._changed.notify()
+        return task.future
+
+    def repeat(self, period_s: float, job: Job[object]) -> Callable[[], None]:
+        """Do `job` every `period_s`, never twice at once; returns how to end it. Its errors are its own."""
+        repeated = _Repeated(period_s, job, time.monotonic())
+        with self._changed:
+            self._repeated.append(repeated)
+            self._changed.notify()
+
+        def end() -> None:
+            with self._changed:
+                if repeated in self._repeated:
+                    self._repeated.remove(repeated)
+
+        return end
+
+    def _closed(self) -> Unavailable:
+        return Unavailable(f"{self.channel.label}: its bus is not open, nothing can be asked of it")
+
+    def _run(self) -> None:
+        while (task := self._next()) is not None:
+            if not _begin(task.future):
+                continue
+            try:
+                result = task.job(self.channel)
+            except Interrupted:
+                self._put_back(task)
+            except Exception as error:  # noqa: BLE001 - it belongs to whoever waits for the future
+                task.future.set_exception(error)
+            else:
+                task.future.set_result(result)
+        for task in self._tasks:
+            if _begin(task.future):
+                task.future.set_exception(self._closed())
+        self._tasks.clear()
+
+    def _next(self) -> _Task | None:
+        with self._changed:
+            self._running = None
+            while self._open:
+                wait_s = self._queue_due()
+                if self._tasks:
+                    self._running = heapq.heappop(self._tasks)
+                    self.channel.resume()
+                    return self._running
+                self._changed.wait(wait_s)
+            return None
+
+    def _put_back(self, task: _Task) -> None:
+        with self._changed:
+            heapq.heappush(self._tasks, task)
+
+    def _queue_due(self) -> float | None:
+        """Queue what is to be repeated now; returns the time until the next."""
+        now = time.monotonic()
+        for repeated in self._repeated:
+            if repeated.due <= now and (repeated.task is None or repeated.task.future.done()):
+                repeated.task = _Task(1, next(self._numbers), repeated.job)
+                heapq.heappush(self._tasks, repeated.task)
+                repeated.due = max(repeated.due + repeated.period_s, now)
+        waiting = [r.due for r in self._repeated if r.task is None or r.task.future.done()]
+        return max(0.0, min(waiting) - now) if waiting else None
+
+
+def _begin(future: Future[Any]) -> bool:
+    """Whether its job is still wanted; one that was interrupted has begun already."""
+    return future.running() or future.set_running_or_notify_cancel()

@@ -1,0 +1,150 @@
+"""The socketcand protocol: CAN frames as ASCII lines over TCP (the server is a hub or a Linux box with CAN).
+
+python-can's own client does not notice that the server has gone and loses the handshake when a frame is glued
+to it; this one says what is wrong at once and costs less per frame.
+"""
+
+import socket
+import time
+from collections.abc import Sequence
+
+from drivers.bus.frames import EXTENDED, Frame
+from drivers.errors import Unavailable
+
+CONNECT_TIMEOUT_S = 1.0
+RECEIVE_BYTES = 65536
+MAX_PENDING = 4096  # characters without the end of a message: not socketcand
+
+
+class SocketcandParser:
+    """`feed(text) -> messages`: what stands between `<` and `>`, across any split. Garbage is skipped."""
+
+    def __init__(self) -> None:
+        self.skipped = 0  # pieces that were no message
+        self._rest = ""
+
+    def feed(self, text: str) -> list[str]:
+        """Complete messages in `text`, without their brackets."""
+        *complete, self._rest = (self._rest + text).split(">")
+        if len(self._rest) > MAX_PENDING:
+            self._rest = ""
+            self.skipped += 1
+        messages = []
+        for piece in complete:
+            _, bracket, message = piece.rpartition("<")
+            if bracket:
+                messages.append(message)
+            else:
+                self.skipped += 1
+        return messages
+
+
+def frame_of(message: str, stamp_ns: int) -> Frame | None:
+    """A frame out of ` frame 181 1234.5 0102 `; `None` for other or damaged messages."""
+    words = message.split()
+    if len(words) < 3 or words[0] != "frame":
+        return None
+    try:
+        can_id = int(words[1], 16)
+        data = bytes.fromhex("".join(words[3:]))
+    except ValueError:
+        return None
+    if len(data) > 8 or can_id > 0x1FFF_FFFF:
+        return None
+    return stamp_ns, can_id if len(words[1]) <= 3 else can_id | EXTENDED, data
+
+
+def send_message(can_id: int, data: bytes) -> str:
+    """The line that sends a frame."""
+    identifier = f"{can_id & 0x1FFF_FFFF:08X}" if can_id & EXTENDED else f"{can_id:03X}"
+    return f"< send {identifier} {len(data)} {data.hex(' ')} >"
+
+
+class SocketcandTransport:
+    """An open connection to one CAN channel of a socketcand server."""
+
+    def __init__(self, host: str, port: int, channel: str) -> None:
+        """Connect and enter raw mode; raises `Unavailable`."""
+        self.dropped = 0
+        self._where = f"socketcand at {host}:{port}"
+        self._parser = SocketcandParser()
+        self._early: list[str] = []
+        try:
+            self._socket = socket.create_connection((host, port), timeout=CONNECT_TIMEOUT_S)
+        except OSError as error:
+            raise Unavailable(
+                f"nothing answers as {self._where} ({error}): start the CAN server or the simulator there, "
+                "or correct host and port"
+            ) from error
+        try:
+            _tune(self._socket)
+            self._handshake(channel)
+        except OSError as error:
+            self._socket.close()
+            raise Unavailable(f"{self._where} broke off while connecting ({error})") from error
+        except Unavailable:
+            self._socket.close()
+            raise
+
+    def receive(self, timeout_s: float) -> Sequence[Frame]:
+        """Frames that came; stamped together when they were taken from the socket."""
+        messages = self._early or self._read(timeout_s)
+        self._early = []
+        stamp_ns = time.monotonic_ns()
+        frames = []
+        for message in messages:
+            frame = frame_of(message, stamp_ns)
+            if frame is not None:
+                frames.append(frame)
+            else:
+                self.dropped += 1
+        return frames
+
+    def send(self, can_id: int, data: bytes) -> None:
+        try:
+            self._socket.sendall(send_message(can_id, data).encode("ascii"))
+        except OSError as error:
+            raise Unavailable(f"{self._where} is gone ({error})") from error
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _read(self, timeout_s: float) -> list[str]:
+        try:
+            if self._socket.gettimeout() != timeout_s:
+                self._socket.settimeout(timeout_s)
+            data = self._socket.recv(RECEIVE_BYTES)
+        except TimeoutError:
+            return []
+        except OSError as error:
+            raise Unavailable(f"{self._where} is gone ({error})") from error
+        if not data:
+            raise Unavailable(f"{self._where} closed the connection")
+        return self._parser.feed(data.decode("ascii", errors="replace"))
+
+    def _handshake(self, channel: str) -> None:
+        deadline = time.monotonic() + CONNECT_TIMEOUT_S
+        self._expect("hi", deadline)
+        for request in (f"< open {channel} >", "< rawmode >"):
+            self._socket.sendall(request.encode("ascii"))
+            self._expect("ok", deadline)
+
+    def _expect(self, answer: str, deadline: float) -> None:
+        while True:
+            while self._early:
+                message = self._early.pop(0).strip()
+                if message == answer:
+                    return
+                if not message.startswith("frame"):
+                    raise Unavailable(f"{self._where} answered {message!r} instead of {answer!r}")
+            if time.monotonic() > deadline:
+                raise Unavailable(f"{self._where} did not answer {answer!r}: is it a socketcand server?")
+            self._early = self._read(max(0.01, deadline - time.monotonic()))
+
+
+def _tune(sock: socket.socket) -> None:
+    """Send at once, and notice within seconds that the other machine is gone."""
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option, value in ((socket.TCP_KEEPIDLE, 1), (socket.TCP_KEEPINTVL, 1), (socket.TCP_KEEPCNT, 2)):
+        sock.setsockopt(socket.IPPROTO_TCP, option, value)

@@ -1,0 +1,33 @@
+"""Object values as bytes and as numbers (CiA 301 §7.1.4: little-endian)."""
+
+import struct
+
+from eds.datatypes import DATA_TYPES
+
+Number = int | float
+
+
+def size_of(data_type: int) -> int | None:
+    """Bytes of a data type; `None` where its length varies or it is unknown."""
+    known = DATA_TYPES.get(data_type)
+    return None if known is None or known.bits is None else (known.bits + 7) // 8
+
+
+def decode(data: bytes, data_type: int) -> Number | None:
+    """A number out of an object's bytes; `None` for types that are no numbers.
+
+    Some devices answer with more bytes than the type has: those beyond are cut off.
+    """
+    known = DATA_TYPES.get(data_type)
+    size = size_of(data_type)
+    if known is None or size is None or known.kind == "bytes" or not data:
+        return None
+    data = data[:size]
+    if known.kind == "real":
+        return None if len(data) < size else float(struct.unpack("<f" if size == 4 else "<d", data)[0])
+    return int.from_bytes(data, "little", signed=known.kind == "signed")
+
+
+def unsigned(data: bytes) -> int:
+    """The bytes as an unsigned number."""
+    return int.from_bytes(data, "little")

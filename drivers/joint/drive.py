@@ -1,0 +1,210 @@
+"""A joint: one axis of a CiA 402 drive as a component with channels in SI units.
+
+Everything about the drive is read from the drive when it comes up: its PDO mapping, its ratings, what it does
+on quick stop. What no TPDO brings is polled by SDO.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+
+from drivers.bus.bus import CanBus
+from drivers.bus.emcy import error_text
+from drivers.bus.frames import EXTENDED, FrameHandler
+from drivers.bus.node import shared_node
+from drivers.bus.pdo import Tpdo
+from drivers.bus.sdo_channel import SdoChannel
+from drivers.component import Kind
+from drivers.freshness import Freshness
+from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
+from drivers.joint.decoder import Decoder
+from drivers.joint.plan import Plan, Polled, make_plan
+from drivers.joint.quantities import AXIS_OFFSET, POSITION, STATUSWORD, channels, quantities
+from drivers.joint.quick_stop import StopOutcome, quick_stop
+from drivers.joint.reading import DriveReading, read_drive
+from drivers.joint.settings import JointSettings
+from drivers.latest import Latest
+from drivers.samples import Channel, Quality, State
+from eds import Description
+
+_IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+
+
+class JointDrive:
+    """One joint by its name in the robot's file. Reads, and stops; it can never enable the drive."""
+
+    kind = Kind.JOINT
+
+    def __init__(self, name: str, settings: JointSettings, bus: CanBus, description: Description) -> None:
+        """Raises `EdsError` where the file describes no such axis, `SettingsError` on a contradiction."""
+        self.name = name
+        self.settings = settings
+        self.node = shared_node(bus, settings.node_id, description, settings)
+        self._quantities = quantities(description, settings.axis)
+        self.channels: tuple[Channel, ...] = channels(name, self._quantities)
+        self.latest = Latest(name, self.channels, settings.stale_after_s)
+        self.reading: DriveReading | None = None  # what the drive said about itself when it came up
+        self.frames = 0
+        self.short_frames = 0  # shorter than the mapping says; nothing was made of them
+        self._description = description
+        self._index = {channel.quantity: index for index, channel in enumerate(self.channels)}
+        self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
+        self._plan: Plan | None = None
+        self._started = False
+        self._lock = threading.RLock()  # the plan and its undoing; values come from two threads
+        self._undo: list[Callable[[], None]] = []
+
+    def start(self) -> None:
+        """Open the bus if nobody else has, and read the drive as soon as it answers."""
+        with self._lock:
+            if self._started:
+                return
+            self._started = True
+        self._freshness.reset()
+        self.node.attach(self, self.name)
+
+    def stop(self) -> None:
+        """Let go of everything; what it does to the drive is nothing."""
+        with self._lock:
+            if not self._started:
+                return
+            self._started = False
+        self.node.detach(self)
+        self.forget()
+
+    def quick_stop(self) -> Future[StopOutcome]:
+        """Ask the drive for a quick stop, ahead of everything else that is asked of its node.
+
+        The future's result says what the statusword confirmed within `stop_timeout_s`. Where the joint was
+        not started it fails with `Unavailable`.
+        """
+        return self.node.run(
+            lambda sdo: quick_stop(sdo, self._offset, self.settings.stop_timeout_s), urgent=True
+        )
+
+    def quality(self, now_ns: int) -> Quality:
+        """How far the joint's position can be trusted now, and what is wrong in words."""
+        state, age_ms = self._freshness.state(now_ns)
+        problem = self.node.problem(now_ns)
+        if not self.node.ready:
+            state = State.LOST
+        elif state is State.OK and self._drive_state(now_ns) in _IN_FAULT:
+            state, problem = State.FAULT, self._fault_text(now_ns)
+        elif state is not State.OK:
+            problem = problem or self._silence_text(age_ms)
+        notes = (*self.node.findings, *(self._plan.notes if self._plan is not None else ()))
+        words = "; ".join(text for text in (problem, *notes) if text)
+        return Quality(state, age_ms, words or None, self.counters())
+
+    def counters(self) -> dict[str, int]:
+        """Since the driver was made."""
+        return {
+            "frames": self.frames,
+            "short_frames": self.short_frames,
+            "stale": self._freshness.stale,
+            **self.node.counters(),
+        }
+
+    # What the node tells.
+
+    def boot(self, sdo: SdoChannel) -> None:
+        reading = read_drive(sdo, self._description, self.settings.axis)
+        plan = make_plan(self.settings, self._quantities, reading)
+        with self._lock:
+            self.forget()
+            if self._started:
+                self.reading, self._plan = reading, plan
+                self._install(plan)
+
+    def forget(self) -> None:
+        with self._lock:
+            while self._undo:
+                self._undo.pop()()
+            self.reading = self._plan = None
+            self.latest.clear()
+            self._freshness.disconnected()
+
+    # How values come.
+
+    @property
+    def _offset(self) -> int:
+        return self.settings.axis * AXIS_OFFSET
+
+    def _install(self, plan: Plan) -> None:
+        bus = self.node.bus
+        for tpdo, decoder in plan.decoders:
+            can_id = tpdo.cob_id | EXTENDED if tpdo.extended else tpdo.cob_id
+            handler = self._handler(tpdo, decoder)
+            bus.subscribe(can_id, handler)
+            self._undo.append(partial(bus.unsubscribe, can_id, handler))
+        for hz, polled in (
+            (self.settings.poll_hz, plan.polled_at(fast=True)),
+            (self.settings.slow_poll_hz, plan.polled_at(fast=False)),
+        ):
+            if hz and polled:
+                self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, polled)))
+
+    def _handler(self, tpdo: Tpdo, decoder: Decoder) -> FrameHandler:
+        """What is done with each frame of a TPDO: the hot path."""
+        size, indices, values = tpdo.size, decoder.channels, decoder.values
+        update, lock = self.latest.update, self._lock
+        position = self._index[POSITION] in indices
+
+        def on_frame(stamp_ns: int, data: bytes) -> None:
+            if len(data) < size:
+                self.short_frames += 1
+                return
+            with lock:
+                self.frames += 1
+                update(stamp_ns, indices, values(data))
+                if position:
+                    self._freshness.seen(stamp_ns)
+
+        return on_frame
+
+    def _poll(self, polled: tuple[Polled, ...], sdo: SdoChannel) -> None:
+        for one in polled:
+            data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
+            self._take(one, int.from_bytes(data, "little", signed=one.quantity.signed), time.monotonic_ns())
+
+    def _take(self, one: Polled, counts: int, stamp_ns: int) -> None:
+        indices: tuple[int, ...] = (one.channel,)
+        values: tuple[float | None, ...] = (counts * one.linear.scale + one.linear.offset,)
+        if one.quantity.name == STATUSWORD:
+            indices = (*indices, len(self.channels) - 1)
+            values = (*values, STATE_OF[counts & STATE_BITS])
+        with self._lock:
+            self.latest.update(stamp_ns, indices, values)
+            if one.quantity.name == POSITION:
+                self._freshness.seen(stamp_ns)
+
+    # What is wrong, in words.
+
+    def _fresh(self, quantity: str, now_ns: int) -> float | None:
+        index = self._index.get(quantity)
+        return None if index is None else self.latest.read(index, now_ns)[0]
+
+    def _drive_state(self, now_ns: int) -> DriveState | None:
+        value = self._fresh("state", now_ns)
+        return None if value is None else DriveState(int(value))
+
+    def _fault_text(self, now_ns: int) -> str:
+        vendor = self._description.vendor_id
+        emcy = self.node.active_emcy
+        code = self._fresh("error_code", now_ns)
+        if emcy is not None:
+            return f"the drive is in fault: {emcy.text(vendor)}"
+        if code:
+            return f"the drive is in fault: {error_text(int(code), vendor)}"
+        return "the drive is in fault and does not say why (no EMCY was seen, 603Fh is empty)"
+
+    def _silence_text(self, age_ms: float | None) -> str:
+        since = "no position has come yet" if age_ms is None else f"no position for {age_ms / 1000:.1f} s"
+        tpdo = None if self._plan is None else self._plan.position_from
+        if tpdo is None:
+            return f"{since}: the drive does not answer the SDO that asks for it"
+        return (
+            f"{since}: TPDO{tpdo.number} (0x{tpdo.cob_id:03X}), which brings it {tpdo.trigger}, does not come"
+        )

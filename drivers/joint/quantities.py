@@ -1,0 +1,95 @@
+"""What a joint can tell: CiA 402 objects, their units, and the channels made of them."""
+
+from dataclasses import dataclass, replace
+
+from drivers.joint.cia402 import MODES, STATE_WORDS
+from drivers.samples import Channel
+from eds import Description
+from eds.datatypes import DATA_TYPES
+
+AXIS_OFFSET = 0x800  # between the objects of two axes in one node (CiA 402-2 §5)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One object that becomes one channel; `scale` is fixed where it is not the joint's own."""
+
+    name: str
+    index: int
+    subindex: int
+    unit: str
+    signed: bool
+    scale: float | None = None
+    enum: dict[int, str] | None = None
+    fast: bool = False  # a joint is not known without it
+
+
+STATE = "state"  # the channel that is made of the statusword
+POSITION, STATUSWORD = "position", "statusword"
+
+_STANDARD = (
+    Quantity(POSITION, 0x6064, 0, "rad", signed=True, fast=True),
+    Quantity("velocity", 0x606C, 0, "rad/s", signed=True),
+    Quantity("torque", 0x6077, 0, "N·m", signed=True),
+    Quantity("current", 0x6078, 0, "A", signed=True),
+    Quantity("following_error", 0x60F4, 0, "rad", signed=True),
+    Quantity(STATUSWORD, 0x6041, 0, "", signed=False, scale=1, fast=True),
+    Quantity("modes_display", 0x6061, 0, "", signed=True, scale=1, enum=MODES),
+    Quantity("error_code", 0x603F, 0, "", signed=False, scale=1),
+)
+
+# CiA 402 has no temperature: each vendor has its own object, °C per count. By vendor id and product code;
+# a product code of None stands for all of the vendor's drives.
+_TEMPERATURES: dict[tuple[int, int | None], tuple[int, int, float]] = {
+    (0x00FB, None): (0x3201, 1, 0.1),  # maxon EPOS4: temperature of the power stage
+    (0x0000, 0x4A44_0001): (0x2010, 0, 0.1),  # the simulated joint drive: temperature of the motor
+}
+
+REQUIRED = ((0x6041, "statusword"), (0x6064, "position actual value"))
+
+
+def quantities(description: Description, axis: int) -> tuple[Quantity, ...]:
+    """What this drive has of what a joint can tell; raises `EdsError` where it cannot be a joint."""
+    offset = axis * AXIS_OFFSET
+    description.require(
+        [(index + offset, name) for index, name in REQUIRED], "a joint" if axis == 0 else f"axis {axis}"
+    )
+    shifted = (_shift(quantity, offset) for quantity in (*_STANDARD, *_temperature(description)))
+    return tuple(
+        _as_described(quantity, description) for quantity in shifted if _described(quantity, description)
+    )
+
+
+def channels(component: str, found: tuple[Quantity, ...]) -> tuple[Channel, ...]:
+    """The channels of a joint: one a quantity, in their order, and its state last."""
+    return (
+        *(Channel(f"{component}.{q.name}", component, q.name, q.unit, q.enum) for q in found),
+        Channel(f"{component}.{STATE}", component, STATE, "", STATE_WORDS),
+    )
+
+
+def _temperature(description: Description) -> tuple[Quantity, ...]:
+    vendor, product = description.vendor_id or 0, description.product_code
+    known = _TEMPERATURES.get((vendor, product)) or _TEMPERATURES.get((vendor, None))
+    if known is None:
+        return ()
+    index, subindex, scale = known
+    return (Quantity("temperature", index, subindex, "°C", signed=True, scale=scale),)
+
+
+def _shift(quantity: Quantity, offset: int) -> Quantity:
+    in_profile = quantity.index >= 0x6000
+    return replace(quantity, index=quantity.index + offset) if in_profile else quantity
+
+
+def _described(quantity: Quantity, description: Description) -> bool:
+    return description.has(quantity.index, quantity.subindex)
+
+
+def _as_described(quantity: Quantity, description: Description) -> Quantity:
+    """The sign as the device's own data type has it, where that is an integer."""
+    variable = description.variable(quantity.index, quantity.subindex)
+    data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
+    if data_type is None or data_type.kind not in ("signed", "unsigned"):
+        return quantity
+    return replace(quantity, signed=data_type.kind == "signed")
