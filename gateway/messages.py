@@ -153,7 +153,8 @@ class DriveReaction(Struct, frozen=True):
     quick_stop_option: int | None = None  # 605Ah
     abort_connection_option: int | None = None  # 6007h
     armed: bool = False  # whether it stops by itself when the gateway dies
-    warning: str | None = None
+    quick_stop: str | None = None  # the first in words
+    abort_connection: str | None = None  # the second in words
 
 
 class StopInfo(Struct, frozen=True):
@@ -162,6 +163,7 @@ class StopInfo(Struct, frozen=True):
     held: bool
     reason: str | None
     since_ns: int | None
+    stopped_again: dict[str, int]  # drive → how often somebody enabled it while the stop was held
     drives: dict[str, DriveReaction]
 
 

@@ -111,6 +111,12 @@ def unknown_method(name: str) -> RpcError:
     return RpcError(f"there is no method {name!r}", ErrorData(Kind.UNKNOWN_NAME), METHOD_NOT_FOUND)
 
 
+def internal_error(method: str, error: Exception) -> RpcError:
+    """What a failure of our own is answered with (−32603)."""
+    message = f"{method} failed inside the gateway: {type(error).__name__}: {error}; its log says more"
+    return RpcError(message, ErrorData(Kind.UNAVAILABLE), INTERNAL_ERROR)
+
+
 class BadLine(RpcError):
     """A line that holds no request; `id` is what could still be read of it."""
 

@@ -1,0 +1,256 @@
+"""The robot's file: TOML to frozen structs, validated once; every error names file, table, key and remedy."""
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+from drivers.bus.settings import CanSettings, DeviceSettings, Role
+from drivers.imu.settings import ImuSettings
+from drivers.insole.settings import InsoleSettings
+from drivers.joint.cia402 import STATE_WORDS
+from drivers.joint.settings import JointSettings
+
+S = TypeVar("S", bound=Struct)
+Table = Mapping[str, Any]
+
+CONTROLWORD = 0x6040
+AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
+RESERVED_NAMES = ("resource", "status", "robot")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+class ConfigError(ValueError):
+    """The robot's file cannot be used; the message names file, table, key and what is allowed."""
+
+
+class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[robot]`."""
+
+    name: Annotated[str, Meta(min_length=1)]
+
+
+class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Meta(ge=0, le=65535)] = 7420
+    role: Role = Role.OBSERVER
+    linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
+
+
+class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[parameter."component.name"]`: one object of a CANopen device that may be changed, and how far.
+
+    value = device's number · scale, in `unit`. `max_step` limits one change. `live` allows changes while a
+    drive is enabled. `states` are the CiA 402 states that allow a change.
+    """
+
+    object: Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$")]
+    unit: str = ""
+    scale: float = 1.0
+    min: float | None = None
+    max: float | None = None
+    max_step: Annotated[float, Meta(gt=0)] | None = None
+    live: bool = False
+    states: tuple[str, ...] | None = None
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Index and subindex."""
+        index, _, subindex = self.object.partition(":")
+        return int(index, 16), int(subindex, 0)
+
+
+class RobotConfig(Struct, frozen=True, kw_only=True):
+    """A robot as its file describes it; each dictionary is by the components' names."""
+
+    path: Path
+    robot: RobotSettings
+    gateway: GatewaySettings = GatewaySettings()
+    can: dict[str, CanSettings] = {}
+    joint: dict[str, JointSettings] = {}
+    device: dict[str, DeviceSettings] = {}
+    insole: dict[str, InsoleSettings] = {}
+    imu: dict[str, ImuSettings] = {}
+    parameter: dict[str, ParameterSettings] = {}
+
+
+_SINGLE: Mapping[str, type[Struct]] = {"robot": RobotSettings, "gateway": GatewaySettings}
+_NAMED: Mapping[str, type[Struct]] = {
+    "can": CanSettings,
+    "joint": JointSettings,
+    "device": DeviceSettings,
+    "insole": InsoleSettings,
+    "imu": ImuSettings,
+    "parameter": ParameterSettings,
+}
+COMPONENT_TABLES = ("joint", "device", "insole", "imu")
+
+
+def load(path: Path) -> RobotConfig:
+    """Read and check the robot's file.
+
+    Raises:
+        ConfigError: it is not there, is no TOML, or says something that cannot work.
+
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}; name the robot's file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: is no TOML: {error}") from error
+    try:
+        config = _convert(path, document)
+        for complaint in _complaints(config):
+            raise ConfigError(complaint)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    return config
+
+
+def _convert(path: Path, document: Table) -> RobotConfig:
+    _check_keys("the file", document, allowed=[*_SINGLE, *_NAMED], required=["robot"])
+    parts: dict[str, Any] = {"path": path}
+    for table, kind in _SINGLE.items():
+        if table in document:
+            parts[table] = _struct(f"[{table}]", document[table], kind)
+    for table, kind in _NAMED.items():
+        entries = document.get(table, {})
+        if not isinstance(entries, dict):
+            raise ConfigError(f"[{table}] holds tables: write [{table}.NAME]")
+        parts[table] = {name: _struct(_header(table, name), entry, kind) for name, entry in entries.items()}
+    return RobotConfig(**parts)
+
+
+def _header(table: str, name: str) -> str:
+    return f'[{table}."{name}"]' if "." in name else f"[{table}.{name}]"
+
+
+def _struct(where: str, table: Any, kind: type[S]) -> S:
+    if not isinstance(table, dict):
+        raise ConfigError(f"{where} is a table, not {table!r}")
+    if kind is ParameterSettings and table and all(isinstance(entry, dict) for entry in table.values()):
+        component, name = where.removesuffix("]").rpartition(".")[2], next(iter(table))
+        raise ConfigError(f'{where}: a parameter\'s name is one key: write [parameter."{component}.{name}"]')
+    fields = msgspec.structs.fields(kind)
+    required = [field.encode_name for field in fields if field.required]
+    # Whatever else stands in [can.NAME] is for python-can.
+    allowed = None if kind is CanSettings else [field.encode_name for field in fields]
+    _check_keys(where, table, allowed, required)
+    try:
+        if issubclass(kind, CanSettings):
+            return kind.from_table(table)
+        return msgspec.convert(table, kind)
+    except msgspec.ValidationError as error:
+        what, _, at = str(error).partition(" - at ")
+        key = at.strip("`").removeprefix("$").removeprefix(".")
+        raise ConfigError(f"{where} {key}: {what[:1].lower()}{what[1:]}") from error
+
+
+def _check_keys(where: str, table: Table, allowed: list[str] | None, required: list[str]) -> None:
+    for key in table:
+        if allowed is not None and key not in allowed:
+            close = difflib.get_close_matches(key, allowed, n=1)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            raise ConfigError(f"{where} has an unknown key {key!r}: {hint}allowed are {', '.join(allowed)}")
+    missing = [key for key in required if key not in table]
+    if missing:
+        raise ConfigError(f"{where} lacks the key {', '.join(map(repr, missing))}")
+
+
+def _complaints(config: RobotConfig) -> Iterator[str]:
+    yield from _about_names(config)
+    yield from _about_nodes(config)
+    yield from _about_ports(config)
+    for name, parameter in config.parameter.items():
+        yield from _about_parameter(config, name, parameter)
+
+
+def _about_names(config: RobotConfig) -> Iterator[str]:
+    seen: dict[str, str] = {}
+    for table in COMPONENT_TABLES:
+        for name in getattr(config, table):
+            if not _NAME.fullmatch(name):
+                yield f"{_header(table, name)}: a name is a letter, then letters, digits, _ and -"
+            if name in RESERVED_NAMES:
+                yield f"[{table}.{name}]: the name {name!r} is taken by the gateway itself; choose another"
+            if name in seen:
+                yield f"[{table}.{name}]: the name {name!r} is that of [{seen[name]}.{name}] too"
+            seen[name] = table
+
+
+def _about_nodes(config: RobotConfig) -> Iterator[str]:
+    seen: dict[tuple[str, int, int | None], str] = {}
+    whole: dict[tuple[str, int], str] = {}  # who is on a node, whatever its axis
+    own = {
+        (name, bus.node_id): f"[can.{name}]" for name, bus in config.can.items() if bus.node_id is not None
+    }
+    for table, devices in (("joint", config.joint), ("device", config.device)):
+        for name, settings in devices.items():
+            where = f"[{table}.{name}]"
+            if settings.bus not in config.can:
+                known = ", ".join(config.can) or "none"
+                yield f"{where} bus: there is no bus {settings.bus!r}; [can.NAME] tables here: {known}"
+            node = (settings.bus, settings.node_id)
+            axis = settings.axis if isinstance(settings, JointSettings) else None
+            other = seen.get((*node, axis)) or own.get(node) or (whole.get(node) if axis is None else None)
+            if other:
+                yield f"{where} node_id: {settings.node_id} on bus {settings.bus!r} belongs to {other}"
+            seen[(*node, axis)] = where
+            whole[node] = where
+
+
+def _about_ports(config: RobotConfig) -> Iterator[str]:
+    insoles: dict[str, tuple[str, InsoleSettings]] = {}
+    taken: dict[str, str] = {}
+    for name, insole in config.insole.items():
+        where = f"[insole.{name}]"
+        other, same = insoles.setdefault(insole.port, (where, insole))
+        if (insole.baudrate, insole.format) != (same.baudrate, same.format):
+            yield f"{where} port: {insole.port!r} is shared with {other}: same baudrate and format, please"
+        taken[insole.port] = where
+    for name, imu in config.imu.items():
+        where = f"[imu.{name}]"
+        if imu.port in taken:
+            yield f"{where} port: {imu.port!r} is in use by {taken[imu.port]}; each sensor has its own port"
+        taken[imu.port] = where
+
+
+def _about_parameter(config: RobotConfig, name: str, parameter: ParameterSettings) -> Iterator[str]:
+    where = _header("parameter", name)
+    component, dot, quantity = name.partition(".")
+    if not (dot and quantity):
+        yield f'{where}: a parameter is called "component.name"'
+    if component not in config.joint and component not in config.device:
+        known = ", ".join([*config.joint, *config.device]) or "none"
+        yield f"{where}: there is no joint or device {component!r}; here are {known}"
+    index, subindex = parameter.address
+    if subindex > 0xFF:
+        yield f"{where} object: the subindex goes from 0 to 255"
+    if index in range(CONTROLWORD, 0xA000, AXIS_OFFSET):
+        yield f"{where} object: {parameter.object} is a controlword: it enables drives and is no parameter"
+    numbers = {
+        "scale": parameter.scale,
+        "min": parameter.min,
+        "max": parameter.max,
+        "max_step": parameter.max_step,
+    }
+    for key, number in numbers.items():
+        if number is not None and not math.isfinite(number):
+            yield f"{where} {key}: {number} is no finite number"
+    if parameter.scale == 0:
+        yield f"{where} scale: 0 would make every value 0"
+    if parameter.min is not None and parameter.max is not None and parameter.min > parameter.max:
+        yield f"{where} min: {parameter.min} is above max {parameter.max}"
+    for state in parameter.states or ():
+        if state not in STATE_WORDS.values():
+            known = ", ".join(STATE_WORDS.values())
+            yield f"{where} states: there is no drive state {state!r}; allowed are {known}"

@@ -1,0 +1,137 @@
+"""The daemon's one loop: sockets, timers, callbacks from other threads. Idle, it sleeps in one call."""
+
+import contextlib
+import heapq
+import itertools
+import logging
+import os
+import selectors
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+log = logging.getLogger(__name__)
+
+Callback = Callable[[], object]
+
+
+class Timer:
+    """A callback that runs once, unless cancelled before."""
+
+    __slots__ = ("callback",)
+
+    def __init__(self, callback: Callback) -> None:
+        self.callback: Callback | None = callback
+
+    def cancel(self) -> None:
+        self.callback = None
+
+
+class Loop:
+    """Waits in one system call for sockets, timers and callbacks from other threads.
+
+    Everything but `post` and `stop` belongs to the thread that runs the loop. A callback that raises is
+    logged and does not end the loop: one client's trouble is not another's.
+    """
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._ready: deque[Callback] = deque()
+        self._timers: list[tuple[int, int, Timer]] = []
+        self._order = itertools.count()
+        self._stopping = False
+        self._woken = False
+        self._thread: int | None = None
+        self._wake_reader, self.wake_writer = os.pipe()
+        os.set_blocking(self._wake_reader, False)
+        os.set_blocking(self.wake_writer, False)
+        self._selector.register(self._wake_reader, selectors.EVENT_READ, lambda _events: self._drain())
+
+    def watch(self, file: Any, events: int, callback: Callable[[int], object]) -> None:
+        """Call `callback(events)` when `file` is ready for one of `events`; no events ends it."""
+        if file not in self._selector.get_map():
+            if events:
+                self._selector.register(file, events, callback)
+        elif events:
+            self._selector.modify(file, events, callback)
+        else:
+            self._selector.unregister(file)
+
+    def post(self, callback: Callback) -> None:
+        """Run `callback` in the loop's next turn; may be called from any thread."""
+        self._ready.append(callback)
+        # The order matters: a loop that clears the flag after this append also sees the append.
+        if not self._woken and threading.get_ident() != self._thread:
+            self._wake()
+
+    def call(self, callback: Callback) -> None:
+        """Run `callback` in the loop: at once when this is its thread, else in its next turn."""
+        if threading.get_ident() == self._thread:
+            self._call(callback)
+        else:
+            self.post(callback)
+
+    def call_later(self, delay_s: float, callback: Callback) -> Timer:
+        """Run `callback` once after `delay_s`."""
+        timer = Timer(callback)
+        due_ns = time.monotonic_ns() + max(0, round(delay_s * 1e9))
+        heapq.heappush(self._timers, (due_ns, next(self._order), timer))
+        return timer
+
+    def stop(self) -> None:
+        """Let `run` return after its turn; may be called from any thread."""
+        self._stopping = True
+        self._wake()
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        self._thread = threading.get_ident()
+        while not self._stopping:
+            self._turn()
+
+    def close(self) -> None:
+        """Give the descriptors back."""
+        self._selector.close()
+        os.close(self._wake_reader)
+        os.close(self.wake_writer)
+
+    def _turn(self) -> None:
+        for key, events in self._selector.select(self._patience_s()):
+            self._call(lambda key=key, events=events: key.data(events))  # type: ignore[misc]
+        now_ns = time.monotonic_ns()
+        while self._timers and self._timers[0][0] <= now_ns:
+            callback = heapq.heappop(self._timers)[2].callback
+            if callback is not None:
+                self._call(callback)
+        # Only what is there now: what these callbacks post waits until the sockets were looked at again.
+        for _ in range(len(self._ready)):
+            self._call(self._ready.popleft())
+
+    def _patience_s(self) -> float | None:
+        if self._ready:
+            return 0.0
+        while self._timers and self._timers[0][2].callback is None:
+            heapq.heappop(self._timers)
+        if not self._timers:
+            return None
+        return max(0, self._timers[0][0] - time.monotonic_ns()) / 1e9
+
+    def _wake(self) -> None:
+        self._woken = True
+        with contextlib.suppress(BlockingIOError):  # full of wake-ups already
+            os.write(self.wake_writer, b"\0")
+
+    def _drain(self) -> None:
+        self._woken = False
+        with contextlib.suppress(BlockingIOError):
+            while os.read(self._wake_reader, 4096):
+                pass
+
+    @staticmethod
+    def _call(callback: Callback) -> None:
+        try:
+            callback()
+        except Exception:  # the loop outlives every callback's error
+            log.exception("a callback of the gateway failed")

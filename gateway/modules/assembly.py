@@ -1,0 +1,92 @@
+"""Builds a robot's buses and components from its file; what cannot be built is named and left out."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+import eds
+from drivers.bus.bus import CanBus
+from drivers.bus.device import CanDevice
+from drivers.component import Component, Kind
+from drivers.errors import DriverError
+from drivers.imu.device import Imu
+from drivers.insole.device import Insole, line_for
+from drivers.insole.settings import InsoleSettings
+from drivers.joint.drive import JointDrive
+from gateway.config import RobotConfig
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Robot:
+    """What could be built, and why the rest could not."""
+
+    buses: dict[str, CanBus] = field(default_factory=dict)
+    components: dict[str, Component] = field(default_factory=dict)
+    descriptions: dict[str, eds.Description] = field(default_factory=dict)
+    absent: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # component → kind, why it is not there
+
+
+def assemble(config: RobotConfig) -> Robot:
+    """Build everything that the file names; nothing is opened yet."""
+    robot = Robot()
+    for name, settings in config.can.items():
+        robot.buses[name] = CanBus(name, settings, config.gateway.role)
+    for kind, devices in ((Kind.JOINT, config.joint), (Kind.DEVICE, config.device)):
+        for name, device in devices.items():
+            _add(robot, kind, name, _can_component(robot, config.path, kind, name, device))
+    lines: dict[str, Any] = {}
+    for name, insole in config.insole.items():
+        _add(robot, Kind.INSOLE, name, _insole(config.path, name, insole, lines))
+    for name, imu in config.imu.items():
+        _add(robot, Kind.IMU, name, lambda name=name, imu=imu: Imu(name, imu))  # type: ignore[misc]
+    return robot
+
+
+def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) -> None:
+    try:
+        robot.components[name] = build()
+    except (DriverError, eds.EdsError, OSError) as error:
+        robot.absent[name] = (kind, str(error))
+    except Exception as error:  # noqa: BLE001 - one device's fault must not take the others with it
+        robot.absent[name] = (kind, f"internal error, {type(error).__name__}: {error}; report it")
+
+
+def _can_component(robot: Robot, path: Path, kind: Kind, name: str, settings: Any) -> Callable[[], Component]:
+    def build() -> Component:
+        description = eds.load(eds.locate(settings.eds, path), settings.node_id)
+        robot.descriptions[name] = description
+        make = JointDrive if kind is Kind.JOINT else CanDevice
+        return make(name, settings, robot.buses[settings.bus], description)
+
+    return build
+
+
+def _insole(
+    path: Path, name: str, settings: InsoleSettings, lines: dict[str, Any]
+) -> Callable[[], Component]:
+    def build() -> Component:
+        layout = settings.layout
+        beside = str(path.parent / layout) if layout.endswith(".toml") else layout
+        if settings.port not in lines:
+            lines[settings.port] = line_for(settings)
+        return Insole(name, msgspec.structs.replace(settings, layout=beside), lines[settings.port])
+
+    return build
+
+
+def facts(description: eds.Description) -> Mapping[str, str | int]:
+    """What `robot.describe` tells of a device's EDS."""
+    found: dict[str, str | int] = {
+        "eds": description.path.name,
+        "vendor": description.vendor,
+        "product": description.product,
+    }
+    warnings = [f"{one.where}: {one.text}" for one in description.findings if one.severity == "warning"]
+    if warnings:
+        found["warnings"] = "; ".join(warnings)
+    return found

@@ -1,0 +1,104 @@
+"""The control module: who may write, what is written, and the stop."""
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
+from gateway import messages
+from gateway.futures import then
+from gateway.modules.lease import Leases
+from gateway.modules.stop import Drive, Stop
+from gateway.modules.tuning import Tuning
+from gateway.wire import Kind, refuse
+
+if TYPE_CHECKING:
+    from gateway.modules.component import ComponentModule
+    from gateway.registry import Context
+    from gateway.session import Answer, Session
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The part of `robot.describe` that comes from the component and control modules."""
+
+    components: list[messages.ComponentInfo]
+    channels: list[messages.ChannelInfo]
+    parameters: list[messages.ParameterInfo]
+    stop: messages.StopInfo
+
+
+class ControlModule:
+    """Everything that changes something on the robot."""
+
+    def __init__(self, context: "Context") -> None:
+        self._context = context
+        self._component = cast("ComponentModule", context.needs["component"])
+        self._leases = Leases()
+        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
+            "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
+            "control.release": self._release,
+            "parameter.list": lambda _session, params: self._tuning.listed(params.names),
+            "parameter.read": lambda _session, params: self._tuning.read(params.names),
+            "parameter.write": self._write,
+            "robot.stop": self._stop_robot,
+        }
+
+    def start(self) -> None:
+        joints = self._context.config.joint
+        drives = {
+            name: cast("Drive", one)
+            for name, one in self._component.robot.components.items()
+            if name in joints
+        }
+        absent = {name: why for name, why in self._component.absent.items() if name in joints}
+        self._drives = drives
+        self._tuning = Tuning(self._context.config, self._component)
+        self._stop = Stop(self._context.loop, drives, absent)
+
+    def stop(self) -> None:
+        self._stop.close()
+        self._tuning.close()
+
+    def describe(self) -> "Future[Described]":
+        """Waits for a cold start, so that it says what is there."""
+        ready = self._component.when_ready(self._component.robot.components)
+        return then(ready, lambda _none: self._described())
+
+    def _described(self) -> Described:
+        stop = messages.StopInfo(
+            held=self._stop.held,
+            reason=self._stop.reason,
+            since_ns=self._stop.since_ns,
+            stopped_again=self._stop.again,
+            drives={name: reaction(drive) for name, drive in self._drives.items()},
+        )
+        return Described(self._component.components(), self._component.channels(), self._tuning.infos(), stop)
+
+    def _release(self, session: "Session", params: messages.ReleaseParams) -> messages.Done:
+        self._leases.release(session, params.lease)
+        return messages.Done()
+
+    def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Answer":
+        if params.trial_s is not None:
+            raise refuse(Kind.BAD_PARAMS, "trials are not available yet; write without trial_s")
+        self._leases.require(session)
+        return self._tuning.write(params.changes)
+
+    def _stop_robot(self, _session: "Session", params: messages.StopParams) -> "Future[messages.Stopped]":
+        self._context.keep(True)  # a held stop keeps the bus, clients or not
+        self._tuning.interrupt()
+        return self._stop.stop(str(params.reason), lambda name: self._component.when_ready([name]))
+
+
+def reaction(drive: Drive) -> messages.DriveReaction:
+    """What a drive does by itself, as it said when it came up."""
+    options = {} if drive.reading is None else drive.reading.options
+    quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
+    return messages.DriveReaction(
+        quick_stop_option=quick_stop,
+        abort_connection_option=abort_connection,
+        quick_stop=option_text(QUICK_STOP_OPTIONS, quick_stop),
+        abort_connection=option_text(ABORT_CONNECTION_OPTIONS, abort_connection),
+    )

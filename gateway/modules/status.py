@@ -1,0 +1,68 @@
+"""The status module: the merged, minimal set that status prediction needs, from resource and component."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+from gateway.futures import then
+from gateway.messages import Params, ResourceSnapshotParams, Snapshot
+from gateway.modules.resource import RESOURCE_CHANNELS, ResourceModule, columns
+from gateway.sources import Selection, narrow
+
+if TYPE_CHECKING:
+    from gateway.modules.component import ComponentModule
+    from gateway.registry import Context
+    from gateway.session import Answer, Session
+
+# What the prediction's features are made from; everything else stays on the robot.
+COMPONENT_GLOBS = (
+    "*.position",
+    "*.velocity",
+    "*.force",
+    "*.cop_x",
+    "*.cop_y",
+    "*.tilt_forward",
+    "*.tilt_side",
+    "*.angular_velocity_?",
+)
+RESOURCE_GLOBS = ("resource.cpu_percent", "resource.memory_percent")
+
+
+class StatusModule:
+    """A choice of the other two modules' channels."""
+
+    def __init__(self, context: "Context") -> None:
+        self._component = cast("ComponentModule", context.needs["component"])
+        self._resource = cast("ResourceModule", context.needs["resource"])
+        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"status.snapshot": self._snapshot}
+
+    def start(self) -> None:
+        """Nothing of its own runs."""
+
+    def stop(self) -> None:
+        """Nothing of its own runs."""
+
+    @property
+    def absent(self) -> Mapping[str, str]:
+        return self._component.absent
+
+    def selections(self) -> list[Selection]:
+        return [*self._components(), *narrow(self._resource.selections(), RESOURCE_GLOBS)]
+
+    def _components(self) -> list[Selection]:
+        return narrow(self._component.selections(), COMPONENT_GLOBS)
+
+    def _snapshot(self, session: "Session", _params: Params) -> "Answer":
+        chosen = self._components()
+        ready = self._component.when_ready(one.source.name for one in chosen)
+        return then(ready, lambda _none: self._answer(session, chosen))
+
+    def _answer(self, session: "Session", chosen: list[Selection]) -> Snapshot:
+        snapshot = self._component.read(chosen)
+        for name in self._component.absent:
+            snapshot.quality[name] = self._component.quality(name, snapshot.stamp_ns)
+        host = self._resource.measure(session, "status.snapshot", ResourceSnapshotParams(processes=False))
+        for channel, value in zip(RESOURCE_CHANNELS, columns(host), strict=True):
+            if channel.name in RESOURCE_GLOBS:
+                snapshot.values[channel.name] = value
+                snapshot.stamps_ns[channel.name] = host.stamp_ns
+        return snapshot

@@ -1,0 +1,207 @@
+"""Parameters as clients see them: listed, read from the device, and written all or nothing.
+
+Writes run one after another in a thread of their own. A stop does not wait for them: it interrupts them.
+"""
+
+import itertools
+import threading
+import time
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from drivers.bus.values import unsigned
+from drivers.errors import DriverError
+from drivers.joint.cia402 import STATE_WORDS, DriveState, drive_state
+from drivers.joint.quantities import AXIS_OFFSET
+from drivers.joint.quick_stop import STATUSWORD
+from drivers.samples import State
+from gateway.config import RobotConfig
+from gateway.futures import failed, gather, then
+from gateway.messages import ParameterInfo, ParameterValue, ParameterValues, Written
+from gateway.modules.component import ComponentModule
+from gateway.modules.parameters import Parameter, resolve
+from gateway.modules.transaction import ANSWER_S, Change, Node, Outcome, Transaction, device_error
+from gateway.sources import check_globs, matches
+from gateway.wire import Kind, RpcError, refuse
+
+# States in which a drive may move; a parameter that is not live needs another one.
+ENERGISED = frozenset(
+    {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE}
+)
+
+
+class Tuning:
+    """Every parameter of the robot. It belongs to the loop's thread, but for `_check`."""
+
+    def __init__(self, config: RobotConfig, component: ComponentModule) -> None:
+        self._component = component
+        self._joints = config.joint
+        self._parameters = resolve(config.parameter, component.robot.descriptions, component.absent)
+        self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
+        self._numbers = itertools.count(time.time_ns() // 1_000_000)  # unique also after a restart
+        self._interrupted = threading.Event()
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="write")
+
+    def close(self) -> None:
+        """Take back what is being written, and end the writer's thread."""
+        self.interrupt()
+        self._writer.shutdown(wait=True)
+
+    def interrupt(self) -> None:
+        """End every write that was asked for until now; what it had changed is taken back."""
+        self._interrupted.set()
+        self._interrupted = threading.Event()
+
+    def infos(self) -> list[ParameterInfo]:
+        return [one.info for one in self._parameters.values()]
+
+    def listed(self, names: list[str] | None) -> ParameterValues:
+        """What is known without asking: the last value read, as long as its device is there."""
+        return ParameterValues({one.name: self._last(one) for one in self._chosen(names)})
+
+    def read(self, names: list[str] | None) -> "Future[ParameterValues]":
+        """What the devices hold now; where one does not tell, `problem` says why."""
+        chosen = self._chosen(names)
+        ready = self._component.when_ready({one.component for one in chosen})
+        uploads = then(ready, lambda _none: gather({one.name: self._upload(one) for one in chosen}))
+        return then(uploads, self._values)
+
+    def write(self, values: Mapping[str, float]) -> "Future[Written]":
+        """All of them or none.
+
+        Raises:
+            RpcError: at once, or as the future's error: why not, and what became of each.
+
+        """
+        changes = [self._change(name, value) for name, value in values.items()]
+        ready = self._component.when_ready({one.parameter.component for one in changes})
+        interrupted = self._interrupted
+        return then(ready, lambda _none: self._begin(changes, interrupted))
+
+    # Reading
+
+    def _chosen(self, names: list[str] | None) -> list[Parameter]:
+        check_globs("parameter", self._parameters, names)
+        return [one for name, one in self._parameters.items() if matches(name, names)]
+
+    def _problem(self, parameter: Parameter) -> str | None:
+        """Why the device cannot be asked at all."""
+        if parameter.problem is not None:
+            return parameter.problem
+        quality = self._component.quality(parameter.component, time.monotonic_ns())
+        if quality["state"] != State.LOST:
+            return None
+        return f"{parameter.component} is not there: {quality['problem'] or 'it is silent'}"
+
+    def _last(self, parameter: Parameter) -> ParameterValue:
+        problem = self._problem(parameter)
+        stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
+        return _value(parameter, value, stamp_ns, problem)
+
+    def _upload(self, parameter: Parameter) -> "Future[bytes]":
+        problem = self._problem(parameter)
+        if problem is not None:
+            return failed(parameter.refusal(Kind.UNAVAILABLE, problem))
+        try:
+            parameter.check_readable()
+            return self._node(parameter).upload(parameter.index, parameter.subindex)
+        except RpcError as error:
+            return failed(error)
+
+    def _values(self, found: Mapping[str, bytes | Exception]) -> ParameterValues:
+        return ParameterValues(
+            {name: self._found(self._parameters[name], one) for name, one in found.items()}
+        )
+
+    def _found(self, parameter: Parameter, found: bytes | Exception) -> ParameterValue:
+        stamp_ns = time.monotonic_ns()
+        try:
+            if isinstance(found, Exception):
+                raise found
+            value = parameter.decode(found)
+        except (DriverError, TimeoutError) as error:
+            return _value(parameter, None, None, str(device_error(parameter, "reading", error)))
+        except RpcError as error:
+            return _value(parameter, None, None, str(error))
+        self._known[parameter.name] = (stamp_ns, value)
+        return _value(parameter, value, stamp_ns)
+
+    def _node(self, parameter: Parameter) -> Node:
+        component: Any = self._component.robot.components.get(parameter.component)
+        if component is None:
+            raise parameter.refusal(Kind.UNAVAILABLE, parameter.problem or "its device is not there")
+        node: Node = component.node
+        return node
+
+    # Writing
+
+    def _change(self, name: str, value: float) -> Change:
+        parameter = self._parameters.get(name)
+        if parameter is None:
+            raise refuse(Kind.UNKNOWN_NAME, f"there is no parameter {name!r}; parameter.list has them all")
+        return Change(parameter, self._node(parameter), parameter.encode(value))
+
+    def _begin(self, changes: list[Change], interrupted: threading.Event) -> "Future[Written]":
+        transaction = Transaction(changes, self._check, interrupted)
+        for change in changes:
+            self._known.pop(change.parameter.name, None)
+        return then(self._writer.submit(transaction.run), self._written)
+
+    def _written(self, done: Outcome) -> Written:
+        now_ns = time.monotonic_ns()
+        self._known.update({name: (now_ns, value) for name, value in done.after.items()})
+        return Written(next(self._numbers), done.before, done.after)
+
+    def _check(self, change: Change, current: float) -> None:
+        """In the writer's thread: the step, and the states of the drives that the parameter may move."""
+        parameter = change.parameter
+        step, most = abs(parameter.decode(change.data) - current), parameter.settings.max_step
+        if most is not None and step > most * (1 + 1e-9):  # a step of exactly the limit, in binary
+            unit = parameter.settings.unit
+            text = f"from {current:g} {unit} it may change by {most:g} {unit} at once, not by {step:g}"
+            raise parameter.refusal(Kind.OUT_OF_LIMIT, text, most)
+        allowed = allowed_states(parameter)
+        if allowed is not None:
+            for drive in self._drives_of(parameter):
+                self._check_state(parameter, drive, allowed)
+
+    def _check_state(self, parameter: Parameter, drive: str, allowed: frozenset[DriveState]) -> None:
+        state, why = self._state(drive)
+        if state in allowed:
+            return
+        said = f"unknown: {why}" if state is None else STATE_WORDS[state]
+        wanted = ", ".join(sorted(STATE_WORDS[one] for one in allowed))
+        text = f"the state of {drive} is {said}; this parameter may be written in: {wanted}"
+        raise parameter.refusal(Kind.WRONG_STATE, text)
+
+    def _state(self, drive: str) -> tuple[DriveState | None, str]:
+        """The drive's state as it says now; or why that is not known."""
+        component: Any = self._component.robot.components.get(drive)
+        if component is None:
+            return None, self._component.absent.get(drive, "it is not there")
+        index = STATUSWORD + AXIS_OFFSET * self._joints[drive].axis
+        try:
+            statusword = unsigned(component.node.upload(index, 0).result(ANSWER_S))
+        except (DriverError, TimeoutError) as error:
+            return None, str(error)
+        return drive_state(statusword), f"its statusword is 0x{statusword:04X}"
+
+    def _drives_of(self, parameter: Parameter) -> Iterable[str]:
+        """A joint's parameter concerns its own drive; another device's may move them all."""
+        return (parameter.component,) if parameter.component in self._joints else tuple(self._joints)
+
+
+def allowed_states(parameter: Parameter) -> frozenset[DriveState] | None:
+    """The drive states in which a parameter may be written; `None` where the state does not matter."""
+    settings = parameter.settings
+    if settings.states is None:
+        return None if settings.live else frozenset(DriveState) - ENERGISED
+    named = frozenset(state for state in DriveState if STATE_WORDS[state] in settings.states)
+    return named if settings.live else named - ENERGISED
+
+
+def _value(
+    parameter: Parameter, value: float | None, stamp_ns: int | None, problem: str | None = None
+) -> ParameterValue:
+    return ParameterValue(value, parameter.settings.unit, parameter.min, parameter.max, stamp_ns, problem)

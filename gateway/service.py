@@ -1,0 +1,141 @@
+"""What the gateway answers: parameters are checked, the method's module is started, its answer given."""
+
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+from gateway import messages, wire
+from gateway.config import RobotConfig
+from gateway.futures import gather, then
+from gateway.loop import Loop
+from gateway.modules.resource import RESOURCE_CHANNELS
+from gateway.registry import MODULES, Module, Registry, Spec
+from gateway.session import Answer, Session
+from gateway.sources import channel_info, check_globs, merge, narrow
+from gateway.streams import Streams
+
+CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are configured
+
+# Which module answers what; the rest is the service's own.
+MODULE_OF: Mapping[str, str] = {
+    "resource.snapshot": "resource",
+    "component.snapshot": "component",
+    "status.snapshot": "status",
+    "robot.stop": "control",
+    "control.acquire": "control",
+    "control.release": "control",
+    "parameter.list": "control",
+    "parameter.read": "control",
+    "parameter.write": "control",
+}
+
+
+class Service:
+    """The methods of one robot's gateway."""
+
+    def __init__(self, config: RobotConfig, loop: Loop, specs: Mapping[str, Spec] = MODULES) -> None:
+        self.registry = Registry(config, loop, specs)
+        self.streams = Streams(loop)
+        self._config = config
+        self._boot_id = boot_id()
+        self._own: Mapping[str, Callable[[Session, Any], Answer]] = {
+            "hello": self._hello,
+            "clock.read": lambda _session, _params: self._clock(),
+            "robot.describe": self._describe,
+            "stream.start": self._stream_start,
+            "stream.stop": self._stream_stop,
+        }
+
+    def opened(self, session: Session) -> None:
+        """A client has come."""
+        session.on_close(lambda: self.registry.leave(session))
+
+    def handle(self, session: Session, request: wire.Request) -> Answer:
+        """The answer to one request, now or later.
+
+        Raises:
+            RpcError: the method or its parameters cannot be served.
+
+        """
+        method = messages.METHODS.get(request.method)
+        if method is None:
+            raise wire.unknown_method(request.method)
+        params = wire.decode_params(request.params, method.params)
+        own = self._own.get(request.method)
+        if own is not None:
+            return own(session, params)
+        module = self._use(MODULE_OF[request.method], session)
+        return then(module, lambda running: running.handlers[request.method](session, params))
+
+    def _use(self, name: str, session: Session) -> "Future[Module]":
+        # What a client asked for just before it vanished is still done (a stop above all).
+        return self.registry.use(name, None if session.closed else session)
+
+    def _hello(self, _session: Session, params: messages.HelloParams) -> messages.Hello:
+        if params.protocol != wire.PROTOCOL:
+            raise wire.refuse(
+                wire.Kind.BAD_PARAMS, f"this gateway speaks protocol {wire.PROTOCOL}, not {params.protocol}"
+            )
+        return messages.Hello(wire.PROTOCOL, self._config.robot.name, CLIENT_ROLE, self._boot_id)
+
+    def _clock(self) -> messages.Clock:
+        return messages.Clock(time.monotonic_ns(), time.time_ns(), self._boot_id)
+
+    def _describe(self, session: Session, _params: messages.Params) -> Answer:
+        def describe(control: Any) -> Answer:
+            return then(control.describe(), self._description)
+
+        return then(self._use("control", session), describe)
+
+    def _description(self, robot: Any) -> messages.Description:
+        return messages.Description(
+            robot=self._config.robot.name,
+            boot_id=self._boot_id,
+            role=self._config.gateway.role.value,
+            components=robot.components,
+            channels=[*robot.channels, *map(channel_info, RESOURCE_CHANNELS)],
+            parameters=robot.parameters,
+            modules=self.registry.phases,
+            clock=self._clock(),
+            stop=robot.stop,
+            guard=messages.GuardInfo(),
+        )
+
+    def _stream_start(self, session: Session, params: messages.StreamStartParams) -> Answer:
+        modules = {name: self._use(name, session) for name in params.modules}
+
+        def start(running: Mapping[str, Any]) -> messages.StreamStarted:
+            for module in running.values():
+                if isinstance(module, Exception):
+                    raise module
+            everything = merge(one for module in running.values() for one in module.selections())
+            absent = {name: why for module in running.values() for name, why in module.absent.items()}
+            names = [name for one in everything for name in one.names]
+            check_globs("channel", names, params.channels, absent)
+            chosen = narrow(everything, params.channels)
+            if session.closed:
+                raise wire.refuse(wire.Kind.UNAVAILABLE, "the connection has ended")
+            if not chosen:
+                raise wire.refuse(wire.Kind.UNAVAILABLE, "there is no channel to stream; see robot.describe")
+            return messages.StreamStarted(self.streams.start(session, chosen, params.rate_hz))
+
+        return then(gather(modules), start)
+
+    def _stream_stop(self, session: Session, params: messages.StreamStopParams) -> messages.Done:
+        if not self.streams.stop(session, params.stream):
+            raise wire.refuse(
+                wire.Kind.UNKNOWN_NAME,
+                f"this connection has no stream {params.stream}; it may have ended before",
+            )
+        return messages.Done()
+
+
+def boot_id() -> str:
+    """What changes whenever the monotonic clock begins anew: the kernel's boot, else this process."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    except OSError:
+        return str(uuid.uuid4())
