@@ -59,6 +59,7 @@ class FrameScanner(Generic[F]):
     def __init__(self) -> None:
         self.counters = Counters()
         self._buffer = bytearray()
+        self.frame_end = 0  # where the last valid frame ended; a stream's start counts as one
         self._begin = 0  # everything before it is dealt with
         self._searched = 0  # everything before it is searched for beginnings
         self._candidates: list[int] = []
@@ -74,7 +75,7 @@ class FrameScanner(Generic[F]):
                 self._candidates.remove(start)
                 continue
             self._drop_until(start)
-            self._begin = self._searched = end
+            self._begin = self._searched = self.frame_end = end
             self._candidates.clear()
             self.counters.frames += 1
             frames.append(frame)
@@ -86,7 +87,7 @@ class FrameScanner(Generic[F]):
         self._drop_until(len(self._buffer))
         self._buffer.clear()
         self._candidates.clear()
-        self._begin = self._searched = 0
+        self._begin = self._searched = self.frame_end = 0
         return []
 
     def _length(self, buffer: bytearray, start: int) -> int:
@@ -145,6 +146,7 @@ class FrameScanner(Generic[F]):
         del self._buffer[:keep]
         self._candidates = [start - keep for start in self._candidates]
         self._searched -= keep
+        self.frame_end -= keep
         self._begin = 0
 
 

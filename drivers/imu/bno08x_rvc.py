@@ -10,12 +10,14 @@ Its roll turns about y and its pitch about x, as phones have it.
 import math
 import struct
 
+from drivers.clock import ClockSpec
 from drivers.imu import rotation
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion
 from drivers.parsing import FrameScanner, Sequence
 
 LENGTH = 19
+CLOCK = ClockSpec(100, 256)  # the index of a frame, at its fixed rate
 CENTIDEGREE = math.radians(0.01)
 MILLI_G = 9.80665e-3
 
@@ -50,5 +52,6 @@ class Bno08xRvcParser(FrameScanner[ImuFrame]):
             acceleration=(x * MILLI_G, y * MILLI_G, z * MILLI_G),
             roll_pitch_yaw=(roll * CENTIDEGREE, pitch * CENTIDEGREE, yaw * CENTIDEGREE),
             sequence=index,
+            ticks=index,
             late=self._sequence.is_late(index),
         )

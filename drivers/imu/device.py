@@ -1,10 +1,14 @@
 """A trunk IMU on a serial port."""
 
+from pathlib import Path
+
 from drivers.component import Kind
 from drivers.freshness import Freshness
+from drivers.imu import zero
 from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import TrunkMotion, channels
+from drivers.imu.rotation import IDENTITY, Quaternion
 from drivers.imu.settings import ImuSettings
 from drivers.latest import Latest
 from drivers.line import Line
@@ -19,31 +23,47 @@ class Imu:
     at rest), `angular_velocity_x|y|z` (rad/s), `orientation_w|x|y|z` (trunk to a world whose z points up),
     `temperature` (°C). What the device does not send stays null.
 
+    `beside` is the folder that a file named in the settings is looked for in.
+
     Raises:
-        SettingsError: the configured axes are no right-handed frame.
+        SettingsError: the configured axes are no right-handed frame, or the zero's file is wrong.
 
     """
 
     kind = Kind.IMU
 
-    def __init__(self, name: str, settings: ImuSettings) -> None:
+    def __init__(self, name: str, settings: ImuSettings, beside: Path | None = None) -> None:
         self.name = name
         self.settings = settings
         self.channels = channels(name)
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         imu_format = FORMATS[settings.format]
         self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.make_parser)
-        self._motion = TrunkMotion(name, settings, imu_format)
+        self._clock_spec = imu_format.clock
+        self._clock = imu_format.clock.make() if imu_format.clock else None
+        stored = IDENTITY if settings.zero is None else zero.load((beside or Path()) / settings.zero)
+        self._motion = TrunkMotion(name, settings, imu_format, stored)
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
 
     def start(self) -> None:
         self._freshness.reset()
-        self.latest.clear()
+        self.disconnected()
         self.line.start(self)
 
     def stop(self) -> None:
         self.line.stop(self)
         self.disconnected()
+
+    def zero_now(self) -> Quaternion:
+        """Count tilt from the present posture (not stored; `zero.text` makes the file).
+
+        Raises:
+            NotUpright: there is no attitude, the trunk moves, or it is far from upright.
+
+        """
+        measured = zero.measure(list(self._motion.recent_ups))
+        self._motion.set_zero(measured)
+        return measured
 
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
@@ -54,13 +74,21 @@ class Imu:
 
     def received(self, frame: ImuFrame, stamp_ns: int) -> None:
         """A frame of the line; called in the port's thread."""
-        indices, values = self._motion.values(frame)
-        if frame.late or not indices:
+        if frame.late:
             return
-        self._freshness.seen(stamp_ns)
-        self.latest.update(stamp_ns, indices, values)
+        if self._clock is not None and frame.ticks is not None:
+            taken_ns = self._clock.stamp(frame.ticks, stamp_ns)
+            if taken_ns is None:
+                return
+            stamp_ns = taken_ns
+        indices, values = self._motion.values(frame, stamp_ns)
+        if indices:
+            self._freshness.seen(stamp_ns)
+            self.latest.update(stamp_ns, indices, values)
 
     def disconnected(self) -> None:
         """The port went away: nothing that it said before is true any more."""
         self.latest.clear()
         self._freshness.disconnected()
+        self._motion.restart()
+        self._clock = self._clock_spec.make() if self._clock_spec else None

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.imu import bno08x_rvc, rotation
+from drivers.clock import ClockSpec
+from drivers.imu import bno08x_rvc, rotation, vectornav, xsens
 from drivers.imu.bno08x_rvc import Bno08xRvcParser
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion
@@ -23,13 +24,14 @@ class ImuFormat:
     """
 
     make_parser: Callable[[], Parser[ImuFrame]]
+    clock: ClockSpec | None = None  # of the frames' ticks
     axes: tuple[Axis, Axis, Axis] = ("x", "y", "z")
     angles: Callable[[float, float, float], Quaternion] = rotation.from_yaw_pitch_roll
 
 
 FORMATS: dict[str, ImuFormat] = {
     "witmotion": ImuFormat(WitmotionParser),
-    "bno08x-rvc": ImuFormat(Bno08xRvcParser, angles=bno08x_rvc.from_angles),
-    "xsens": ImuFormat(XsensParser),
-    "vectornav": ImuFormat(VectornavParser, axes=("x", "-y", "-z")),
+    "bno08x-rvc": ImuFormat(Bno08xRvcParser, bno08x_rvc.CLOCK, angles=bno08x_rvc.from_angles),
+    "xsens": ImuFormat(XsensParser, xsens.CLOCK),
+    "vectornav": ImuFormat(VectornavParser, vectornav.CLOCK, axes=("x", "-y", "-z")),
 }

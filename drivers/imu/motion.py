@@ -1,9 +1,11 @@
 """From an IMU's frames to what the trunk does: the sensor's axes become the trunk's, angles become tilt."""
 
 import math
+from collections import deque
 
 from drivers.errors import SettingsError
 from drivers.imu import rotation
+from drivers.imu.attitude import ComplementaryFilter
 from drivers.imu.formats import ImuFormat
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion, Vector
@@ -34,6 +36,9 @@ TEMPERATURE = (_INDEX["temperature"],)
 
 NWU_FROM_NED: Quaternion = (0.0, 1.0, 0.0, 0.0)  # north-east-down to north-west-up: half a turn about x
 
+RAW_AFTER_NS = 500_000_000
+ZERO_FRAMES = 200  # about a second of the fastest device
+
 Values = tuple[tuple[int, ...], tuple[float | None, ...]]
 
 
@@ -62,17 +67,35 @@ class TrunkMotion:
 
     """
 
-    def __init__(self, name: str, settings: ImuSettings, imu_format: ImuFormat) -> None:
-        self._format = imu_format
+    def __init__(
+        self, name: str, settings: ImuSettings, imu_format: ImuFormat, zero: Quaternion = rotation.IDENTITY
+    ) -> None:
+        self._angles = imu_format.angles
+        self._attitude = settings.attitude
         try:
             axes = rotation.from_axes(settings.axes or imu_format.axes)
         except ValueError as error:
             raise SettingsError(f"[imu.{name}]: {error}") from error
-        trunk_from_sensor = rotation.multiply(rotation.from_yaw_pitch_roll(*settings.mounting), axes)
-        self._turn = rotation.matrix(trunk_from_sensor)
-        self._sensor_from_trunk = rotation.conjugate(trunk_from_sensor)
+        self._mounted_from_sensor = rotation.multiply(rotation.from_yaw_pitch_roll(*settings.mounting), axes)
+        self._filter = ComplementaryFilter()
+        self.recent_ups: deque[Vector] = deque(maxlen=ZERO_FRAMES)  # in trunk axes as mounted, for a zero
+        self.set_zero(zero)
+        self.restart()
 
-    def values(self, frame: ImuFrame) -> Values:
+    def set_zero(self, zero: Quaternion) -> None:
+        """Count tilt from the posture that `zero` was taken in."""
+        self._trunk_from_sensor = rotation.multiply(zero, self._mounted_from_sensor)
+        self._turn = rotation.matrix(self._trunk_from_sensor)
+        self._sensor_from_trunk = rotation.conjugate(self._trunk_from_sensor)
+
+    def restart(self) -> None:
+        """The stream begins anew."""
+        self._filter.restart()
+        self.recent_ups.clear()
+        self._device_attitude_ns: int | None = None
+        self._began_ns: int | None = None
+
+    def values(self, frame: ImuFrame, stamp_ns: int) -> Values:
         """Channel indices and values that `frame` gives."""
         indices: list[int] = []
         values: list[float | None] = []
@@ -83,8 +106,12 @@ class TrunkMotion:
             if vector is not None:
                 indices += where
                 values += rotation.transform(self._turn, vector)
-        orientation = self._orientation(frame)
-        if orientation is not None:
+        sensor = self._world_from_sensor(frame, stamp_ns)
+        if sensor is not None:
+            self.recent_ups.append(
+                rotation.matrix(rotation.multiply(sensor, rotation.conjugate(self._mounted_from_sensor)))[2]
+            )
+            orientation = rotation.multiply(sensor, self._sensor_from_trunk)
             indices += (*TILT, *ORIENTATION)
             # The last row of world_from_trunk is the world's up in the trunk's axes.
             values += (*tilt(rotation.matrix(orientation)[2]), *orientation)
@@ -93,15 +120,29 @@ class TrunkMotion:
             values.append(frame.temperature)
         return tuple(indices), tuple(values)
 
-    def _orientation(self, frame: ImuFrame) -> Quaternion | None:
-        """Trunk to a world whose z points up."""
+    def _world_from_sensor(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
+        """Sensor to a world whose z points up: the device's own attitude, or the filter's."""
+        device = None if self._attitude == "filter" else self._device_attitude(frame)
+        if device is not None:
+            self._device_attitude_ns = stamp_ns
+            return device
+        if self._attitude == "device":
+            return None
+        filtered = self._filter.update(stamp_ns, frame.angular_velocity, frame.acceleration)
+        return filtered if self._attitude == "filter" or self._device_is_raw(stamp_ns) else None
+
+    def _device_is_raw(self, stamp_ns: int) -> bool:
+        """Whether the device has sent no attitude for so long that it has none to send."""
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
+        return stamp_ns - max(self._began_ns, self._device_attitude_ns or 0) > RAW_AFTER_NS
+
+    def _device_attitude(self, frame: ImuFrame) -> Quaternion | None:
         device = frame.orientation
         if device is not None:
             device = rotation.normalised(device)
         elif frame.roll_pitch_yaw is not None:
-            device = self._format.angles(*frame.roll_pitch_yaw)
-        if device is None:
-            return None
-        if frame.z_down:
-            device = rotation.multiply(NWU_FROM_NED, device)
-        return rotation.multiply(device, self._sensor_from_trunk)
+            device = self._angles(*frame.roll_pitch_yaw)
+        if device is not None and frame.z_down:
+            return rotation.multiply(NWU_FROM_NED, device)
+        return device

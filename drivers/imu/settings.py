@@ -20,5 +20,9 @@ class ImuSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     format: Literal["witmotion", "bno08x-rvc", "xsens", "vectornav"] = "witmotion"
     axes: tuple[Axis, Axis, Axis] | None = None  # None: as the format's device defines its own
     mounting: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    zero: str | None = None  # file of a zero taken by `gwrms calibrate imu`, beside the robot's file
+    attitude: Literal["auto", "device", "filter"] = (
+        "auto"  # auto: the device's, else from rates and acceleration
+    )
     stale_after_s: Positive = 0.5
     lost_after_s: Positive = 2.0

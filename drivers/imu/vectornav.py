@@ -13,6 +13,7 @@ import struct
 from functools import reduce
 from operator import xor
 
+from drivers.clock import ClockSpec
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
 from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
@@ -20,8 +21,7 @@ from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
 BINARY, ASCII = 0xFA, ord("$")
 LONGEST_ASCII = 256
 TESLA_PER_GAUSS = 1e-4
-TICKS_PER_SECOND = 1_000_000_000
-TICKS_MODULUS = 1 << 64
+CLOCK = ClockSpec(1_000_000_000, 1 << 64)  # time since start-up
 HEX_DIGITS = frozenset(b"0123456789ABCDEFabcdef")
 
 # What the values of an ASCII message are, in order.

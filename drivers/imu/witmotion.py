@@ -7,6 +7,8 @@ moment comes in several frames. (WitMotion, "WIT standard communication protocol
 import math
 import struct
 
+import msgspec
+
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
 from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
@@ -53,25 +55,30 @@ def decode(kind: int, data: bytes) -> tuple[ImuFrame, bool]:
         return _time(data), False
     a, b, c, last = _WORDS.unpack(data)
     saturated = kind in (ACCELERATIONS, RATES) and not -32768 < min(a, b, c) <= max(a, b, c) < 32767
-    if kind == ACCELERATIONS:
-        frame = ImuFrame(
-            "acceleration", acceleration=_scaled(a, b, c, ACCELERATION), temperature=last * CENTI
-        )
-    elif kind == RATES:
-        frame = ImuFrame(
-            "angular_velocity", angular_velocity=_scaled(a, b, c, RATE), temperature=last * CENTI
-        )
+    if kind == QUATERNIONS:
+        parts = (a * QUATERNION, b * QUATERNION, c * QUATERNION, last * QUATERNION)
+        return ImuFrame("quaternion", orientation=parts), False
+    frame = vectors(kind, a, b, c)
+    if frame is None:
+        return ImuFrame(OTHERS[kind], more={"data": data.hex()}), False
+    if kind in (ACCELERATIONS, RATES):
+        frame = msgspec.structs.replace(frame, temperature=last * CENTI)
     elif kind == ANGLES:
-        frame = ImuFrame("angle", roll_pitch_yaw=_scaled(a, b, c, ANGLE), more={"version": last & 0xFFFF})
-    elif kind == QUATERNIONS:
-        frame = ImuFrame(
-            "quaternion", orientation=(a * QUATERNION, b * QUATERNION, c * QUATERNION, last * QUATERNION)
-        )
-    elif kind == MAGNETIC:  # the unit depends on the model's magnetometer
-        frame = ImuFrame("magnetic", more={"magnetic_raw_x": a, "magnetic_raw_y": b, "magnetic_raw_z": c})
-    else:
-        frame = ImuFrame(OTHERS[kind], more={"data": data.hex()})
+        frame.more["version"] = last & 0xFFFF
     return frame, saturated
+
+
+def vectors(kind: int, a: int, b: int, c: int) -> ImuFrame | None:
+    """The frame of three words, as serial and CAN variant share them; `None` for other types."""
+    if kind == ACCELERATIONS:
+        return ImuFrame("acceleration", acceleration=_scaled(a, b, c, ACCELERATION))
+    if kind == RATES:
+        return ImuFrame("angular_velocity", angular_velocity=_scaled(a, b, c, RATE))
+    if kind == ANGLES:
+        return ImuFrame("angle", roll_pitch_yaw=_scaled(a, b, c, ANGLE))
+    if kind == MAGNETIC:  # the unit depends on the model's magnetometer
+        return ImuFrame("magnetic", more={"magnetic_raw_x": a, "magnetic_raw_y": b, "magnetic_raw_z": c})
+    return None
 
 
 def _scaled(a: int, b: int, c: int, scale: float) -> Vector:

@@ -9,6 +9,7 @@ import math
 import struct
 from collections.abc import Callable
 
+from drivers.clock import ClockSpec
 from drivers.imu.frame import ImuFrame, More
 from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner, Sequence
 
@@ -21,8 +22,7 @@ MESSAGES = {
 }
 LONGEST_PAYLOAD = 2048
 EXTENDED = 0xFF
-TICKS_PER_SECOND = 10_000
-TICKS_MODULUS = 1 << 32
+CLOCK = ClockSpec(10_000, 1 << 32)  # sample time fine
 
 FORMAT_BITS, FRAME_BITS = 0x0003, 0x000C
 NORTH_EAST_DOWN = 0x0004
