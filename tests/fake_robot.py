@@ -267,7 +267,7 @@ class FakeRobot:
                 for name in self.parameters
             ],
             "modules": dict.fromkeys(("resource", "component", "control", "status"), "off"),
-            "stop": {"held": False, "reason": None, "since_ns": None, "drives": {}},
+            "stop": {"held": False, "reason": None, "since_ns": None, "stopped_again": {}, "drives": {}},
             "guard": {"configured": False},
             "clock": {"monotonic_ns": time.monotonic_ns(), "utc_ns": time.time_ns(), "boot_id": self.boot_id},
         }

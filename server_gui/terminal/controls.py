@@ -1,0 +1,114 @@
+"""What keys do: choose a parameter, raise or lower it, stop, quit. Draws nothing."""
+
+import concurrent.futures
+import math
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from gateway.messages import ParameterInfo
+from server_gui.core.robot import Robot
+from server_gui.terminal.keys import Key
+
+STEPS = 20  # from one end of a parameter's range to the other
+
+
+class Commands(Protocol):
+    """What can be asked of a robot; both return at once."""
+
+    def write(self, changes: Mapping[str, float]) -> "concurrent.futures.Future[None]": ...
+
+    def stop(self, reason: str) -> "concurrent.futures.Future[None]": ...
+
+
+class Controls:
+    """The selected parameter and what is under way. Belongs to the thread that draws."""
+
+    def __init__(self, robot: Robot, commands: Commands) -> None:
+        self.wants_to_quit = False
+        self.stop_sent = False
+        self.note = ""
+        self._robot = robot
+        self._commands = commands
+        self._row = 0
+        self._write: concurrent.futures.Future[None] | None = None
+        self._does: dict[Key, Callable[[], None]] = {
+            Key.UP: lambda: self._move(-1),
+            Key.DOWN: lambda: self._move(+1),
+            Key.LEFT: lambda: self._change(-1),
+            Key.RIGHT: lambda: self._change(+1),
+            Key.STOP: self._stop,
+            Key.QUIT: self._quit,
+        }
+
+    @property
+    def names(self) -> list[str]:
+        """The parameters that can be chosen, in the robot's order."""
+        return list(self._robot.parameters)
+
+    @property
+    def selected(self) -> str | None:
+        """The chosen parameter, None while none is known."""
+        names = self.names
+        return names[min(self._row, len(names) - 1)] if names else None
+
+    @property
+    def writing(self) -> bool:
+        """Whether a write is under way."""
+        return self._write is not None and not self._write.done()
+
+    def press(self, key: Key) -> None:
+        """Do what a key stands for."""
+        self._does[key]()
+
+    def _move(self, by: int) -> None:
+        self._row = max(0, min(self._row + by, len(self.names) - 1))
+
+    def _change(self, by: int) -> None:
+        name = self.selected
+        if name is None or self.writing:
+            return
+        value = self._robot.parameters[name].value
+        info = self._info(name)
+        if value is None or info is None:
+            self.note = f"{name} is not known now, so it is not changed"
+            return
+        target = neighbour(value, by, info)
+        if target is None:
+            self.note = f"{name} has no limits to move between; use gwrms set {name}=VALUE"
+        elif target != value:
+            self.note = f"writing {name} = {target:.10g} {info.unit}"
+            self._write = self._commands.write({name: target})
+
+    def _info(self, name: str) -> ParameterInfo | None:
+        description = self._robot.description
+        known = description.parameters if description is not None else []
+        return next((info for info in known if info.name == name), None)
+
+    def _stop(self) -> None:
+        self.stop_sent = True
+        self._robot.last_stop = None
+        self._commands.stop("STOP key of the dashboard")
+
+    def _quit(self) -> None:
+        self.wants_to_quit = True
+
+
+def step_of(low: float, high: float, largest: float | None) -> float:
+    """A round step (1, 2 or 5 times a power of ten) of about a twentieth of the range, within `largest`."""
+    wanted = (high - low) / STEPS
+    wanted = min(wanted, largest) if largest else wanted
+    power = 10.0 ** math.floor(math.log10(wanted) + 1e-9)
+    return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= wanted * (1 + 1e-9))
+
+
+def neighbour(value: float, by: int, info: ParameterInfo) -> float | None:
+    """The next step above (+1) or below (−1) a value, within its limits; None where there are none."""
+    if info.min is None or info.max is None or info.max <= info.min:
+        return None
+    step = step_of(info.min, info.max, info.max_step)
+    places = value / step
+    on_grid = round(places)
+    if abs(places - on_grid) > 1e-6:
+        on_grid = math.floor(places) + (by < 0)
+    # Ten digits: 0.42, not 0.42000000000000004.
+    return round(min(max((on_grid + by) * step, info.min), info.max), 10)

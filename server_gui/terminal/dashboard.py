@@ -1,0 +1,67 @@
+"""The terminal dashboard: lays the panels out and draws them ten times a second."""
+
+import io
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console, RenderableType
+from rich.layout import Layout
+from rich.live import Live
+
+from server_gui.core.robot import Robot
+from server_gui.terminal import panels
+from server_gui.terminal.controls import Controls
+from server_gui.terminal.keys import Keyboard
+
+FRAME_S = 0.1
+PICTURE_SIZE = (118, 27)
+
+
+def draw(robot: Robot, controls: Controls, where: str) -> RenderableType:
+    """One frame."""
+    page = Layout()
+    page.split_column(
+        Layout(panels.header(robot, where), size=3),
+        Layout(name="upper", size=2 + 1 + max(6, len(robot.names("joint")))),
+        Layout(name="lower"),
+        Layout(panels.footer(robot, controls, where), size=2),
+    )
+    page["upper"].update(panels.joints(robot))
+    page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(robot), ratio=2))
+    page["left"].split_column(
+        Layout(panels.feet_and_trunk(robot), size=6),
+        Layout(panels.parameters(robot, controls)),
+    )
+    return page
+
+
+class Dashboard:
+    """Shows a robot in the terminal until `tick` says that it is enough, or the user quits."""
+
+    def __init__(self, robot: Robot, controls: Controls, where: str) -> None:
+        self._robot = robot
+        self._controls = controls
+        self._where = where
+
+    def run(self, tick: Callable[[], bool]) -> None:
+        """Draw; `tick` is called before every frame, takes what has come, and returns whether to go on."""
+        console = Console()
+        live = Live(
+            console=console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
+        )
+        with Keyboard() as keyboard, live:
+            next_frame = time.monotonic()
+            while tick() and not self._controls.wants_to_quit:
+                live.update(draw(self._robot, self._controls, self._where), refresh=True)
+                next_frame = max(next_frame + FRAME_S, time.monotonic())
+                for key in keyboard.wait(next_frame - time.monotonic()):
+                    self._controls.press(key)
+
+
+def save_picture(path: Path, robot: Robot, controls: Controls, where: str) -> None:
+    """The frame of this moment as an SVG file."""
+    width, height = PICTURE_SIZE
+    console = Console(record=True, width=width, height=height, file=io.StringIO(), force_terminal=True)
+    console.print(draw(robot, controls, where), height=height)
+    console.save_svg(str(path), title="gwrms demo")

@@ -1,0 +1,75 @@
+"""The run without a screen: one compact line a second, and a table of what the run showed."""
+
+import math
+import sys
+
+from gateway.client import ConnectionState
+from server_gui.core.robot import Robot
+from server_gui.core.summary import Range, Summary
+
+NONE = "–"
+
+
+def line(robot: Robot, elapsed_s: float) -> str:
+    """What is now, in one line."""
+    joints = " ".join(_degrees(robot.values.get(f"{name}.position")) for name in robot.names("joint"))
+    feet = "/".join(_newtons(robot.values.get(f"{name}.force")) for name in robot.names("insole"))
+    tilts = " ".join(_degrees(robot.values.get(f"{name}.tilt_forward")) for name in robot.names("imu"))
+    cpu = robot.resources.cpu.percent if robot.resources is not None else None
+    wrong = ", ".join(f"{part.name} {part.state}" for part in robot.not_ok()) or "all ok"
+    return (
+        f"{elapsed_s:5.0f} s  {_link(robot)}  joints {joints} °  feet {feet} N  "
+        f"trunk {tilts} °  cpu {NONE if cpu is None else f'{cpu:.0f}'} %  {wrong}"
+    )
+
+
+def _link(robot: Robot) -> str:
+    age_s = robot.age_s()
+    age = NONE if age_s is None else f"{age_s * 1000:.0f} ms"
+    if robot.link.state is not ConnectionState.CONNECTED:
+        return f"{robot.link.state.value}, {age} old"
+    return f"{'STALE ' if robot.is_stale() else ''}age {age} {robot.rate_hz():.0f} Hz"
+
+
+def table(summary: Summary, robot: Robot) -> str:
+    """What the run showed."""
+    link = robot.link
+    lines = [
+        "",
+        f"{'joint':<14}{'angle over the run':>26}",
+        *(f"{name:<14}{_range(seen):>26}" for name, seen in summary.joints.items()),
+        "",
+        f"{'foot':<14}{'loaded':>26}",
+        *(f"{name:<14}{_share(foot.loaded_share):>26}" for name, foot in summary.feet.items()),
+        f"the weight changed feet {summary.alternations} times",
+        "",
+        f"{'component':<14}{'worst state':>26}",
+        *(f"{name:<14}{state:>26}" for name, state in summary.worst.items()),
+        "",
+        f"{summary.rows} rows, {link.dropped} dropped, {link.missed} batches missed, {link.links} links",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def say(text: str) -> None:
+    """Print a line at once, also into a pipe."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def _degrees(value_rad: float | None) -> str:
+    return NONE if value_rad is None else f"{math.degrees(value_rad):+.0f}"
+
+
+def _newtons(force_n: float | None) -> str:
+    return NONE if force_n is None else f"{force_n:.0f}"
+
+
+def _range(seen: Range) -> str:
+    if seen.low is None or seen.high is None:
+        return NONE
+    return f"{math.degrees(seen.low):+.1f}° … {math.degrees(seen.high):+.1f}°"
+
+
+def _share(share: float | None) -> str:
+    return NONE if share is None else f"{100 * share:.0f} % of the time"

@@ -1,0 +1,93 @@
+"""Small drawings of text: bars, sparklines, states as shape, colour and word."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from rich.text import Text
+
+LEFT = "#56b4e9"  # Okabe–Ito sky blue
+RIGHT = "#e69f00"  # Okabe–Ito orange
+GOOD = "#009e73"
+WARN = "#f0e442"
+BAD = "#d55e00"
+OLD = "grey50"
+DIM = "grey62"
+NONE = "–"
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A state for the eye: never by colour alone."""
+
+    shape: str
+    colour: str
+
+
+STATES: dict[str, Mark] = {
+    "ok": Mark("●", GOOD),
+    "stale": Mark("◌", OLD),
+    "lost": Mark("✕", BAD),
+    "fault": Mark("■", BAD),
+    "operation enabled": Mark("●", GOOD),
+    "switched on": Mark("◐", WARN),
+    "ready to switch on": Mark("◔", WARN),
+    "switch on disabled": Mark("○", DIM),
+    "not ready to switch on": Mark("○", DIM),
+    "quick stop active": Mark("▲", WARN),
+    "fault reaction active": Mark("■", BAD),
+}
+UNKNOWN = Mark("?", WARN)
+
+
+def side_colour(component: str) -> str:
+    """Left is blue, right is orange, what has no side is plain."""
+    side = component.partition("_")[0]
+    return {"left": LEFT, "right": RIGHT}.get(side, "default")
+
+
+def state_text(word: str) -> Text:
+    """A state as shape, colour and word."""
+    plain = word.replace("_", " ").lower()
+    mark = STATES.get(plain, UNKNOWN)
+    return Text(f"{mark.shape} {plain}", style=mark.colour)
+
+
+def sparkline(values: Iterable[float | None], low: float, high: float, width: int) -> str:
+    """The newest `width` values as blocks between `low` and `high`; a blank where there is none."""
+    newest = list(values)[-width:]
+    span = (high - low) or 1.0
+    return "".join(" " if value is None else BLOCKS[_eighth((value - low) / span)] for value in newest).rjust(
+        width
+    )
+
+
+def bar(share: float | None, width: int) -> str:
+    """A bar of `width` cells filled to `share` (0–1)."""
+    filled = 0 if share is None else round(min(max(share, 0.0), 1.0) * width)
+    return "━" * filled + "╌" * (width - filled)
+
+
+def needle(value: float | None, low: float, high: float, width: int) -> str:
+    """Where a value lies between `low` and `high`; zero is marked when it lies between."""
+    cells = ["─"] * width
+    if low < 0.0 < high:
+        cells[_cell(0.0, low, high, width)] = "┼"
+    if value is not None:
+        cells[_cell(value, low, high, width)] = "◆"
+    return "".join(cells)
+
+
+def degrees(value_rad: float | None) -> str:
+    """An angle for people."""
+    return NONE if value_rad is None else f"{math.degrees(value_rad):+.1f}°"
+
+
+def _eighth(share: float) -> int:
+    return min(max(int(share * len(BLOCKS)), 0), len(BLOCKS) - 1)
+
+
+def _cell(value: float, low: float, high: float, width: int) -> int:
+    return min(max(round((value - low) / (high - low) * (width - 1)), 0), width - 1)

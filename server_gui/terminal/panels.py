@@ -1,0 +1,282 @@
+"""The dashboard's panels: each draws one part of a robot's state and asks nothing of anybody."""
+
+import math
+import time
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from gateway.client import ConnectionState
+from gateway.messages import ParameterInfo, ParameterValue, Written
+from server_gui.core.events import Failed
+from server_gui.core.robot import Robot
+from server_gui.terminal.controls import Controls
+from server_gui.terminal.marks import (
+    BAD,
+    DIM,
+    GOOD,
+    NONE,
+    OLD,
+    WARN,
+    bar,
+    degrees,
+    needle,
+    side_colour,
+    sparkline,
+    state_text,
+)
+
+FULL_FORCE_N = 1000.0
+JOINT_LOW_RAD, JOINT_HIGH_RAD = math.radians(-30), math.radians(75)
+SHOWN_PROCESSES = 8
+TILT_RAD = math.radians(15)
+SPARK_WIDTH = 34
+SPARK_SPAN_RAD = math.radians(20)  # at least: a joint at rest is a flat line, not a magnified one
+ROWS_A_BLOCK = 6
+
+
+def header(robot: Robot, where: str) -> RenderableType:
+    """Which robot, how it is reached, how old what is shown is, what is wrong."""
+    row = Table.grid(expand=True, padding=(0, 2))
+    row.add_column(ratio=1)
+    row.add_column(justify="right")
+    name = robot.description.robot if robot.description is not None else where
+    row.add_row(Text.assemble((name, "bold"), ("  " + where, DIM)), _link(robot))
+    return Panel(row, title="[bold]GWRMS[/]", title_align="left", box=box.ROUNDED, border_style=DIM)
+
+
+def _link(robot: Robot) -> Text:
+    link = robot.link
+    age_s = robot.age_s()
+    if link.state is not ConnectionState.CONNECTED:
+        age = f", shown is {age_s:.1f} s old" if age_s is not None else ""
+        return Text(f"✕ {link.state.value}{age}", style=BAD)
+    age = NONE if age_s is None else f"{age_s * 1000:.0f} ms"
+    trip = NONE if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
+    text = Text.assemble(
+        state_text("stale" if robot.is_stale() else "ok"),
+        f"  age {age}  {robot.rate_hz():.0f} Hz  round trip {trip}  ",
+    )
+    lost = link.missed + link.dropped
+    text.append(f"lost {lost}", style=WARN if lost else DIM)
+    if link.links > 1:
+        text.append(f"  links {link.links}", style=WARN)
+    return text
+
+
+def joints(robot: Robot) -> RenderableType:
+    """Every joint with its drive's state and its angle over the last seconds."""
+    stale = robot.is_stale()
+    grid = Table(box=None, expand=True, padding=(0, 1), header_style=DIM)
+    grid.add_column("joint", no_wrap=True)
+    grid.add_column("drive", no_wrap=True)
+    grid.add_column("angle", justify="right", no_wrap=True, min_width=7)
+    grid.add_column("−30°     0°             75°", no_wrap=True)
+    grid.add_column("last seconds", no_wrap=True, width=SPARK_WIDTH)
+    for name in robot.names("joint"):
+        channel = f"{name}.position"
+        value = robot.values.get(channel)
+        colour = OLD if stale or value is None else side_colour(name)
+        past = list(robot.history.get(channel, ()))[::ROWS_A_BLOCK]
+        grid.add_row(
+            Text(name.replace("_", " "), style=side_colour(name)),
+            _drive(robot, name, stale),
+            Text(degrees(value), style=colour),
+            Text(needle(value, JOINT_LOW_RAD, JOINT_HIGH_RAD, 28), style=colour),
+            Text(sparkline(past, *_spark_range(past), SPARK_WIDTH), style=colour),
+        )
+    return _panel(grid, "Joints", robot)
+
+
+def _spark_range(past: list[float | None]) -> tuple[float, float]:
+    seen = [value for value in past if value is not None] or [0.0]
+    low, high = min(seen), max(seen)
+    margin = max(0.0, SPARK_SPAN_RAD - (high - low)) / 2
+    return low - margin, high + margin
+
+
+def _drive(robot: Robot, name: str, stale: bool) -> Text:
+    part = robot.parts[name]
+    if part.state in ("stale", "lost"):
+        return _part_state(robot, name)
+    word = robot.word(f"{name}.state")
+    if stale or word is None:
+        return Text(word or NONE, style=OLD)
+    return state_text(word)
+
+
+def _part_state(robot: Robot, name: str) -> Text:
+    part = robot.parts[name]
+    text = state_text(part.state)
+    if part.state != "ok" and part.age_ms is not None:
+        text.append(f" {part.age_ms / 1000:.1f} s", style=OLD)
+    return text
+
+
+def feet_and_trunk(robot: Robot) -> RenderableType:
+    """What each foot carries, and how the trunk leans."""
+    stale = robot.is_stale()
+    grid = Table.grid(expand=True, padding=(0, 1))
+    grid.add_column(no_wrap=True)
+    grid.add_column(justify="right", min_width=7, no_wrap=True)
+    grid.add_column(no_wrap=True)
+    for name in robot.names("insole"):
+        force = robot.values.get(f"{name}.force")
+        colour = OLD if stale or force is None else side_colour(name)
+        share = None if force is None else force / FULL_FORCE_N
+        label = Text(name.replace("_insole", " foot").replace("_", " "), style=side_colour(name))
+        number = _part_state(robot, name) if force is None else Text(f"{force:.0f} N", style=colour)
+        grid.add_row(label, number, Text(bar(share, 20), style=colour))
+    for name in robot.names("imu"):
+        for quantity, words in (("tilt_forward", "forward"), ("tilt_side", "to the side")):
+            tilt = robot.values.get(f"{name}.{quantity}")
+            colour = OLD if stale or tilt is None else "default"
+            number = _part_state(robot, name) if tilt is None else Text(degrees(tilt), style=colour)
+            grid.add_row(f"{name} {words}", number, Text(needle(tilt, -TILT_RAD, TILT_RAD, 20), style=colour))
+    return _panel(grid, "Feet and trunk", robot)
+
+
+def parameters(robot: Robot, controls: Controls) -> RenderableType:
+    """The gait parameters as the controller holds them; the chosen one can be moved."""
+    grid = Table.grid(expand=True, padding=(0, 1))
+    for justify in ("left", "left", "right", "left", "left"):
+        grid.add_column(justify=justify, no_wrap=True)
+    known = robot.description.parameters if robot.description is not None else []
+    infos = {info.name: info for info in known}
+    for name, held in robot.parameters.items():
+        chosen = name == controls.selected
+        style = "bold" if chosen else "default"
+        value = Text(NONE if held.value is None else f"{held.value:.10g}", style=style)
+        grid.add_row(
+            "▶" if chosen else " ", Text(name, style=style), value, held.unit, _range(held, infos.get(name))
+        )
+    if not robot.parameters:
+        grid.add_row("", Text("not known yet", style=OLD), "", "", "")
+    return _panel(grid, "Gait parameters", robot, _age(robot.parameters_at_ns))
+
+
+def _range(held: ParameterValue, info: ParameterInfo | None) -> Text:
+    if held.problem is not None or info is None or info.min is None or info.max is None:
+        return Text(held.problem or "no limits known", style=WARN)
+    where = needle(held.value, info.min, info.max, 20)
+    return Text.assemble(f"{info.min:g} ", (where, DIM), f" {info.max:g}")
+
+
+def resources(robot: Robot) -> RenderableType:
+    """The robot's computer: CPU, memory, and who uses them most."""
+    seen = robot.resources
+    if seen is None:
+        return _panel(Text("not known yet", style=OLD), "Computer", robot)
+    grid = Table.grid(expand=True, padding=(0, 1))
+    grid.add_column(no_wrap=True, ratio=1)
+    for _ in range(3):
+        grid.add_column(justify="right", no_wrap=True)
+    cpu = None if seen.cpu.percent is None else seen.cpu.percent / 100
+    memory = seen.memory.used / seen.memory.total
+    grid.add_row(Text("CPU"), Text(bar(cpu, 12)), _percent(seen.cpu.percent), "")
+    grid.add_row(Text("memory"), Text(bar(memory, 12)), f"{100 * memory:.0f} %", _mib(seen.memory.used))
+    grid.add_row(
+        Text("this gateway", style=DIM), "", _percent(seen.gateway.cpu_percent), _mib(seen.gateway.rss_bytes)
+    )
+    if isinstance(seen.processes, list):
+        for process in seen.processes[:SHOWN_PROCESSES]:
+            pid = Text(str(process.pid), style=DIM)
+            grid.add_row(process.name, pid, _percent(process.cpu_percent), _mib(process.memory_bytes))
+    return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
+
+
+def footer(robot: Robot, controls: Controls, where: str) -> RenderableType:
+    """The keys, and the last thing that was said."""
+    keys = Text.assemble(
+        (" s ", "bold white on red"),
+        " STOP   ",
+        ("↑↓", "bold"),
+        " choose   ",
+        ("←→", "bold"),
+        " lower, raise   ",
+        ("q", "bold"),
+        " quit",
+    )
+    keys.append("      software stop, not safety-rated", style=DIM)
+    news = _news(robot, controls, where)
+    for text in (keys, news):
+        text.no_wrap, text.overflow = True, "ellipsis"
+    return Group(keys, news)
+
+
+def _news(robot: Robot, controls: Controls, where: str) -> Text:
+    """The one thing that matters most now."""
+    if controls.stop_sent:
+        return _stop(robot)
+    if robot.last_failure is not None:
+        return Text(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
+    if robot.link.problem is not None:
+        return Text(f"✕ {robot.link.problem}", style=BAD)
+    bad = robot.not_ok()
+    if bad:
+        return Text(
+            "  ".join(f"{part.name} {part.state}: {part.problem or 'no reason known'}" for part in bad),
+            style=WARN,
+        )
+    if controls.writing:
+        return Text(controls.note, style=DIM)
+    if robot.last_change is not None:
+        return _written(robot.last_change.written)
+    hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
+    return Text(controls.note or hint, style=DIM)
+
+
+def _written(written: Written) -> Text:
+    changes = (
+        f"{name} {written.before.get(name, math.nan):.10g} → {after:.10g}"
+        for name, after in written.after.items()
+    )
+    return Text(f"✓ {', '.join(changes)}, read back", style=GOOD)
+
+
+def _stop(robot: Robot) -> Text:
+    answer = robot.last_stop
+    if answer is None:
+        return Text("STOP sent …", style=f"bold {WARN}")
+    if isinstance(answer, Failed):
+        return Text(f"STOP NOT CONFIRMED: {answer.reason}", style=f"bold {BAD}")
+    drives = answer.stopped.drives
+    missing = [f"{name} {outcome}" for name, outcome in drives.items() if outcome != "confirmed"]
+    if missing or not drives:
+        return Text(f"STOP NOT CONFIRMED: {', '.join(missing) or 'no drives'}", style=f"bold {BAD}")
+    return Text(f"STOP confirmed by all {len(drives)} drives", style=f"bold {GOOD}")
+
+
+def _panel(content: RenderableType, title: str, robot: Robot, note: str = "") -> Panel:
+    stale = robot.is_stale()
+    age_s = robot.age_s()
+    old = f" {age_s:.1f} s old" if stale and age_s is not None else ""
+    style = OLD if stale else DIM
+    return Panel(
+        content,
+        title=f"{title}{old}",
+        subtitle=note or None,
+        subtitle_align="right",
+        title_align="left",
+        box=box.ROUNDED,
+        border_style=style,
+        style=OLD if stale else "none",
+    )
+
+
+def _age(at_ns: int | None) -> str:
+    if at_ns is None:
+        return ""
+    age_s = (time.monotonic_ns() - at_ns) / 1e9
+    return f"{age_s:.1f} s old" if age_s > 2.0 else ""
+
+
+def _percent(value: float | None) -> str:
+    return NONE if value is None else f"{value:.1f} %"
+
+
+def _mib(count: int) -> str:
+    return f"{count / (1 << 20):.0f} MiB"
