@@ -25,6 +25,13 @@ FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
 MAX_UNCLAIMED = 2048  # as many as there are 11-bit identifiers
 
+_WIRE = "check termination, wiring and bitrate"
+_STATE_WORDS = {
+    BusState.WARNING: f"the CAN controller counts many errors: {_WIRE}",
+    BusState.PASSIVE: f"the CAN controller is error passive: {_WIRE}",
+    BusState.OFF: f"the CAN controller is bus off, no frame can pass: {_WIRE}",
+}
+
 
 class BusUser:
     """What is told when a bus comes, goes, and that time passes: in the bus's thread, never for long."""
@@ -46,7 +53,7 @@ class CanBus:
         self.name = name
         self.settings = settings
         self.role = role
-        self.problem: str | None = None  # why it is not open, or what is wrong with it, in words
+        self.problem: str | None = None  # why it is not open, in words
         self.state = BusState.ACTIVE  # as the controller's error frames say, where the interface has them
         self.frames = 0
         self.opened = 0  # times
@@ -63,6 +70,11 @@ class CanBus:
         self._stopping = threading.Event()
         self._transport: Transport | None = None
         self._thread: threading.Thread | None = None
+
+    @property
+    def trouble(self) -> str | None:
+        """Why it is not open, or what its controller says about the wire; `None` when nothing is wrong."""
+        return self.problem or _STATE_WORDS.get(self.state)
 
     def start(self) -> None:
         """Keep the bus open, nodes or not; idempotent, returns at once."""

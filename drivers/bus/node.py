@@ -24,7 +24,7 @@ from eds import Description
 T = TypeVar("T")
 
 EMCY_HISTORY = 64
-FIRST_RETRY_S = 0.25
+FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
 HEARTBEATS_MISSED = 2.5  # producer times without a heartbeat, where no time is configured
 
@@ -133,13 +133,13 @@ class Node(BusUser):
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with the node now, in words with what to check; `None` when nothing is."""
         if not self.ready:
-            return self.bus.problem or self._step
+            return self.bus.trouble or self._step
         silent_ms = self.silent_ms(now_ns)
         if silent_ms is not None and self.lost_heartbeat(now_ns):
             return f"its heartbeat is missing for {silent_ms / 1000:.1f} s: check the node's power and cable"
         if self.nmt_state is not None and self.nmt_state is not NmtState.OPERATIONAL:
             return f"it is {self.nmt_state.words} (NMT) and sends no PDOs until its master starts it"
-        return None
+        return self.bus.trouble
 
     def silent_ms(self, now_ns: int) -> float | None:
         """Since its last heartbeat, or anything else it said itself; `None` before the first."""
@@ -242,7 +242,7 @@ class Node(BusUser):
             self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
 
     def _come_up(self, sdo: SdoChannel) -> None:
-        sdo.upload(0x1000, 0, attempts=1)
+        sdo.upload(0x1000, 0, attempts=1, timeout_s=min(self._retry_s, self._times.sdo_timeout_s))
         self._check_identity(sdo)
         self._read_heartbeat_time(sdo)
         self._follow_emcy(sdo)

@@ -63,15 +63,18 @@ class SdoChannel:
         """Allow transfers again."""
         self._interrupted.clear()
 
-    def upload(self, index: int, subindex: int, attempts: int = READ_ATTEMPTS) -> bytes:
+    def upload(
+        self, index: int, subindex: int, attempts: int = READ_ATTEMPTS, timeout_s: float | None = None
+    ) -> bytes:
         """Read an object; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
         what = f"{self.label}: reading 0x{index:04X}:{subindex:02X}"
+        wait_s = timeout_s or self.timeout_s
         for _ in range(attempts - 1):
             try:
-                return self._transfer(sdo.upload(index, subindex), index, subindex, what)
+                return self._transfer(sdo.upload(index, subindex), index, subindex, what, wait_s)
             except DeviceTimeout:
                 continue
-        return self._transfer(sdo.upload(index, subindex), index, subindex, what)
+        return self._transfer(sdo.upload(index, subindex), index, subindex, what, wait_s)
 
     def download(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object, once; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
@@ -79,18 +82,20 @@ class SdoChannel:
         what = f"{self.label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
         unknown = "whether the device took it is not known, read it back"
         try:
-            self._transfer(sdo.download(index, subindex, data), index, subindex, what)
+            self._transfer(sdo.download(index, subindex, data), index, subindex, what, self.timeout_s)
         except Interrupted as error:
             raise DeviceTimeout(f"{what}: interrupted by an urgent request; {unknown}") from error
         except DeviceTimeout as error:
             raise DeviceTimeout(f"{error}; {unknown}") from error
 
-    def _transfer(self, steps: Generator[bytes | None, bytes, T], index: int, subindex: int, what: str) -> T:
+    def _transfer(
+        self, steps: Generator[bytes | None, bytes, T], index: int, subindex: int, what: str, timeout_s: float
+    ) -> T:
         self._check_interrupted()
         self._forget_stale()
         self.counters.transfers += 1
         try:
-            return self._run(steps)
+            return self._run(steps, timeout_s)
         except sdo.SdoAborted as error:
             self.counters.aborts += 1
             raise DeviceAbort(f"{what}: refused, {abort_text(error.abort_code)}", error.abort_code) from error
@@ -100,12 +105,12 @@ class SdoChannel:
         except queue.Empty as error:
             self.counters.timeouts += 1
             self._send(sdo.abort_request(index, subindex, sdo.TIMED_OUT))
-            raise DeviceTimeout(f"{what}: no answer within {self.timeout_s:g} s") from error
+            raise DeviceTimeout(f"{what}: no answer within {timeout_s:g} s") from error
         except Interrupted:
             self._send(sdo.abort_request(index, subindex, sdo.GENERAL_ERROR))
             raise
 
-    def _run(self, steps: Generator[bytes | None, bytes, T]) -> T:
+    def _run(self, steps: Generator[bytes | None, bytes, T], timeout_s: float) -> T:
         try:
             request = next(steps)
             while True:
@@ -113,7 +118,7 @@ class SdoChannel:
                     self.counters.stale += 1
                 else:
                     self._send(request)
-                    deadline = time.monotonic() + self.timeout_s
+                    deadline = time.monotonic() + timeout_s
                 request = steps.send(self._response(deadline))
         except StopIteration as done:
             result: T = done.value

@@ -1,0 +1,225 @@
+"""A bus opens for those who hold it, says what is wrong, and comes back."""
+
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from drivers.bus.bus import BusUser, CanBus
+from drivers.bus.bus_state import BusState, bus_state
+from drivers.bus.frames import ERROR, EXTENDED
+from drivers.bus.settings import CanSettings
+from drivers.errors import Unavailable
+from tests.unit.bus.waiting import until
+
+
+class Recorder(BusUser):
+    def __init__(self) -> None:
+        self.events: list[str] = []
+        self.ticks = 0
+
+    def bus_opened(self) -> None:
+        self.events.append("opened")
+
+    def bus_closed(self) -> None:
+        self.events.append("closed")
+
+    def tick(self, now_ns: int) -> None:
+        self.ticks += 1
+
+
+@pytest.fixture
+def peer(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
+    with can.Bus(channel=request.node.name, interface="virtual") as bus:
+        yield bus
+
+
+@pytest.fixture
+def bus(request: pytest.FixtureRequest) -> Iterator[CanBus]:
+    bus = CanBus("main", CanSettings(interface="virtual", channel=request.node.name))
+    bus.start()
+    until(lambda: bus.opened)
+    yield bus
+    bus.stop()
+
+
+def test_frames_reach_their_handlers_with_the_time_of_reception(bus: CanBus, peer: can.BusABC) -> None:
+    got: list[tuple[int, bytes]] = []
+    bus.subscribe(0x181, lambda stamp_ns, data: got.append((stamp_ns, data)))
+    before_ns = time.monotonic_ns()
+    peer.send(can.Message(arbitration_id=0x181, data=b"\x01\x02", is_extended_id=False))
+    until(lambda: got)
+    assert got[0][1] == b"\x01\x02"
+    assert before_ns <= got[0][0] <= time.monotonic_ns()
+
+
+def test_an_extended_identifier_is_not_taken_for_a_short_one(bus: CanBus, peer: can.BusABC) -> None:
+    got: list[str] = []
+    bus.subscribe(0x181, lambda *_: got.append("short"))
+    bus.subscribe(0x181 | EXTENDED, lambda *_: got.append("long"))
+    peer.send(can.Message(arbitration_id=0x181, data=b"", is_extended_id=True))
+    peer.send(can.Message(arbitration_id=0x181, data=b"", is_extended_id=False))
+    until(lambda: len(got) == 2)
+    assert got == ["long", "short"]
+
+
+def test_several_handlers_share_an_identifier_and_leave_one_by_one(bus: CanBus, peer: can.BusABC) -> None:
+    got: list[str] = []
+
+    def first(*_: object) -> None:
+        got.append("first")
+
+    def second(*_: object) -> None:
+        got.append("second")
+
+    def send() -> None:
+        peer.send(can.Message(arbitration_id=0x181, data=b"", is_extended_id=False))
+
+    bus.subscribe(0x181, first)
+    bus.subscribe(0x181, second)
+    send()
+    until(lambda: got == ["first", "second"])
+    bus.unsubscribe(0x181, first)
+    send()
+    until(lambda: got == ["first", "second", "second"])
+    bus.unsubscribe(0x181, second)
+    bus.unsubscribe(0x181, second)
+    send()
+    until(lambda: 0x181 in bus.unclaimed)
+    assert got == ["first", "second", "second"]
+
+
+def test_a_handler_that_fails_silences_nobody_and_is_told(bus: CanBus, peer: can.BusABC) -> None:
+    got: list[bytes] = []
+
+    def broken(_stamp_ns: int, _data: bytes) -> None:
+        raise ZeroDivisionError("oops")
+
+    bus.subscribe(0x181, broken)
+    bus.subscribe(0x182, lambda _, data: got.append(data))
+    for can_id in (0x181, 0x182):
+        peer.send(can.Message(arbitration_id=can_id, data=b"\x07", is_extended_id=False))
+    until(lambda: got)
+    assert bus.failed_handlers == 1
+    assert "0x181: ZeroDivisionError: oops" in str(bus.problem)
+
+
+def test_users_are_told_that_the_bus_opened_and_that_time_passes(bus: CanBus) -> None:
+    user = Recorder()
+    bus.hold(user)
+    bus.hold(user)
+    until(lambda: user.ticks > 1)
+    assert user.events == ["opened"]
+    bus.release(user)
+
+
+def test_a_bus_nobody_holds_is_closed_and_threads_take_turns_as_before() -> None:
+    before_s = sys.getswitchinterval()
+    bus = CanBus("main", CanSettings(interface="virtual", channel="closing"))
+    user = Recorder()
+    for _ in range(3):
+        bus.hold(user)
+        bus.start()
+        until(lambda: user.ticks)
+        assert sys.getswitchinterval() < before_s
+        bus.release(user)
+        bus.stop()
+        assert sys.getswitchinterval() == pytest.approx(before_s)
+    assert bus.opened == 3
+    with pytest.raises(Unavailable, match="bus main is not open"):
+        bus.send(0x601, bytes(8))
+
+
+def test_an_interface_that_is_not_there_is_named_and_tried_again() -> None:
+    bus = CanBus("main", CanSettings(interface="slcan", channel="/dev/ttyNONE"))
+    bus.start()
+    until(lambda: bus.problem)
+    assert "slcan channel /dev/ttyNONE cannot be opened" in str(bus.problem)
+    bus.stop()
+
+
+@pytest.mark.parametrize("more", [{}, {"host": "127.0.0.1"}, {"host": "127.0.0.1", "port": "x"}])
+def test_a_socketcand_table_without_its_keys_says_so(more: dict[str, object]) -> None:
+    bus = CanBus("main", CanSettings.from_table({"interface": "socketcand", "channel": "can0", **more}))
+    bus.start()
+    until(lambda: bus.problem)
+    assert "needs the keys host and port" in str(bus.problem)
+    bus.stop()
+
+
+class Hub:
+    """A socketcand server that can be killed and started again on its port."""
+
+    def __init__(self, port: int = 0) -> None:
+        self.listener = socket.create_server(("127.0.0.1", port), reuse_port=True)
+        self.port = self.listener.getsockname()[1]
+        self.connection: socket.socket | None = None
+        self.thread = threading.Thread(target=self._serve)
+        self.thread.start()
+
+    def _serve(self) -> None:
+        connection, _ = self.listener.accept()
+        connection.sendall(b"< hi >")
+        for _ in range(2):
+            connection.recv(100)
+            connection.sendall(b"< ok >")
+        self.connection = connection
+
+    def kill(self) -> None:
+        self.thread.join()
+        assert self.connection is not None
+        self.connection.close()
+        self.listener.close()
+
+
+def test_a_hub_that_disappears_is_noticed_costs_no_cpu_and_is_found_again() -> None:
+    hub = Hub()
+    more = {"host": "127.0.0.1", "port": hub.port}
+    bus = CanBus("main", CanSettings.from_table({"interface": "socketcand", "channel": "can0", **more}))
+    user = Recorder()
+    bus.hold(user)
+    until(lambda: user.events == ["opened"])
+    hub.kill()
+    until(lambda: user.events == ["opened", "closed"])
+    until(lambda: "nothing answers as socketcand" in str(bus.problem))
+    began_s = time.process_time()
+    time.sleep(1.0)
+    assert time.process_time() - began_s < 0.3
+    hub = Hub(hub.port)
+    until(lambda: user.events == ["opened", "closed", "opened"])
+    assert bus.problem is None
+    bus.release(user)
+    hub.kill()
+
+
+@pytest.mark.parametrize(
+    ("can_id", "data", "state"),
+    [
+        (0x004, "00 04", BusState.WARNING),
+        (0x004, "00 08", BusState.WARNING),
+        (0x004, "00 10", BusState.PASSIVE),
+        (0x204, "00 20", BusState.PASSIVE),
+        (0x004, "00 40", BusState.ACTIVE),
+        (0x004, "00 01", None),  # an overflow says nothing about the state
+        (0x040, "", BusState.OFF),
+        (0x100, "", BusState.ACTIVE),
+        (0x020, "", None),
+    ],
+)
+def test_error_frames_tell_the_controllers_state(can_id: int, data: str, state: BusState | None) -> None:
+    assert bus_state(can_id | ERROR, bytes.fromhex(data)) is state
+    assert bus_state(can_id, bytes.fromhex(data)) is None
+
+
+def test_bus_off_and_back_is_seen_on_the_bus(bus: CanBus, peer: can.BusABC) -> None:
+    def error_frame(can_id: int, data: bytes) -> None:
+        peer.send(can.Message(arbitration_id=can_id, data=data, is_error_frame=True, is_extended_id=False))
+
+    error_frame(0x40, b"")
+    until(lambda: bus.state is BusState.OFF)
+    error_frame(0x100, b"")
+    until(lambda: bus.state is BusState.ACTIVE)

@@ -1,0 +1,168 @@
+"""SDO transfers, byte by byte as CiA 301 §7.2.4 draws them."""
+
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.bus import sdo
+
+Steps = Generator[bytes | None, bytes, Any]
+
+
+def play(steps: Steps, dialogue: list[tuple[str | None, str]]) -> object:
+    """Send each response after checking the request before it; returns the transfer's result."""
+    request = next(steps)
+    for expected, response in dialogue:
+        assert request == (None if expected is None else bytes.fromhex(expected))
+        try:
+            request = steps.send(bytes.fromhex(response))
+        except StopIteration as done:
+            return done.value
+    raise AssertionError(f"not done: {request!r}")
+
+
+@pytest.mark.parametrize(
+    ("response", "data"),
+    [
+        ("43 64 60 00 78 56 34 12", "78 56 34 12"),
+        ("47 64 60 00 78 56 34 00", "78 56 34"),
+        ("4B 64 60 00 78 56 00 00", "78 56"),
+        ("4F 64 60 00 78 00 00 00", "78"),
+        ("42 64 60 00 78 56 34 12", "78 56 34 12"),  # size not told: all four
+    ],
+)
+def test_expedited_upload(response: str, data: str) -> None:
+    dialogue = [("40 64 60 00 00 00 00 00", response)]
+    assert play(sdo.upload(0x6064, 0), dialogue) == bytes.fromhex(data)
+
+
+def test_segmented_upload() -> None:
+    assert (
+        play(
+            sdo.upload(0x1008, 0),
+            [
+                ("40 08 10 00 00 00 00 00", "41 08 10 00 0A 00 00 00"),
+                ("60 00 00 00 00 00 00 00", "00 41 42 43 44 45 46 47"),
+                ("70 00 00 00 00 00 00 00", "19 48 49 4A 00 00 00 00"),
+            ],
+        )
+        == b"ABCDEFGHIJ"
+    )
+
+
+@pytest.mark.parametrize(
+    ("data", "request_hex"),
+    [
+        ("02 00", "2B 40 60 00 02 00 00 00"),
+        ("01", "2F 40 60 00 01 00 00 00"),
+        ("01 02 03", "27 40 60 00 01 02 03 00"),
+        ("73 61 76 65", "23 40 60 00 73 61 76 65"),
+    ],
+)
+def test_expedited_download(data: str, request_hex: str) -> None:
+    steps = sdo.download(0x6040, 0, bytes.fromhex(data))
+    assert play(steps, [(request_hex, "60 40 60 00 00 00 00 00")]) is None
+
+
+def test_segmented_download() -> None:
+    dialogue: list[tuple[str | None, str]] = [
+        ("21 08 10 00 0A 00 00 00", "60 08 10 00 00 00 00 00"),
+        ("00 41 42 43 44 45 46 47", "20 00 00 00 00 00 00 00"),
+        ("19 48 49 4A 00 00 00 00", "30 00 00 00 00 00 00 00"),
+    ]
+    assert play(sdo.download(0x1008, 0, b"ABCDEFGHIJ"), dialogue) is None
+
+
+@pytest.mark.parametrize("at", ["64 60 00", "00 00 00"])
+def test_an_abort_of_this_object_ends_the_transfer_with_its_code(at: str) -> None:
+    steps = sdo.upload(0x6064, 0)
+    with pytest.raises(sdo.SdoAborted) as caught:
+        play(steps, [("40 64 60 00 00 00 00 00", f"80 {at} 00 00 02 06")])
+    assert caught.value.abort_code == 0x06020000
+
+
+@pytest.mark.parametrize(
+    "stale",
+    [
+        "4B 41 60 00 27 06 00 00",  # another object
+        "4B 64 60 01 27 06 00 00",  # another sub-index
+        "60 64 60 00 00 00 00 00",  # the confirmation of a write
+        "80 41 60 00 00 00 02 06",  # the abort of another object
+    ],
+)
+def test_an_answer_that_is_not_ours_is_passed_over(stale: str) -> None:
+    dialogue = [("40 64 60 00 00 00 00 00", stale), (None, "4F 64 60 00 01 00 00 00")]
+    assert play(sdo.upload(0x6064, 0), dialogue) == b"\x01"
+
+
+def test_a_late_confirmation_of_another_write_confirms_nothing() -> None:
+    dialogue = [("2B 40 60 00 02 00 00 00", "60 65 60 00 00 00 00 00"), (None, "60 40 60 00 00 00 00 00")]
+    assert play(sdo.download(0x6040, 0, b"\x02\x00"), dialogue) is None
+
+
+def test_a_repeated_segment_is_passed_over() -> None:
+    dialogue = [
+        ("40 08 10 00 00 00 00 00", "41 08 10 00 0A 00 00 00"),
+        ("60 00 00 00 00 00 00 00", "00 41 42 43 44 45 46 47"),
+        ("70 00 00 00 00 00 00 00", "00 41 42 43 44 45 46 47"),
+        (None, "19 48 49 4A 00 00 00 00"),
+    ]
+    assert play(sdo.upload(0x1008, 0), dialogue) == b"ABCDEFGHIJ"
+
+
+def test_a_device_that_sends_less_than_it_announced_is_not_believed() -> None:
+    dialogue = [
+        ("40 08 10 00 00 00 00 00", "41 08 10 00 0A 00 00 00"),
+        ("60 00 00 00 00 00 00 00", "01 41 42 43 44 45 46 47"),
+    ]
+    with pytest.raises(sdo.SdoProtocolError, match="announced 10 bytes and sent 7"):
+        play(sdo.upload(0x1008, 0), dialogue)
+
+
+def test_an_upload_without_end_is_bounded() -> None:
+    steps = sdo.upload(0x1008, 0)
+    next(steps)
+    with pytest.raises(sdo.SdoProtocolError, match="announces"):
+        steps.send(bytes.fromhex("41 08 10 00 FF FF FF FF"))
+
+
+def test_nothing_to_write_is_refused() -> None:
+    with pytest.raises(ValueError, match="nothing to write"):
+        next(sdo.download(0x6040, 0, b""))
+
+
+def test_an_abort_request_names_object_and_code() -> None:
+    assert sdo.abort_request(0x6064, 2, 0x05040000) == bytes.fromhex("80 64 60 02 00 00 04 05")
+
+
+@given(st.binary(min_size=1, max_size=300))
+def test_what_is_downloaded_in_segments_is_what_the_device_gets(data: bytes) -> None:
+    steps = sdo.download(0x2000, 1, data)
+    request = next(steps)
+    received = bytearray()
+    try:
+        while True:
+            assert request is not None
+            if request[0] & 0xE0 == 0x20:
+                if request[0] & 2:
+                    received += request[4 : 8 - (request[0] >> 2 & 3)]
+                request = steps.send(b"\x60\x00\x20\x01" + bytes(4))
+            else:
+                received += request[1 : 8 - (request[0] >> 1 & 7)]
+                request = steps.send(bytes([0x20 | request[0] & 0x10]) + bytes(7))
+    except StopIteration:
+        assert bytes(received) == data
+
+
+@given(st.lists(st.binary(min_size=8, max_size=8), max_size=12))
+def test_garbage_never_breaks_a_transfer_otherwise_than_it_says(responses: list[bytes]) -> None:
+    for steps in (sdo.upload(0x6064, 0), sdo.download(0x2000, 1, bytes(20))):
+        try:
+            next(steps)
+            for response in responses:
+                steps.send(response)
+        except (StopIteration, sdo.SdoAborted, sdo.SdoProtocolError):
+            continue

@@ -1,0 +1,134 @@
+"""The socketcand client: its parser at every split, and its words for a server that is not in order."""
+
+import contextlib
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.bus.frames import EXTENDED, Frame
+from drivers.bus.socketcand import MAX_PENDING, SocketcandParser, SocketcandTransport, frame_of, send_message
+from drivers.errors import Unavailable
+
+STREAM = (
+    "< frame 181 1234.5 0102030405060708 >< frame 1FFFFFFF 0.0 AA >< error 20000004 1.0 >< frame 702 1.0 05 >"
+)
+
+
+@pytest.mark.parametrize("split", range(len(STREAM) + 1))
+def test_messages_survive_every_split(split: int) -> None:
+    parser = SocketcandParser()
+    messages = parser.feed(STREAM[:split]) + parser.feed(STREAM[split:])
+    frames = [frame_of(message, 7) for message in messages]
+    assert frames == [
+        (7, 0x181, bytes.fromhex("0102030405060708")),
+        (7, 0x1FFFFFFF | EXTENDED, b"\xaa"),
+        None,
+        (7, 0x702, b"\x05"),
+    ]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "",
+        " frame",
+        " frame 181",
+        " frame xyz 1.0 01",
+        " frame 181 1.0 0",
+        " frame 181 1.0 010203040506070809",
+    ],
+)
+def test_a_damaged_message_is_no_frame(message: str) -> None:
+    assert frame_of(message, 0) is None
+
+
+def test_a_frame_without_data_is_a_frame() -> None:
+    assert frame_of(" frame 080 1.0 ", 3) == (3, 0x80, b"")
+
+
+@given(st.text(max_size=200))
+def test_garbage_costs_only_itself(garbage: str) -> None:
+    parser = SocketcandParser()
+    parser.feed(garbage)
+    messages = parser.feed("> < frame 181 1.0 01 >")
+    assert frame_of(messages[-1], 0) == (0, 0x181, b"\x01")
+
+
+def test_a_stream_without_an_end_is_bounded() -> None:
+    parser = SocketcandParser()
+    assert parser.feed("<" + "x" * 2 * MAX_PENDING) == []
+    assert parser.skipped == 1
+    assert parser.feed("< frame 181 1.0 01 >")
+
+
+def test_what_is_sent_is_what_the_protocol_says() -> None:
+    assert send_message(0x601, bytes([0x40, 0x41, 0x60, 0])) == "< send 601 4 40 41 60 00 >"
+    assert send_message(0x12345 | EXTENDED, b"") == "< send 00012345 0  >"
+
+
+@contextlib.contextmanager
+def server(*answers: bytes, then: bytes = b"", keep_open: bool = False) -> Iterator[int]:
+    """A server that gives one answer a request, the first at once; returns its port."""
+    done = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def serve() -> None:
+            connection, _ = listener.accept()
+            with connection:
+                for number, answer in enumerate(answers):
+                    if number:
+                        connection.recv(100)
+                    connection.sendall(answer)
+                connection.sendall(then)
+                if keep_open:
+                    done.wait(30)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield listener.getsockname()[1]
+        done.set()
+        thread.join()
+
+
+def receive(transport: SocketcandTransport) -> list[Frame]:
+    frames: list[Frame] = []
+    while not frames:
+        frames.extend(transport.receive(5.0))
+    return frames
+
+
+def test_a_frame_glued_to_the_handshake_is_not_lost() -> None:
+    with server(b"< hi >", b"< ok >", b"< ok >< frame 181 1.0 0102 >", keep_open=True) as port:
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        assert [frame[1:] for frame in receive(transport)] == [(0x181, b"\x01\x02")]
+        transport.close()
+
+
+def test_a_server_that_does_not_greet_is_named() -> None:
+    with server(b"< h", b"", keep_open=True) as port, pytest.raises(Unavailable, match="did not answer 'hi'"):
+        SocketcandTransport("127.0.0.1", port, "can0")
+
+
+def test_a_server_that_goes_is_noticed_at_once() -> None:
+    with server(b"< hi >", b"< ok >", b"< ok >") as port:
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        with pytest.raises(Unavailable, match="closed the connection"):
+            receive(transport)
+        transport.close()
+
+
+def test_a_refused_channel_is_told_in_the_servers_words() -> None:
+    words = b"< error could not open bus >"
+    with server(b"< hi >", words) as port, pytest.raises(Unavailable, match="'error could not open bus'"):
+        SocketcandTransport("127.0.0.1", port, "can9")
+
+
+def test_a_server_that_is_not_there_is_named() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as closed:
+        port = closed.getsockname()[1]
+    with pytest.raises(Unavailable, match=rf"nothing answers as socketcand at 127\.0\.0\.1:{port}"):
+        SocketcandTransport("127.0.0.1", port, "can0")
