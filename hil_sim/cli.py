@@ -14,8 +14,8 @@ from hil_sim.robot import SimulatedRobot
 
 _DESCRIPTION = """\
 A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen
-bus, two plantar-pressure insoles and a trunk IMU. A gateway, or any other program, meets it where it would meet
-a real robot: on a CAN bus and on serial ports.
+bus, two plantar-pressure insoles and a trunk IMU. A gateway, or any other program, meets it where it would
+meet a real robot: on a CAN bus and on serial ports.
 """
 
 _EPILOG = """\

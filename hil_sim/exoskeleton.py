@@ -90,7 +90,6 @@ class Exoskeleton:
         now_s = self.clock.now_s
         for drive, load in zip(self.drives.values(), self.wearer.joint_loads(now_s), strict=True):
             drive.joint.load = load
-            drive.advance()
         feet, trunk = self.wearer.feet(now_s), self.wearer.trunk()
         for name, insole, foot in zip(SENSORS, self._insoles, feet, strict=False):
             self._emit(name, insole.frame(foot, self.clock.now_ns // 1000))

@@ -127,8 +127,8 @@ live = true
 """
 
 _JOINT_PARAMETERS_NOTE = """
-# Per joint: the torque the drive may use at most (6072h, per mille of 40 N·m rated at the joint), and the speed
-# of its own moves in profile position mode (6081h, counts/s; 2π / 409 600 rad each).
+# Per joint: the most torque that the drive may use (6072h, per mille of 40 N·m rated at the joint), and the
+# speed of its own moves in profile position mode (6081h, counts/s; 2π / 409 600 rad each).
 """
 
 _JOINT_PARAMETERS = """

@@ -39,7 +39,7 @@ def _unread_by(peer: tuple[str, int], hub_port: int) -> bool:
 
 
 class _Client:
-    """One connection; `live` once frames may be sent to it."""
+    """One connection: `raw` once it wants frames, `held` while they wait for its "< ok >" to be read."""
 
     def __init__(self, connection: socket.socket, peer: tuple[str, int]) -> None:
         self.connection = connection
@@ -47,7 +47,8 @@ class _Client:
         self.messages = Messages()
         self.waiting = bytearray()
         self.blocked = False
-        self.live = False
+        self.raw = False
+        self.held = False
 
 
 class Hub:
@@ -118,21 +119,20 @@ class Hub:
             self._say(client, b"< ok >")
         elif command == b"rawmode":
             self._say(client, b"< ok >")
-            self._bus.clock.after(_PAUSE_NS, partial(self._go_live, client))
+            client.raw = client.held = True
+            self._bus.clock.after(_PAUSE_NS, partial(self._release, client))
         elif command == b"echo":
             self._say(client, b"< echo >")
         else:
             self.messages_refused += 1
-            if not client.live:
+            if not client.raw:
                 self._say(client, b"< error unknown command >")
 
-    def _go_live(self, client: _Client) -> None:
-        if client.connection not in self._clients:
-            return
-        if client.waiting or _unread_by(client.peer, self.port):
-            self._bus.clock.after(_PAUSE_NS, partial(self._go_live, client))
+    def _release(self, client: _Client) -> None:
+        if client.connection in self._clients and _unread_by(client.peer, self.port):
+            self._bus.clock.after(_PAUSE_NS, partial(self._release, client))
         else:
-            client.live = True
+            client.held = False
 
     def _drop(self, client: _Client) -> None:
         if self._clients.pop(client.connection, None) is not None:
@@ -146,21 +146,22 @@ class Hub:
             return
         message = b""
         for client in self._clients.values():
-            if client.live and client is not sender:
+            if client.raw and client is not sender:
                 message = message or frame_message(frame, self._epoch_s + self._bus.clock.now_s)
                 client.waiting += message
 
     def _say(self, client: _Client, message: bytes) -> None:
         client.waiting += message
-        self._write(client)
+        if not client.held:
+            self._write(client)
 
     def _flush(self) -> None:
         for client in tuple(self._clients.values()):
+            if client.waiting and not (client.blocked or client.held):
+                self._write(client)
             if len(client.waiting) > _BACKLOG_BYTES:
                 self.clients_cut += 1
                 self._drop(client)
-            elif client.waiting and not client.blocked:
-                self._write(client)
 
     def _write(self, client: _Client) -> None:
         try:

@@ -18,6 +18,8 @@ def frame_message(frame: Frame, stamp_s: float) -> bytes:
 
 def parse_send(words: list[bytes]) -> Frame | None:
     """The frame in `send ID LENGTH BYTE…`, `None` if that is not what it is."""
+    if not all(word.isalnum() for word in words):  # what int() would take beyond digits
+        return None
     try:
         identifier, length, *data = words[1:]
         frame = Frame(

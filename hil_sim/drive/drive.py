@@ -16,6 +16,7 @@ from hil_sim.node.nmt import NmtState
 from hil_sim.node.node import Node
 
 STEP_NS = round(STEP_S * 1e9)
+_TICK_NS = 5 * STEP_NS  # the joint is where it is now at each SYNC, and at least this often
 
 FOLLOWING_ERROR = 0x8611  # error codes of CiA 402-2 table 17 and CiA 301
 MOTOR_TEMPERATURE = 0x4310
@@ -119,6 +120,7 @@ class JointDrive(Node):
         self._targeted = False  # a target has come since the drive was enabled
         self._bind()
         self._take_constants()
+        clock.every(_TICK_NS, self.advance)
 
     # -- objects ---------------------------------------------------------------------------------------
 

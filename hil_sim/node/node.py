@@ -44,6 +44,7 @@ class Node:
         self._handlers: dict[int, Callable[[Frame], None]] = {}
         self._boots = 0
         pdo.guard_configuration(self.dictionary, self._configure_soon)
+        self._reconfigure_on_write()
 
     # -- power -----------------------------------------------------------------------------------------
 
@@ -137,6 +138,12 @@ class Node:
         self._emergencies.end_all()
 
     # -- configuration from the dictionary ---------------------------------------------------------------
+
+    def _reconfigure_on_write(self) -> None:
+        """SYNC and SDO channels listen where their objects say, from the moment that is written."""
+        servers = [self.dictionary.members(index)[1:3] for index in self.dictionary.indices(*SDO_SERVERS)]
+        for entry in (self.dictionary[SYNC], *(entry for server in servers for entry in server)):
+            entry.on_write = lambda _: self._configure_soon()
 
     def _configure_soon(self) -> None:
         """Configure when the write that asked for it has been taken into the dictionary."""

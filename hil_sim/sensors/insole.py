@@ -22,7 +22,7 @@ ADC_BITS = 16
 UNIT_PA = 100.0  # 0.1 kPa
 FULL_SCALE = 0xFFFF
 
-_SPREAD_X, _SPREAD_Y = 0.055, 0.030  # m, how far the load spreads around the centre of pressure
+_SPREAD_X, _SPREAD_Y = 0.045, 0.030  # m, how far the load spreads around the centre of pressure
 _NOISE_SHARE = 0.01
 _NOISE_COUNTS = 0.6
 

@@ -1,0 +1,101 @@
+"""`gwrms sim` as a process."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hil_sim.cli import main
+
+
+@contextmanager
+def sim(folder: Path, *arguments: str) -> Iterator[tuple["subprocess.Popen[str]", Path]]:
+    command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(folder), *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            ready = json.loads(process.stdout.readline())
+            assert ready["ready"] is True
+            yield process, Path(ready["config"])
+        finally:
+            process.kill()
+
+
+def hub_port(folder: Path) -> int:
+    return int((folder / "hub.port").read_text(encoding="ascii"))
+
+
+def test_it_says_ready_and_ends_cleanly_on_sigterm(tmp_path: Path) -> None:
+    with sim(tmp_path / "robot") as (process, config):
+        assert config == tmp_path / "robot" / "robot.toml"
+        assert config.is_file()
+        socket.create_connection(("127.0.0.1", hub_port(config.parent)), timeout=20).close()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20) == 0
+    assert not (config.parent / "trunk").is_symlink()
+
+
+def test_it_runs_as_long_as_it_is_told(tmp_path: Path) -> None:
+    with sim(tmp_path, "--seconds", "0.5", "--scenario", "stand") as (process, _):
+        assert process.wait(20) == 0
+
+
+def test_after_kill_9_the_same_folder_has_the_same_port_and_paths(tmp_path: Path) -> None:
+    with sim(tmp_path) as (process, _):
+        port = hub_port(tmp_path)
+        client = socket.create_connection(("127.0.0.1", port), timeout=20)
+        assert client.recv(6) == b"< hi >"
+        process.send_signal(signal.SIGKILL)
+        process.wait(20)
+    assert (tmp_path / "trunk").is_symlink()
+    with client, sim(tmp_path):
+        assert hub_port(tmp_path) == port
+        os.close(os.open(tmp_path / "trunk", os.O_RDWR | os.O_NOCTTY))
+
+
+def test_a_second_simulator_in_the_folder_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    with sim(tmp_path):
+        command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(tmp_path)]
+        second = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert second.returncode == 1
+    assert second.stdout == ""
+    assert second.stderr.strip() == (
+        f"gwrms sim: another simulator is running in {tmp_path}; stop it first, or choose another --dir"
+    )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["--dir"],
+        ["--dir", "x", "--scenario", "fly"],
+        ["--dir", "x", "--seconds", "-1"],
+        ["--dir", "x", "--seed", "y"],
+    ],
+)
+def test_wrong_usage_is_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert "usage: gwrms sim" in capsys.readouterr().err
+
+
+def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    for word in ("robot.toml", "walk", "sit", "2001h", "Exit code", "example"):
+        assert word in text
+
+
+def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="ascii")
+    command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(tmp_path / "file" / "robot")]
+    failed = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert failed.returncode == 1
+    assert str(tmp_path / "file" / "robot") in failed.stderr
