@@ -91,10 +91,11 @@ class Child:
         deadline = time.monotonic() + within_s
         while True:
             meanwhile()
-            self.check()
+            ended = self._listen()
             for line in self._out.lines():
                 if (found := find(line)) is not None:
                     return found
+            self._raise_if(ended)
             left_s = deadline - time.monotonic()
             if left_s <= 0:
                 raise ChildFailed(f"the {self.name} is not ready after {within_s:g} s. {self.last_words()}")
@@ -107,16 +108,16 @@ class Child:
             ChildFailed: it has ended.
 
         """
-        ended = self._process.poll()
-        self._out.drain()
-        self._err.drain()
-        if ended is not None:
-            raise ChildFailed(f"the {self.name} has ended ({_exit(ended)}). {self.last_words()}")
+        self._raise_if(self._listen())
 
     def last_words(self) -> str:
         """The end of what it wrote to stderr."""
         lines = self._err.lines()[-LAST_LINES:]
-        return "It said last:\n" + "\n".join(f"  {line}" for line in lines) if lines else "It said nothing."
+        return (
+            "It said last:\n" + "\n".join(f"  {line}" for line in lines)
+            if lines
+            else "It wrote nothing to stderr."
+        )
 
     def end(self) -> None:
         """End it and wait. Idempotent."""
@@ -130,12 +131,21 @@ class Child:
         self._out.close()
         self._err.close()
 
+    def _listen(self) -> int | None:
+        """Its exit status, None while it lives; whatever it wrote until then is held."""
+        ended = self._process.poll()
+        self._out.drain()
+        self._err.drain()
+        return ended
+
+    def _raise_if(self, ended: int | None) -> None:
+        if ended is not None:
+            raise ChildFailed(f"the {self.name} has ended ({_exit(ended)}). {self.last_words()}")
+
     def _wait(self, within_s: float) -> None:
         # It may still have something to say, and would wait for us to hear it.
         deadline = time.monotonic() + within_s
-        while self._process.poll() is None:
-            self._out.drain()
-            self._err.drain()
+        while self._listen() is None:
             left_s = deadline - time.monotonic()
             try:
                 self._process.wait(max(MIN_WAIT_S, min(left_s, 0.05)))

@@ -57,7 +57,8 @@ class Controls:
         return self._write is not None and not self._write.done()
 
     def press(self, key: Key) -> None:
-        """Do what a key stands for."""
+        """Do what a key stands for; what a STOP came to is shown until the next key."""
+        self.stop_sent = key is Key.STOP
         self._does[key]()
 
     def _move(self, by: int) -> None:
@@ -85,7 +86,6 @@ class Controls:
         return next((info for info in known if info.name == name), None)
 
     def _stop(self) -> None:
-        self.stop_sent = True
         self._robot.last_stop = None
         self._commands.stop("STOP key of the dashboard")
 

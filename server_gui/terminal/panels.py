@@ -74,7 +74,7 @@ def joints(robot: Robot) -> RenderableType:
     grid.add_column("joint", no_wrap=True)
     grid.add_column("drive", no_wrap=True)
     grid.add_column("angle", justify="right", no_wrap=True, min_width=7)
-    grid.add_column("−30°     0°             75°", no_wrap=True)
+    grid.add_column("−30°    0°               75°", no_wrap=True)
     grid.add_column("last seconds", no_wrap=True, width=SPARK_WIDTH)
     for name in robot.names("joint"):
         channel = f"{name}.position"

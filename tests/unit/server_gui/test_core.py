@@ -1,0 +1,265 @@
+"""The server's core without a screen: events in, state out."""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from gateway.client import Address, Batch, ConnectionState
+from server_gui.core.events import STOP, Event, Failed, LinkChanged, Telemetry
+from server_gui.core.feed import Feed
+from server_gui.core.mailbox import Mailbox
+from server_gui.core.network import Network
+from server_gui.core.robot import HISTORY_ROWS, Robot
+from server_gui.core.summary import Summary
+from tests.fake_robot import FakeRobot
+
+SECOND_NS = 1_000_000_000
+
+
+def batch(columns: dict[str, list[float | None]], at_ns: int = 0, dropped: int = 0, missed: int = 0) -> Batch:
+    rows = len(next(iter(columns.values()), []))
+    return Batch(list(range(rows)), columns, 0, dropped, missed, 1, at_ns)
+
+
+def telemetry(
+    columns: dict[str, list[float | None]], at_ns: int = 0, dropped: int = 0, missed: int = 0
+) -> Telemetry:
+    return Telemetry(batch(columns, at_ns, dropped, missed), age_ns=0)
+
+
+# --- state
+
+
+def test_newest_row_wins_and_null_replaces_a_number() -> None:
+    robot = Robot()
+    robot.apply(telemetry({"a": [1.0, 2.0]}))
+    assert robot.values == {"a": 2.0}
+    robot.apply(telemetry({"a": [3.0, None]}))
+    assert robot.values == {"a": None}
+
+
+def test_history_is_bounded() -> None:
+    robot = Robot()
+    robot.apply(telemetry({"a": [float(i) for i in range(3 * HISTORY_ROWS)]}))
+    assert len(robot.history["a"]) == HISTORY_ROWS
+    assert robot.history["a"][-1] == 3 * HISTORY_ROWS - 1
+
+
+def test_values_are_stale_half_a_second_after_they_were_taken() -> None:
+    robot = Robot()
+    assert robot.is_stale(0)
+    assert robot.age_s(0) is None
+    robot.apply(Telemetry(batch({"a": [1.0]}, at_ns=10 * SECOND_NS), age_ns=SECOND_NS // 10))
+    assert not robot.is_stale(10 * SECOND_NS)
+    assert robot.age_s(10 * SECOND_NS) == pytest.approx(0.1)
+    assert robot.is_stale(10 * SECOND_NS + SECOND_NS // 2)
+
+
+def test_rate_counts_the_rows_of_the_last_two_seconds() -> None:
+    robot = Robot()
+    for second in range(10):
+        robot.apply(telemetry({"a": [0.0] * 50}, at_ns=second * SECOND_NS))
+    assert robot.rate_hz(9 * SECOND_NS + 1) == 50.0
+    assert robot.rate_hz(20 * SECOND_NS) == 0.0
+
+
+def test_losses_add_up_over_links() -> None:
+    robot = Robot()
+    robot.apply(telemetry({"a": [1.0]}, dropped=5, missed=1))
+    robot.apply(telemetry({"a": [1.0]}, dropped=7))
+    robot.apply(telemetry({"a": [1.0]}, dropped=0))
+    robot.apply(telemetry({"a": [1.0]}, dropped=2))
+    assert (robot.link.dropped, robot.link.missed) == (9, 1)
+
+
+def test_failed_stop_is_the_last_word_on_the_stop() -> None:
+    robot = Robot()
+    robot.apply(Failed(STOP, "no link"))
+    assert robot.last_stop == Failed(STOP, "no link")
+    assert robot.last_failure is None
+
+
+def test_link_says_why_it_is_down() -> None:
+    robot = Robot()
+    robot.apply(LinkChanged(ConnectionState.CONNECTED, None, 1))
+    robot.apply(LinkChanged(ConnectionState.WAITING, "closed", 2))
+    assert (robot.link.state, robot.link.problem, robot.link.links) == (ConnectionState.WAITING, "closed", 1)
+
+
+# --- mailbox
+
+
+def test_telemetry_never_pushes_out_what_is_rare() -> None:
+    mailbox = Mailbox(telemetry_depth=2)
+    mailbox.put(Failed("x", "y"))
+    for value in range(5):
+        mailbox.put(telemetry({"a": [float(value)]}))
+    events = mailbox.drain()
+    assert events[0] == Failed("x", "y")
+    assert [event.batch.columns["a"] for event in events if isinstance(event, Telemetry)] == [[3.0], [4.0]]
+    assert mailbox.drain() == []
+
+
+# --- summary
+
+
+def walk(summary: Summary, turns: int) -> None:
+    for turn in range(turns):
+        left, right = (700.0, 0.0) if turn % 2 else (0.0, 700.0)
+        forces: dict[str, list[float | None]] = {"left.force": [left], "right.force": [right]}
+        summary.take(batch({**forces, "knee.position": [0.5 * turn]}))
+
+
+def test_walk_has_no_failures() -> None:
+    summary = Summary.of(["knee"], ["left", "right"])
+    walk(summary, 6)
+    summary.see("knee", "ok")
+    assert summary.failures() == []
+    assert summary.alternations == 5
+    assert summary.feet["left"].loaded_share == pytest.approx(0.5)
+
+
+def test_joint_that_stands_still_is_named() -> None:
+    summary = Summary.of(["knee", "hip"], ["left", "right"])
+    walk(summary, 6)
+    assert summary.failures() == ["did not move: hip"]
+
+
+def test_standing_on_both_feet_is_no_walk() -> None:
+    summary = Summary.of(["knee"], ["left", "right"])
+    for value in range(10):
+        summary.take(batch({"left.force": [400.0], "right.force": [350.0], "knee.position": [float(value)]}))
+    assert summary.failures() == ["the feet did not alternate"]
+
+
+def test_component_that_was_lost_once_is_named_also_when_it_came_back() -> None:
+    summary = Summary.of(["knee"], ["left", "right"])
+    walk(summary, 6)
+    for state in ("ok", "lost", "stale", "ok"):
+        summary.see("trunk", state)
+    assert summary.failures() == ["lost: trunk"]
+
+
+def test_missing_values_count_for_nothing() -> None:
+    summary = Summary.of(["knee"], ["left", "right"])
+    summary.take(batch({"left.force": [None], "right.force": [700.0], "knee.position": [None]}))
+    assert summary.joints["knee"].low is None
+    assert summary.feet["left"].loaded_share is None
+
+
+# --- feed, against a gateway that speaks the contract
+
+
+class Watcher:
+    """A robot's state, kept up to date in the test's own thread."""
+
+    def __init__(self, fake: FakeRobot, network: Network) -> None:
+        self.robot = Robot()
+        self.events: list[Event] = []
+        self._mailbox = Mailbox()
+        self.feed = Feed(
+            Address.parse(fake.address), self._mailbox.put, ("*.position", "*.state"), ("gait.*",)
+        )
+        self.following = network.run(self.feed.run())
+
+    def until(self, condition: Callable[[], object]) -> None:
+        deadline = time.monotonic() + 30
+        while not condition():
+            assert time.monotonic() < deadline, self.events[-5:]
+            assert not self.following.done()
+            for event in self._mailbox.drain():
+                self.events.append(event)
+                self.robot.apply(event)
+            time.sleep(0.005)
+
+
+@pytest.fixture
+def fake() -> Iterator[FakeRobot]:
+    with FakeRobot() as fake:
+        yield fake
+
+
+@pytest.fixture
+def network() -> Iterator[Network]:
+    with Network() as network:
+        yield network
+
+
+def test_feed_tells_what_the_robot_is_and_does(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    robot = watcher.robot
+    watcher.until(lambda: robot.values and robot.resources and robot.parameters)
+    assert robot.word("left_knee.state") == "OPERATION ENABLED"
+    assert set(robot.parameters) == {"gait.step_length", "gait.cycle_time"}
+    assert "left_insole.force" not in robot.values
+    assert robot.names("insole") == ["left_insole", "right_insole"]
+    assert not robot.is_stale()
+    assert robot.not_ok() == []
+
+
+def test_feed_goes_on_after_the_link_came_back(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: watcher.robot.values)
+    fake.refuse()
+    watcher.until(watcher.robot.is_stale)
+    assert watcher.robot.link.problem is not None
+    fake.boot_id = "boot-2"
+    fake.listen()
+    watcher.until(lambda: not watcher.robot.is_stale())
+    assert watcher.robot.link.links == 2
+    assert watcher.robot.description is not None
+    assert watcher.robot.description.boot_id == "boot-2"
+
+
+def test_lost_component_is_named_with_its_reason(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: watcher.robot.values.get("left_knee.position") is not None)
+    fake.lost.add("left_knee")
+    watcher.until(watcher.robot.not_ok)
+    (part,) = watcher.robot.not_ok()
+    assert (part.name, part.state, part.problem) == ("left_knee", "lost", "no heartbeat; check its cable")
+    watcher.until(lambda: watcher.robot.values["left_knee.position"] is None)
+
+
+def test_write_is_told_and_seen_in_the_parameters(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: watcher.robot.parameters)
+    network.run(watcher.feed.write({"gait.step_length": 0.45})).result(30)
+    watcher.until(lambda: watcher.robot.last_change)
+    watcher.until(lambda: watcher.robot.parameters["gait.step_length"].value == 0.45)
+
+
+def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: watcher.robot.parameters)
+    network.run(watcher.feed.write({"gait.step_length": 9.0})).result(30)
+    watcher.until(lambda: watcher.robot.last_failure)
+    assert "above 0.6" in str(watcher.robot.last_failure)
+
+
+def test_stop_without_a_link_is_told_as_failed(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: watcher.robot.values)
+    fake.refuse()
+    watcher.until(watcher.robot.is_stale)
+    network.run(watcher.feed.stop("test")).result(30)
+    watcher.until(lambda: isinstance(watcher.robot.last_stop, Failed))
+    assert fake.called("robot.stop") == []
+
+
+def test_network_joins_its_thread_with_work_under_way(fake: FakeRobot) -> None:
+    with Network() as network:
+        watcher = Watcher(fake, network)
+        watcher.until(lambda: watcher.robot.values)
+    assert "network" not in {thread.name for thread in threading.enumerate()}
+    assert watcher.following.done()
+
+
+def test_age_counts_the_robots_own_delay(fake: FakeRobot, network: Network) -> None:
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: any(isinstance(event, Telemetry) for event in watcher.events))
+    ages = [event.age_ns for event in watcher.events if isinstance(event, Telemetry)]
+    assert all(age is not None and 0 <= age < 30 * SECOND_NS and math.isfinite(age) for age in ages)
