@@ -46,7 +46,10 @@ class FakeNode:
         self.bus.shutdown()
 
     def send(self, can_id: int, data: bytes) -> None:
-        self.bus.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))
+        self.send_message(can_id, data, extended=False)
+
+    def send_message(self, can_id: int, data: bytes, *, extended: bool) -> None:
+        self.bus.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=extended))
 
     def boot_up(self) -> None:
         self.send(0x700 + self.node_id, b"\x00")

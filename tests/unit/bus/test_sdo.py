@@ -1,6 +1,6 @@
 """SDO transfers, byte by byte as CiA 301 §7.2.4 draws them."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from typing import Any
 
 import pytest
@@ -12,7 +12,7 @@ from drivers.bus import sdo
 Steps = Generator[bytes | None, bytes, Any]
 
 
-def play(steps: Steps, dialogue: list[tuple[str | None, str]]) -> object:
+def play(steps: Steps, dialogue: Sequence[tuple[str | None, str]]) -> object:
     """Send each response after checking the request before it; returns the transfer's result."""
     request = next(steps)
     for expected, response in dialogue:

@@ -1,0 +1,91 @@
+"""A drive described by an EDS of the test's own, played by a fake node."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import eds
+from drivers.bus.bus import CanBus
+from drivers.bus.settings import CanSettings
+from drivers.joint.drive import JointDrive
+from drivers.joint.settings import JointSettings
+
+Objects = dict[tuple[int, int], bytes]
+
+# index, data type, bytes, value
+AXIS = (
+    (0x603F, 6, 2, 0),
+    (0x6040, 6, 2, 0),
+    (0x6041, 6, 2, 0x0040),
+    (0x6061, 2, 1, 8),
+    (0x6064, 4, 4, 0),
+    (0x606C, 4, 4, 0),
+    (0x6077, 3, 2, 0),
+    (0x605A, 3, 2, 2),
+    (0x6076, 7, 4, 400),
+)
+COMMON = (
+    (0x1000, 7, 4, 0x00020192),
+    (0x6007, 3, 2, 1),
+)
+
+
+def drive_objects(axes: int = 1) -> Objects:
+    """Every object of a drive with its value."""
+    objects = {(index, 0): value.to_bytes(size, "little") for index, _, size, value in COMMON}
+    for axis in range(axes):
+        objects |= {
+            (index + axis * 0x800, 0): value.to_bytes(size, "little") for index, _, size, value in AXIS
+        }
+    return objects
+
+
+def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 255) -> Objects:
+    """Communication and mapping parameter of one TPDO; `mapped` as in 1A00h."""
+    objects = {
+        (0x1800 + number - 1, 1): cob_id.to_bytes(4, "little"),
+        (0x1800 + number - 1, 2): bytes([transmission_type]),
+        (0x1A00 + number - 1, 0): bytes([len(mapped)]),
+    }
+    for subindex, entry in enumerate(mapped, start=1):
+        objects[0x1A00 + number - 1, subindex] = entry.to_bytes(4, "little")
+    return objects
+
+
+def drive_eds(objects: Objects) -> str:
+    """An EDS of exactly these objects."""
+    types = {index: data_type for index, data_type, _, _ in COMMON} | {
+        index + axis * 0x800: data_type for index, data_type, _, _ in AXIS for axis in range(8)
+    }
+    sections = []
+    for index, subindex in sorted(objects):
+        name = f"{index:04X}" if index in types else f"{index:04X}sub{subindex}"
+        data_type = types.get(index, 7 if len(objects[index, subindex]) == 4 else 5)
+        sections.append(f"[{name}]\nParameterName={name}\nDataType={data_type}\nAccessType=rw\n")
+    return "\n".join(sections)
+
+
+@pytest.fixture
+def channel(request: pytest.FixtureRequest) -> str:
+    return str(request.node.nodeid)
+
+
+@pytest.fixture
+def bus(channel: str) -> CanBus:
+    return CanBus("main", CanSettings(interface="virtual", channel=channel))
+
+
+@pytest.fixture
+def joint(bus: CanBus, tmp_path: Path) -> Callable[..., JointDrive]:
+    """Make a joint for a drive with `objects`, node id 2."""
+
+    def make(objects: Objects, name: str = "left_knee", **more: Any) -> JointDrive:
+        path = tmp_path / "drive.eds"
+        path.write_text(drive_eds(objects))
+        table: dict[str, Any] = {"counts_per_revolution": 1000, "gear_ratio": 1, "sdo_timeout_s": 0.2, **more}
+        settings = JointSettings(bus="main", node_id=2, eds="drive.eds", **table)
+        return JointDrive(name, settings, bus, eds.load(path, 2))
+
+    return make
