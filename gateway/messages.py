@@ -110,24 +110,26 @@ class Clock(Struct, frozen=True):
     boot_id: str
 
 
-class ComponentInfo(Struct, frozen=True, omit_defaults=True):
+class ComponentInfo(Struct, frozen=True):
     """One component of `robot.describe`; `problem` says in words what is wrong."""
 
     name: str
     kind: str
     state: str
     problem: str | None = None
-    device: dict[str, str | int] | None = None  # vendor, product, file and findings, where it has an EDS
+    device: dict[str, str | int] | UnsetType = (
+        UNSET  # what its EDS says
+    )
 
 
-class ChannelInfo(Struct, frozen=True, omit_defaults=True):
+class ChannelInfo(Struct, frozen=True):
     """One channel of `robot.describe`; `enum` gives a state's numbers their words."""
 
     name: str
-    unit: str = ""
-    component: str = ""
-    quantity: str = ""
-    enum: dict[str, str] | None = None
+    unit: str
+    component: str
+    quantity: str
+    enum: dict[str, str] | UnsetType = UNSET
 
 
 class ParameterInfo(Struct, frozen=True):

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from msgspec import UNSET
+
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
 from gateway.messages import ChannelInfo
@@ -92,5 +94,5 @@ def check_globs(
 
 def channel_info(channel: Channel) -> ChannelInfo:
     """A channel as `robot.describe` shows it; JSON's keys are text."""
-    enum = None if channel.enum is None else {str(number): word for number, word in channel.enum.items()}
+    enum = UNSET if channel.enum is None else {str(number): word for number, word in channel.enum.items()}
     return ChannelInfo(channel.name, channel.unit, channel.component, channel.quantity, enum)

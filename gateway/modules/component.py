@@ -9,6 +9,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from msgspec import UNSET
+
 from drivers.component import Component
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel, State
@@ -54,7 +56,7 @@ class ComponentModule:
         self.robot = Robot()
         self._context = context
         self._warm_ns = 0
-        self._waiting: list[tuple[frozenset[str], Future[None]]] = []
+        self._waiting: list[tuple[Callable[[], bool], Future[None]]] = []
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"component.snapshot": self._snapshot}
 
     def start(self) -> None:
@@ -90,15 +92,14 @@ class ComponentModule:
         return [whole(ComponentSource(one)) for one in self.robot.components.values() if one.channels]
 
     def when_ready(self, names: Iterable[str]) -> "Future[None]":
-        """Done when these components have given their first values, or the time for a cold start is over."""
-        wanted = frozenset(names)
-        if self._is_ready(wanted):
-            return done(None)
-        future: Future[None] = Future()
-        self._waiting.append((wanted, future))
-        if len(self._waiting) == 1:
-            self._context.loop.call_later(LOOK_S, self._look)
-        return future
+        """Done when these components are there, or the time for a cold start is over."""
+        wanted = tuple(names)
+        return self._when(lambda: all(self._is_there(name) for name in wanted))
+
+    def when_known(self, selections: Iterable[Selection]) -> "Future[None]":
+        """Done when these channels have had their first values, or the time for a cold start is over."""
+        wanted = tuple(selections)
+        return self._when(lambda: all(map(_has_values, wanted)))
 
     def read(self, selections: Iterable[Selection]) -> Snapshot:
         """The values now, and the quality of their components."""
@@ -136,7 +137,7 @@ class ComponentModule:
         for name, kind in kinds.items():
             quality = self.quality(name, now_ns)
             description = self.robot.descriptions.get(name)
-            device = None if description is None else dict(facts(description))
+            device = UNSET if description is None else dict(facts(description))
             problem = quality["problem"]
             found.append(
                 ComponentInfo(
@@ -153,7 +154,7 @@ class ComponentModule:
         names = [name for one in selections for name in one.names]
         check_globs("channel", names, params.channels, self.absent)
         chosen = narrow(selections, params.channels)
-        ready = self.when_ready(one.source.name for one in chosen)
+        ready = self.when_known(chosen)
         return then(ready, lambda _none: self._answer(chosen, everything=params.channels is None))
 
     def _answer(self, chosen: list[Selection], *, everything: bool) -> Snapshot:
@@ -164,22 +165,31 @@ class ComponentModule:
                 snapshot.quality.setdefault(name, self.quality(name, now_ns))
         return snapshot
 
-    def _is_ready(self, names: frozenset[str]) -> bool:
-        now_ns = time.monotonic_ns()
-        return now_ns >= self._warm_ns or all(self._has_begun(name, now_ns) for name in names)
-
-    def _has_begun(self, name: str, now_ns: int) -> bool:
+    def _is_there(self, name: str) -> bool:
         component = self.robot.components.get(name)
-        if component is None or component.latest.updated_ns is not None:
-            return True
-        return not component.channels and component.quality(now_ns).state is State.OK
+        return component is None or component.quality(time.monotonic_ns()).state is not State.LOST
+
+    def _when(self, ready: Callable[[], bool]) -> "Future[None]":
+        if self._is_warm() or ready():
+            return done(None)
+        future: Future[None] = Future()
+        self._waiting.append((ready, future))
+        if len(self._waiting) == 1:
+            self._context.loop.call_later(LOOK_S, self._look)
+        return future
+
+    def _is_warm(self) -> bool:
+        return time.monotonic_ns() >= self._warm_ns
 
     def _look(self) -> None:
-        waiting, self._waiting = self._waiting, []
-        for wanted, future in waiting:
-            if self._is_ready(wanted):
-                future.set_result(None)
-            else:
-                self._waiting.append((wanted, future))
+        over = [future for ready, future in self._waiting if self._is_warm() or ready()]
+        self._waiting = [(ready, future) for ready, future in self._waiting if future not in over]
         if self._waiting:
             self._context.loop.call_later(LOOK_S, self._look)
+        for future in over:  # last, because whoever waited may begin to wait for something else
+            future.set_result(None)
+
+
+def _has_values(selection: Selection) -> bool:
+    latest, now_ns = selection.source.latest, time.monotonic_ns()
+    return all(latest.read(index, now_ns)[1] is not None for index in selection.indices)

@@ -53,7 +53,7 @@ class StatusModule:
 
     def _snapshot(self, session: "Session", _params: Params) -> "Answer":
         chosen = self._components()
-        ready = self._component.when_ready(one.source.name for one in chosen)
+        ready = self._component.when_known(chosen)
         return then(ready, lambda _none: self._answer(session, chosen))
 
     def _answer(self, session: "Session", chosen: list[Selection]) -> Snapshot:

@@ -1,0 +1,349 @@
+"""A daemon in a thread, a blocking client that knows nothing of ours, and components from the manual."""
+
+import contextlib
+import json
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import pytest
+
+import eds
+from drivers.component import Component, Kind
+from drivers.errors import DeviceAbort
+from drivers.joint.quick_stop import StopOutcome
+from drivers.latest import Latest
+from drivers.samples import Channel, Quality, State
+from gateway.config import RobotConfig, load
+from gateway.daemon import Daemon, listen
+from gateway.modules.assembly import Robot
+
+DEADLINE_S = 20.0
+Bytes = dict[tuple[int, int], bytes]
+
+
+class Answered(Exception):
+    """An error that the gateway answered."""
+
+    def __init__(self, error: dict[str, Any]) -> None:
+        super().__init__(error["message"])
+        self.code: int = error["code"]
+        self.data: dict[str, Any] = error.get("data", {})
+        self.kind: str | None = self.data.get("kind")
+
+
+class Client:
+    """One connection; notifications are kept apart from answers."""
+
+    def __init__(self, address: tuple[str, int]) -> None:
+        self.socket = socket.create_connection(address, timeout=DEADLINE_S)
+        self.notifications: deque[dict[str, Any]] = deque()
+        self._answers: dict[Any, dict[str, Any]] = {}
+        self._reader = self.socket.makefile("rb")
+        self._id = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._reader.close()
+        self.socket.close()
+
+    def send(self, data: bytes) -> None:
+        self.socket.sendall(data)
+
+    def request(self, method: str, **params: Any) -> int:
+        """Send without waiting; returns the id."""
+        self._id += 1
+        message = {"jsonrpc": "2.0", "id": self._id, "method": method, "params": params}
+        self.send(json.dumps(message).encode() + b"\n")
+        return self._id
+
+    def line(self) -> dict[str, Any] | None:
+        """The next line of any kind; `None` at the end."""
+        line = self._reader.readline()
+        return json.loads(line) if line else None
+
+    def answer(self, id_: Any) -> Any:
+        while id_ not in self._answers:
+            message = self.line()
+            if message is None:
+                raise ConnectionError("closed")
+            if "method" in message:
+                self.notifications.append(message)
+            else:
+                self._answers[message["id"]] = message
+        message = self._answers.pop(id_)
+        assert message["jsonrpc"] == "2.0"
+        if "error" in message:
+            raise Answered(message["error"])
+        return message["result"]
+
+    def call(self, method: str, **params: Any) -> Any:
+        return self.answer(self.request(method, **params))
+
+    def refused(self, method: str, **params: Any) -> Answered:
+        """The error that this call is answered with."""
+        with pytest.raises(Answered) as caught:
+            self.call(method, **params)
+        return caught.value
+
+    def data(self) -> dict[str, Any]:
+        """The next stream notification's parameters."""
+        while not self.notifications:
+            message = self.line()
+            assert message is not None
+            if "method" in message:
+                self.notifications.append(message)
+            else:
+                self._answers[message["id"]] = message
+        params: dict[str, Any] = self.notifications.popleft()["params"]
+        return params
+
+
+@contextlib.contextmanager
+def serving(config: RobotConfig, **options: Any) -> Iterator[tuple[str, int]]:
+    """A daemon in a thread; ends it and joins it."""
+    daemon = Daemon(config, listen("127.0.0.1", 0), **options)
+    ready = threading.Event()
+    thread = threading.Thread(target=daemon.run, args=(ready.set,), name="daemon")
+    address = daemon.address
+    thread.start()
+    try:
+        assert ready.wait(DEADLINE_S)
+        yield address
+    finally:
+        daemon.end()
+        thread.join(DEADLINE_S)
+        assert not thread.is_alive(), "the daemon did not end"
+
+
+def until(condition: Callable[[], object], what: str = "") -> None:
+    """Wait until something is so, for as long as a slow machine may need."""
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline, f"never: {what}"
+        time.sleep(0.005)
+
+
+class FakeNode:
+    """A device's objects, with the faults that a test wants."""
+
+    def __init__(self, objects: Bytes) -> None:
+        self.objects = dict(objects)
+        self.log: list[tuple[str, int, bytes | None]] = []
+        self.before_download: Callable[[int, bytes], None] = lambda index, data: None
+        self.before_upload: Callable[[int], None] = lambda index: None
+        self.store: Callable[[int, bytes], bytes] = lambda index, data: data
+
+    def upload(self, index: int, subindex: int) -> "Future[bytes]":
+        return self._do(lambda: self._upload(index, subindex))
+
+    def download(self, index: int, subindex: int, data: bytes) -> "Future[None]":
+        return self._do(lambda: self._download(index, subindex, data))
+
+    def written(self) -> list[tuple[int, bytes | None]]:
+        return [(index, data) for what, index, data in self.log if what == "download"]
+
+    def _upload(self, index: int, subindex: int) -> bytes:
+        self.log.append(("upload", index, None))
+        self.before_upload(index)
+        if (index, subindex) not in self.objects:
+            raise DeviceAbort(f"0x{index:04X}: no such object", 0x0602_0000)
+        return self.objects[index, subindex]
+
+    def _download(self, index: int, subindex: int, data: bytes) -> None:
+        self.log.append(("download", index, data))
+        self.before_download(index, data)
+        self.objects[index, subindex] = self.store(index, data)
+
+    @staticmethod
+    def _do(work: Callable[[], Any]) -> "Future[Any]":
+        future: Future[Any] = Future()
+        try:
+            future.set_result(work())
+        except Exception as error:  # noqa: BLE001 - a device's error is the future's
+            future.set_exception(error)
+        return future
+
+
+class FakeComponent:
+    """A component whose samples a test gives by hand."""
+
+    def __init__(
+        self,
+        name: str,
+        kind: Kind,
+        quantities: Sequence[str],
+        stale_after_s: float = 1000.0,
+        lost: str | None = None,
+    ) -> None:
+        self.name = name
+        self.kind = kind
+        self.channels = tuple(Channel(f"{name}.{quantity}", name, quantity, "rad") for quantity in quantities)
+        self.latest = Latest(name, self.channels, stale_after_s)
+        self.lost: str | None = None  # why it is not there
+        self.started = 0
+        self.stopped = 0
+        self.node = FakeNode({})
+
+    def start(self) -> None:
+        self.started += 1
+
+    def stop(self) -> None:
+        self.stopped += 1
+        self.latest.clear()
+
+    def give(self, *values: float | None, stamp_ns: int | None = None) -> None:
+        stamp_ns = time.monotonic_ns() if stamp_ns is None else stamp_ns
+        self.latest.update(stamp_ns, tuple(range(len(values))), values)
+
+    def quality(self, now_ns: int) -> Quality:
+        state = State.OK if self.lost is None else State.LOST
+        age_ns = self.latest.age_ns(now_ns)
+        return Quality(state, None if age_ns is None else age_ns / 1e6, self.lost, {"frames": 7})
+
+
+ENABLED, QUICK_STOPPED, DISABLED = (
+    0x1237,
+    0x1217,
+    0x1250,
+)  # statuswords (CiA 402-2)
+
+
+class FakeDrive(FakeComponent):
+    """A CiA 402 drive that stops when it is asked, unless told otherwise."""
+
+    def __init__(self, name: str, statusword: int = ENABLED) -> None:
+        super().__init__(name, Kind.JOINT, ["position", "statusword"])
+        self.reading = None
+        self.stops = 0
+        self.stopping = StopOutcome.CONFIRMED
+        self.hanging: Future[StopOutcome] | None = None
+        self.set_state(statusword)
+
+    def set_state(self, statusword: int) -> None:
+        self.node.objects[0x6041, 0] = statusword.to_bytes(2, "little")
+        self.give(0.5, statusword)
+
+    def start(self) -> None:
+        super().start()
+        self.set_state(int.from_bytes(self.node.objects[0x6041, 0], "little"))
+
+    def quick_stop(self) -> "Future[StopOutcome]":
+        self.stops += 1
+        if self.hanging is not None:
+            return self.hanging
+        if self.stopping is StopOutcome.CONFIRMED:
+            self.set_state(QUICK_STOPPED)
+        future: Future[StopOutcome] = Future()
+        future.set_result(self.stopping)
+        return future
+
+
+HEAD = """
+[robot]
+name = "exo-test"
+[gateway]
+port = 0
+linger_s = 0.05
+[can.main]
+interface = "virtual"
+channel = "unused"
+"""
+
+ROBOT = (
+    HEAD
+    + """
+[joint.left_knee]
+bus = "main"
+node_id = 2
+eds = "joint_drive.eds"
+counts_per_revolution = 4096
+gear_ratio = 100.0
+[joint.right_knee]
+bus = "main"
+node_id = 5
+eds = "joint_drive.eds"
+counts_per_revolution = 4096
+gear_ratio = 100.0
+[device.gait]
+bus = "main"
+node_id = 16
+eds = "gait_controller.eds"
+[insole.left_insole]
+port = "/dev/null-left"
+[parameter."gait.step_length"]
+object = "0x2001:0"
+unit = "m"
+scale = 0.001
+min = 0.25
+max = 0.60
+max_step = 0.10
+live = true
+[parameter."gait.cycle_time"]
+object = "0x2002:0"
+unit = "s"
+scale = 0.001
+live = true
+[parameter."gait.toe_height"]
+object = "0x2003:0"
+unit = "m"
+scale = 0.001
+[parameter."left_knee.max_torque"]
+object = "0x6072:0"
+unit = "%"
+scale = 0.1
+"""
+)
+
+
+def config(folder: Path, text: str = ROBOT) -> RobotConfig:
+    path = folder / "robot.toml"
+    path.write_text(text, encoding="utf-8")
+    return load(path)
+
+
+class Bench:
+    """The robot of `ROBOT` made of fakes."""
+
+    def __init__(self) -> None:
+        self.left = FakeDrive("left_knee")
+        self.right = FakeDrive("right_knee")
+        self.gait = FakeComponent("gait", Kind.DEVICE, [])
+        self.insole = FakeComponent("left_insole", Kind.INSOLE, ["force", "cop_x"])
+        self.gait.node.objects |= {
+            (0x2001, 0): (400).to_bytes(2, "little"),
+            (0x2002, 0): (1200).to_bytes(2, "little"),
+            (0x2003, 0): (80).to_bytes(2, "little"),
+        }
+        self.left.node.objects[0x6072, 0] = (1000).to_bytes(2, "little")
+        self.insole.give(300.0, None)
+        self.absent: dict[str, tuple[Kind, str]] = {}
+        self.assembled = 0
+
+    @property
+    def components(self) -> Mapping[str, Component]:
+        everything: list[Component] = [self.left, self.right, self.gait, self.insole]
+        return {one.name: one for one in everything if one.name not in self.absent}
+
+    def assemble(self, config: RobotConfig) -> Robot:
+        self.assembled += 1
+        files = {
+            "left_knee": "joint_drive.eds",
+            "right_knee": "joint_drive.eds",
+            "gait": "gait_controller.eds",
+        }
+        descriptions = {name: eds.load(eds.locate(file, None), 1) for name, file in files.items()}
+        return Robot({}, dict(self.components), descriptions, dict(self.absent))

@@ -1,0 +1,222 @@
+"""Snapshots and descriptions: values, stamps and quality; what is missing is null and named."""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from drivers.component import Kind
+from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving, until
+
+
+def test_a_snapshot_has_value_stamp_and_quality_of_every_channel(client: Client, bench: Bench) -> None:
+    answer = client.call("component.snapshot")
+    assert answer["values"] == {
+        "left_knee.position": 0.5,
+        "left_knee.statusword": 0x1237,
+        "right_knee.position": 0.5,
+        "right_knee.statusword": 0x1237,
+        "left_insole.force": 300.0,
+        "left_insole.cop_x": None,
+    }
+    assert set(answer["stamps_ns"]) == set(answer["values"])
+    assert set(answer["quality"]) == {"left_knee", "right_knee", "gait", "left_insole"}
+    assert answer["quality"]["left_knee"]["state"] == "ok"
+    assert answer["quality"]["left_knee"]["frames"] == 7
+    assert answer["quality"]["left_knee"]["age_ms"] >= 0
+
+
+def test_globs_choose_channels(client: Client) -> None:
+    answer = client.call("component.snapshot", channels=["*_knee.position", "left_insole.f*"])
+    assert set(answer["values"]) == {"left_knee.position", "right_knee.position", "left_insole.force"}
+    assert set(answer["quality"]) == {"left_knee", "right_knee", "left_insole"}
+
+
+def test_a_glob_that_means_nothing_is_an_unknown_name(client: Client) -> None:
+    error = client.refused("component.snapshot", channels=["left_knee.position", "left_nee.*"])
+    assert error.kind == "unknown_name"
+    assert "'left_nee.*'" in str(error)
+
+
+def test_a_stale_value_is_null_and_keeps_its_stamp(client: Client, bench: Bench) -> None:
+    stamp_ns = time.monotonic_ns() - 2_000_000_000_000
+    client.call("component.snapshot")
+    bench.insole.give(1.0, 2.0, stamp_ns=stamp_ns)
+    answer = client.call("component.snapshot", channels=["left_insole.force"])
+    assert answer["values"] == {"left_insole.force": None}
+    assert answer["stamps_ns"] == {"left_insole.force": stamp_ns}
+
+
+def test_a_value_that_is_no_number_is_null(client: Client, bench: Bench) -> None:
+    client.call("component.snapshot")
+    bench.insole.give(math.nan, math.inf)
+    assert set(client.call("component.snapshot", channels=["left_insole.*"])["values"].values()) == {None}
+
+
+def test_a_cold_start_waits_for_the_first_values(
+    connect: Callable[[], Client], bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.modules.component.COLD_S", 1000.0)
+    bench.insole.latest.clear()
+    slow, other = connect(), connect()
+    id_ = slow.request("component.snapshot", channels=["left_insole.*"])
+    assert other.call("component.snapshot", channels=["left_knee.*"])["values"]["left_knee.position"] == 0.5
+    assert other.call("clock.read")  # nobody else waits
+    bench.insole.give(12.0, 0.1)
+    assert slow.answer(id_)["values"]["left_insole.force"] == 12.0
+
+
+def test_a_cold_start_does_not_wait_for_ever(client: Client, bench: Bench) -> None:
+    bench.insole.latest.clear()
+    answer = client.call("component.snapshot")
+    assert answer["values"]["left_insole.force"] is None
+    assert answer["values"]["left_knee.position"] == 0.5
+
+
+def test_what_cannot_be_built_is_named_and_the_rest_is_served(client: Client, bench: Bench) -> None:
+    bench.absent["left_knee"] = (Kind.JOINT, "knee.eds: line 3: no such object")
+    described = client.call("robot.describe")
+    states = {one["name"]: (one["state"], one["problem"]) for one in described["components"]}
+    assert states["left_knee"] == ("lost", "knee.eds: line 3: no such object")
+    assert states["right_knee"] == ("ok", None)
+    answer = client.call("component.snapshot")
+    assert answer["quality"]["left_knee"]["problem"] == "knee.eds: line 3: no such object"
+    assert answer["values"]["right_knee.position"] == 0.5
+    error = client.refused("component.snapshot", channels=["left_knee.position"])
+    assert (error.kind, error.data["component"]) == ("unavailable", "left_knee")
+    assert "line 3" in str(error)
+    error = client.refused("stream.start", modules=["component"], rate_hz=1, channels=["left_knee.*"])
+    assert error.kind == "unavailable"
+
+
+def test_a_component_that_cannot_start_does_not_stop_the_rest(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start() -> None:
+        raise RuntimeError("no threads left")
+
+    monkeypatch.setattr(bench.insole, "start", start)
+    answer = client.call("component.snapshot")
+    assert "no threads left" in answer["quality"]["left_insole"]["problem"]
+    assert answer["values"]["left_knee.position"] == 0.5
+
+
+def test_a_component_that_is_lost_says_why(client: Client, bench: Bench) -> None:
+    bench.gait.lost = "no frame at all from node 16: check its power"
+    described = client.call("robot.describe")
+    gait = next(one for one in described["components"] if one["name"] == "gait")
+    assert (gait["kind"], gait["state"]) == ("device", "lost")
+    assert gait["problem"] == "no frame at all from node 16: check its power"
+
+
+def test_describe_tells_all_a_client_needs(client: Client) -> None:
+    described = client.call("robot.describe")
+    assert (described["robot"], described["role"]) == ("exo-test", "observer")
+    channels = {one["name"]: one for one in described["channels"]}
+    assert channels["left_knee.position"] == {
+        "name": "left_knee.position",
+        "unit": "rad",
+        "component": "left_knee",
+        "quantity": "position",
+    }
+    assert channels["resource.cpu_percent"]["unit"] == "%"
+    parameters = {one["name"]: one for one in described["parameters"]}
+    step = parameters["gait.step_length"]
+    assert (step["unit"], step["min"], step["max"], step["max_step"]) == ("m", 0.25, 0.6, 0.1)
+    assert (step["object"], step["access"], step["live"], step["component"]) == (
+        "0x2001:0",
+        "rw",
+        True,
+        "gait",
+    )
+    assert described["modules"]["control"] == "running"
+    assert described["stop"]["held"] is False
+    assert set(described["stop"]["drives"]) == {"left_knee", "right_knee"}
+    assert described["guard"] == {"configured": False}
+    assert described["clock"]["boot_id"] == described["boot_id"]
+
+
+def test_modules_start_with_the_first_client_and_stop_after_the_last(
+    connect: Callable[[], Client], bench: Bench
+) -> None:
+    watcher = connect()
+    assert bench.left.started == 0
+    first, second = connect(), connect()
+    first.call("component.snapshot")
+    second.call("component.snapshot")
+    assert (bench.left.started, bench.left.stopped, bench.assembled) == (1, 0, 1)
+    first.close()
+    time.sleep(0.15)  # longer than linger_s
+    assert second.call("component.snapshot")["values"]["left_knee.position"] == 0.5
+    assert bench.left.stopped == 0
+    second.close()
+    until(lambda: bench.left.stopped == 1, "the last client has left")
+    assert watcher.call("component.snapshot", channels=["left_knee.*"])["values"]["left_knee.position"] == 0.5
+    assert (bench.left.started, bench.assembled) == (2, 2)
+
+
+def test_a_start_and_stop_that_take_long_hold_nobody_up(bench: Bench, tmp_path: Path) -> None:
+    go = threading.Event()
+    starting, stop = bench.assemble, bench.left.stop
+
+    def assemble_slowly(robot: object) -> object:
+        go.wait()
+        return starting(config(tmp_path, ROBOT))
+
+    def stop_slowly() -> None:
+        go.wait()
+        stop()
+
+    with pytest.MonkeyPatch.context() as patch, serving(config(tmp_path)) as address:
+        patch.setattr("gateway.modules.component.assemble", assemble_slowly)
+        patch.setattr(bench.left, "stop", stop_slowly)
+        with Client(address) as slow, Client(address) as other:
+            id_ = slow.request("component.snapshot", channels=["left_knee.position"])
+            assert other.call("clock.read")
+            assert other.call("resource.snapshot", processes=False)
+            go.set()
+            assert slow.answer(id_)["values"] == {"left_knee.position": 0.5}
+            go.clear()
+            slow.close()
+            time.sleep(0.1)  # it is stopping now, or soon
+            id_ = other.request("component.snapshot", channels=["left_knee.position"])
+            assert other.call("clock.read")
+            go.set()
+            assert other.answer(id_)["values"] == {"left_knee.position": 0.5}
+
+
+def test_a_module_that_cannot_start_says_why_and_is_tried_again(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+
+        def broken(_config: object) -> None:
+            raise OSError("no memory")
+
+        patch.setattr("gateway.modules.component.assemble", broken)
+        for method in ("component.snapshot", "status.snapshot", "parameter.list", "robot.stop"):
+            error = client.refused(method)
+            assert error.kind == "unavailable"
+            assert "component cannot start: no memory" in str(error)
+    assert client.call("component.snapshot")["values"]["left_knee.position"] == 0.5
+
+
+def test_status_is_a_small_choice_of_both_modules(client: Client) -> None:
+    first = client.call("status.snapshot")
+    assert set(first["values"]) == {
+        "left_knee.position",
+        "right_knee.position",
+        "left_insole.force",
+        "left_insole.cop_x",
+        "resource.cpu_percent",
+        "resource.memory_percent",
+    }
+    assert first["values"]["resource.cpu_percent"] is None
+    assert 0 < first["values"]["resource.memory_percent"] < 100
+    assert set(first["quality"]) >= {"left_knee", "left_insole"}
+    until(
+        lambda: client.call("status.snapshot")["values"]["resource.cpu_percent"] is not None, "cpu is known"
+    )

@@ -1,0 +1,295 @@
+"""The daemon as clients meet it: bad input, half-closed, silent and flooding clients; nobody else notices."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gateway import daemon, wire
+from tests.unit.gateway.harness import DEADLINE_S, Bench, Client, config, serving, until
+
+Connect = Callable[[], Client]
+CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
+
+
+def test_hello_names_the_robot_and_the_protocol(client: Client) -> None:
+    answer = client.call("hello", client="test", protocol=1)
+    assert (answer["protocol"], answer["robot"]) == (1, "exo-test")
+    assert answer["boot_id"] == client.call("clock.read")["boot_id"]
+
+
+def test_another_protocol_is_refused_with_ours(client: Client) -> None:
+    assert "speaks protocol 1, not 2" in str(client.refused("hello", client="test", protocol=2))
+
+
+def test_clock_relates_monotonic_to_utc(client: Client) -> None:
+    before_ns, before_utc_ns = time.monotonic_ns(), time.time_ns()
+    answer = client.call("clock.read")
+    assert before_ns <= answer["monotonic_ns"] <= time.monotonic_ns()
+    assert before_utc_ns <= answer["utc_ns"] <= time.time_ns()
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        "resource.snap",
+        "parameter.confirm",
+        "parameter.revert",
+        "parameter.store",
+        "robot.reset",
+        "journal.tail",
+        "",
+    ],
+)
+def test_a_method_that_does_not_exist_is_named(client: Client, method: str) -> None:
+    error = client.refused(method)
+    assert (error.code, error.kind) == (wire.METHOD_NOT_FOUND, "unknown_name")
+    assert repr(method) in str(error)
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "id_"),
+    [
+        (b"{\n", -32700, None),
+        (b"\xff\xfe\n", -32700, None),
+        (b'[{"jsonrpc":"2.0","id":1,"method":"clock.read"}]\n', -32600, None),
+        (b'{"jsonrpc":"2.0","id":7,"method":"clock.read","params":[]}\n', -32602, 7),
+        (b'{"jsonrpc":"2.0","id":7,"method":"clock.read","params":{"x":1}}\n', -32602, 7),
+        (b"x" * (wire.LINE_LIMIT + 1) + b"\n", -32600, None),
+        (b'{"jsonrpc":"2.0","id":7,"method":"clock.read","params":' + b"[" * 60000 + b"}\n", -32700, None),
+    ],
+)
+def test_a_bad_line_is_answered_and_the_next_one_served(
+    client: Client, line: bytes, code: int, id_: int | None
+) -> None:
+    client.send(line + CLOCK % 9)
+    answer = client.line()
+    assert answer is not None
+    assert (answer["error"]["code"], answer["id"]) == (code, id_)
+    assert client.answer(9)["monotonic_ns"] > 0
+
+
+def test_a_notification_is_done_and_not_answered(client: Client) -> None:
+    client.send(
+        b'{"jsonrpc":"2.0","method":"clock.read"}\n{"jsonrpc":"2.0","method":"nonsense"}\n' + CLOCK % 1
+    )
+    answer = client.line()
+    assert answer is not None
+    assert answer["id"] == 1
+
+
+def test_ids_come_back_as_they_were_sent(client: Client) -> None:
+    for id_ in (0, -5, 2**70, "a", "ü\u2028", "", None):
+        client.send(json.dumps({"jsonrpc": "2.0", "id": id_, "method": "clock.read"}).encode() + b"\n")
+        answer = client.line()
+        assert answer is not None
+        assert answer["id"] == id_
+
+
+def test_a_client_that_half_closes_gets_its_answers_first(client: Client, bench: Bench) -> None:
+    client.request("component.snapshot")
+    last = client.request("clock.read")
+    client.send(CLOCK[:-1] % 77)  # the last line needs no newline
+    client.socket.shutdown(socket.SHUT_WR)
+    answers = {message["id"]: message for message in iter(client.line, None)}
+    assert set(answers) == {1, last, 77}
+    assert all("result" in message for message in answers.values())
+
+
+def test_a_half_closed_client_keeps_the_stream_it_asked_for(client: Client) -> None:
+    client.request("stream.start", modules=["component"], rate_hz=50)
+    client.socket.shutdown(socket.SHUT_WR)
+    assert [client.data()["seq"] for _ in range(5)] == [0, 1, 2, 3, 4]
+
+
+def test_a_client_that_never_reads_is_bounded_and_nobody_notices(
+    connect: Connect, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.session.STUCK_S", 0.5)
+    silent, other = connect(), connect()
+    for _ in range(60):
+        silent.request("stream.start", modules=["component"], rate_hz=1000)
+    other.call("stream.start", modules=["component"], rate_hz=20)
+
+    def closed() -> bool:
+        other.data()
+        try:
+            silent.send(CLOCK % 1)
+        except OSError:
+            return True
+        return False
+
+    until(closed, "the silent client is closed")
+    assert other.call("clock.read")
+
+
+def test_a_client_that_sends_without_reading_does_not_starve_others(connect: Connect) -> None:
+    flood, other = connect(), connect()
+    flood.socket.settimeout(0.2)
+    line = b'{"jsonrpc":"2.0","id":1,"method":"robot.describe"}\n'
+
+    def blocked() -> bool:
+        try:
+            return flood.socket.send(line * 1000) == 0
+        except TimeoutError:
+            return True
+
+    until(blocked, "the flood is not read any more")
+    assert other.call("clock.read")
+
+
+def test_a_stop_overtakes_what_its_own_connection_has_queued(client: Client, bench: Bench) -> None:
+    client.call("component.snapshot")
+    lines = [json.dumps({"jsonrpc": "2.0", "id": i, "method": "resource.snapshot"}) for i in range(100)]
+    lines.append('{"jsonrpc":"2.0","id":"stop","method":"robot.stop","params":{"reason":"test"}}')
+    client.send("\n".join(lines).encode() + b"\n")
+    order = [message["id"] for message in (client.line() for _ in range(101)) if message is not None]
+    assert order.index("stop") < 50
+
+
+def test_one_client_too_many_is_told(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(daemon, "MAX_SESSIONS", 2)
+    first, second = connect(), connect()
+    assert first.call("clock.read")
+    assert second.call("clock.read")
+    third = connect()
+    message = third.line()
+    assert message is not None
+    assert message["error"]["data"]["kind"] == "unavailable"
+    assert third.line() is None
+    second.close()
+    until(lambda: _answers(connect), "a place is free again")
+
+
+def _answers(connect: Connect) -> bool:
+    client = connect()
+    client.send(CLOCK % 1)
+    message = client.line()
+    return message is not None and "result" in message
+
+
+def test_connections_that_come_and_go_leave_nothing(connect: Connect) -> None:
+    for _ in range(50):
+        one = connect()
+        one.request("component.snapshot")
+        one.close()
+    assert connect().call("clock.read")
+
+
+GARBAGE = st.one_of(
+    st.binary(max_size=300),
+    st.sampled_from(
+        [b"\n", b"{}\n", b"[]\n", CLOCK % 5, CLOCK[:20], b"\xff\n", b'{"jsonrpc":"2.0",\n', b"\x00" * 70_000]
+    ),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(pieces=st.lists(GARBAGE, max_size=8), cuts=st.lists(st.integers(0, 2000), max_size=4))
+def test_garbage_in_any_pieces_hurts_neither_the_daemon_nor_another_session(
+    garbage_gateway: tuple[str, int], pieces: list[bytes], cuts: list[int]
+) -> None:
+    stream = b"".join(pieces)
+    with Client(garbage_gateway) as bad, Client(garbage_gateway) as good:
+        start = 0
+        for cut in sorted(cuts):
+            bad.send(stream[start:cut])
+            start = max(start, cut)
+            assert good.call("clock.read")
+        bad.send(stream[start:] + b"\n" + CLOCK % 99)
+        assert bad.answer(99)["monotonic_ns"] > 0
+        assert good.call("clock.read")
+
+
+@pytest.fixture(scope="module")
+def garbage_gateway(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, int]]:
+    with serving(config(tmp_path_factory.mktemp("garbage"))) as address:
+        yield address
+
+
+class TestProcess:
+    """The command itself, as a process of its own."""
+
+    @pytest.fixture
+    def process(self, tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
+        config(tmp_path)
+        command = [
+            sys.executable,
+            "-m",
+            "gateway.main",
+            "gateway",
+            str(tmp_path / "robot.toml"),
+            "--port",
+            "0",
+        ]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            yield process
+            process.kill()
+
+    @staticmethod
+    def address(process: "subprocess.Popen[str]") -> tuple[str, int]:
+        assert process.stdout is not None
+        match = re.fullmatch(r"listening on (127\.0\.0\.1):(\d+)\n", process.stdout.readline())
+        assert match is not None
+        return match[1], int(match[2])
+
+    @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+    def test_signals_end_it_cleanly_with_clients_and_modules(
+        self, process: "subprocess.Popen[str]", number: signal.Signals
+    ) -> None:
+        with Client(self.address(process)) as client:
+            client.call("resource.snapshot")
+            process.send_signal(number)
+            assert client.line() is None
+            assert process.wait(DEADLINE_S) == 0
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+
+    def test_a_resource_only_client_starts_no_thread(self, process: "subprocess.Popen[str]") -> None:
+        with Client(self.address(process)) as client:
+            client.call("hello", client="test")
+            client.call("resource.snapshot")
+            threads = list(Path(f"/proc/{process.pid}/task").iterdir())
+        assert len(threads) == 1
+
+    def test_idle_it_does_not_run_at_all(self, process: "subprocess.Popen[str]") -> None:
+        with Client(self.address(process)) as client:
+            client.call("resource.snapshot")
+
+        def switches() -> tuple[str, ...]:
+            status = Path(f"/proc/{process.pid}/status").read_text(encoding="ascii")
+            return tuple(line for line in status.splitlines() if "ctxt_switches" in line)
+
+        def rests() -> bool:
+            before = switches()
+            time.sleep(0.4)
+            return switches() == before
+
+        until(rests, "no context switch while nobody is there")
+
+
+def test_what_a_resource_only_gateway_imports() -> None:
+    code = (
+        "import sys, gateway.cli.serve, gateway.modules.resource, gateway.modules.host; "
+        "print([m for m in ('can', 'canopen', 'serial', 'asyncio', 'numpy', 'rich') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_a_port_in_use_is_named_with_what_to_do() -> None:
+    with daemon.listen("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(OSError, match=f"127.0.0.1:{port}: .*choose another with --host or --port"):
+            daemon.listen("127.0.0.1", port)
