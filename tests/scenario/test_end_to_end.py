@@ -1,0 +1,210 @@
+"""The whole chain as its users run it: simulator, gateway and client, each a process of its own."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.client import Address, LinkSettings, Robot
+from server_gui.terminal.children import Child, ChildFailed
+
+pytestmark = pytest.mark.timeout(300)
+
+DEADLINE_S = 120.0
+STRIDES = 200  # rows at 50 Hz: more than two strides of the slowest gait that is set here
+
+
+def nothing() -> None:
+    pass
+
+
+def until(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline, "the condition was not met in time"
+        time.sleep(0.05)
+
+
+def gwrms(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """One command, as a person types it."""
+    command = [sys.executable, "-P", "-m", "gateway.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+
+
+class Bench:
+    """A simulator and a gateway, each of which can be killed and started again."""
+
+    def __init__(self, folder: Path, processes: ExitStack) -> None:
+        self.folder = folder
+        self._processes = processes
+        self.port = 0
+        self.start_simulator()
+        self.start_gateway()
+
+    def start_simulator(self) -> None:
+        self.simulator = self._processes.enter_context(Child("simulator", ["sim", "--dir", str(self.folder)]))
+        ready = self.simulator.wait_ready(_json, DEADLINE_S, nothing)
+        assert ready["ready"] is True
+        self.config = Path(ready["config"])
+
+    def start_gateway(self) -> None:
+        arguments = ["gateway", str(self.config), "--port", str(self.port)]
+        self.gateway = self._processes.enter_context(Child("gateway", arguments))
+        host, port = self.gateway.wait_ready(_listening, DEADLINE_S, nothing)
+        assert host == "127.0.0.1"
+        self.port = port
+
+    @property
+    def address(self) -> str:
+        return f"127.0.0.1:{self.port}"
+
+    def kill(self, child: Child) -> None:
+        """kill -9, and wait until it is dead."""
+        os.kill(child.pid, signal.SIGKILL)
+        until(lambda: _is_dead(child))
+
+    def ask(self, method: str, **params: Any) -> dict[str, Any]:
+        """One request as `nc` sends it: a line, then the sending half is closed; the answer until the end."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=DEADLINE_S) as link:
+            request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
+            link.sendall(json.dumps(request).encode() + b"\n")
+            link.shutdown(socket.SHUT_WR)
+            answer = b"".join(iter(lambda: link.recv(65536), b""))
+        result: dict[str, Any] = json.loads(answer)["result"]
+        return result
+
+    def states(self) -> dict[str, str]:
+        """Every component's state."""
+        quality = self.ask("component.snapshot")["quality"]
+        return {name: found["state"] for name, found in quality.items()}
+
+    def is_whole(self) -> bool:
+        snapshot = self.ask("component.snapshot")
+        return set(self.states().values()) == {"ok"} and snapshot["values"]["left_hip.position"] is not None
+
+
+def _json(line: str) -> dict[str, Any] | None:
+    found: dict[str, Any] = json.loads(line)
+    return found
+
+
+def _listening(line: str) -> tuple[str, int] | None:
+    said = re.fullmatch(r"listening on (\S+):(\d+)", line)
+    return (said[1], int(said[2])) if said else None
+
+
+def _is_dead(child: Child) -> bool:
+    try:
+        child.check()
+    except ChildFailed:
+        return True
+    return False
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with ExitStack() as processes:
+        bench = Bench(tmp_path, processes)
+        until(bench.is_whole)
+        yield bench
+
+
+def hip_range(bench: Bench) -> float:
+    """How far the left hip moves, in rad, as `gwrms watch` in a process of its own sees it."""
+    arguments = ("watch", "left_hip.position", "--rate", "50", "--count", str(STRIDES), "--json")
+    watched = gwrms(*arguments, "--robot", bench.address)
+    assert watched.returncode == 0, watched.stderr
+    rows = [json.loads(line)["values"]["left_hip.position"] for line in watched.stdout.splitlines()]
+    angles = [angle for angle in rows if angle is not None]
+    assert len(rows) == STRIDES
+    assert len(angles) > STRIDES / 2
+    return float(max(angles) - min(angles))
+
+
+def test_written_step_length_changes_the_measured_hip_range(bench: Bench) -> None:
+    before = hip_range(bench)
+    assert before > 0.2
+    for length in ("0.3", "0.2"):
+        written = gwrms("set", f"gait.step_length={length}", "--robot", bench.address, "--json")
+        assert written.returncode == 0, written.stderr
+        assert json.loads(written.stdout)["after"] == {"gait.step_length": float(length)}
+    until(lambda: hip_range(bench) < 0.75 * before)
+
+
+def test_refused_write_leaves_the_gait_as_it_was(bench: Bench) -> None:
+    refused = gwrms("set", "gait.step_length=5", "--robot", bench.address)
+    assert refused.returncode == 1
+    assert "gait.step_length" in refused.stderr
+    assert "Traceback" not in refused.stderr
+    read = gwrms("get", "gait.step_length", "--robot", bench.address, "--json")
+    assert json.loads(read.stdout)["values"]["gait.step_length"]["value"] == 0.4
+
+
+def test_one_line_and_a_half_close_answer_live_values(bench: Bench) -> None:
+    first = bench.ask("component.snapshot")
+    assert first["values"]["left_hip.position"] is not None
+    stamp_ns = first["stamps_ns"]["left_hip.position"]
+    until(lambda: bench.ask("component.snapshot")["stamps_ns"]["left_hip.position"] > stamp_ns)
+    forces = [first["values"][f"{foot}_insole.force"] for foot in ("left", "right")]
+    assert all(force is not None for force in forces)
+
+
+def test_simulator_and_client_outlive_a_killed_gateway(bench: Bench) -> None:
+    with Robot(Address(port=bench.port), LinkSettings(silence_s=30.0)) as robot:
+        stream = robot.watch("left_hip.position", rate_hz=50)
+        before = next(stream)
+        bench.kill(bench.gateway)
+        bench.simulator.check()
+        bench.start_gateway()
+        after = next(batch for batch in stream if batch.link > before.link and any(_numbers(batch.columns)))
+        assert after.columns.keys() == before.columns.keys()
+        stream.close()
+    bench.simulator.check()
+    until(bench.is_whole)
+
+
+def test_gateway_outlives_a_killed_simulator_and_says_what_is_gone(bench: Bench) -> None:
+    bench.kill(bench.simulator)
+    until(lambda: set(bench.states().values()) == {"lost"})
+    gone = bench.ask("component.snapshot")
+    assert set(gone["values"].values()) == {None}
+    assert all(found["problem"] for found in gone["quality"].values())
+    bench.gateway.check()
+    bench.start_simulator()
+    until(bench.is_whole)
+    bench.gateway.check()
+
+
+def test_stop_is_confirmed_by_every_drive_and_the_robot_stands(bench: Bench) -> None:
+    stopped = gwrms("stop", "--robot", bench.address, "--json")
+    assert stopped.returncode == 0, stopped.stderr
+    drives = json.loads(stopped.stdout)["drives"]
+    assert len(drives) == 6
+    assert set(drives.values()) == {"confirmed"}
+    until(lambda: hip_range(bench) < 0.02)
+
+
+def test_demo_shows_a_walk_and_ends_everything(tmp_path: Path) -> None:
+    shown = gwrms("demo", "--headless", "--seconds", "8", "--dir", str(tmp_path))
+    assert shown.returncode == 0, shown.stderr
+    assert shown.stdout.rstrip().endswith("The joints moved, the feet alternated, no component was lost.")
+
+
+def test_demo_of_a_standing_robot_is_no_walk(tmp_path: Path) -> None:
+    shown = gwrms("demo", "--headless", "--seconds", "3", "--scenario", "stand", "--dir", str(tmp_path))
+    assert shown.returncode == 1
+    assert "this was no walk: did not move" in shown.stderr
+
+
+def _numbers(columns: dict[str, list[float | None]]) -> list[bool]:
+    return [value is not None for column in columns.values() for value in column]
