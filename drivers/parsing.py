@@ -151,32 +151,42 @@ class FrameScanner(Generic[F]):
 
 
 class Sequence:
-    """Follows a device's wrapping frame counter, and tells late frames from missing ones."""
+    """Follows a device's wrapping frame counter, and tells late frames from missing ones.
 
-    def __init__(self, counters: Counters, modulus: int) -> None:
+    `LATE_RUN` late frames in rising order mean that the device counts anew: the last of them is not late.
+    """
+
+    LATE_RUN = 8
+
+    def __init__(self, counters: Counters, modulus: int, gaps: bool = True) -> None:
         self._counters = counters
         self._modulus = modulus
-        self._last: int | None = None
-        self._late: int | None = None
+        self._gaps = gaps  # a time has none: only its order tells anything
+        self._newest: int | None = None
+        self._late = 0
+        self._late_run = 0
 
     def is_late(self, number: int) -> bool:
-        """Count what `number` shows; true when the frame is a repetition or older than the last one.
-
-        Two consecutive late frames in a row mean that the device counts anew: the second is not late.
-        """
-        if self._last is None or (self._late is not None and number == (self._late + 1) % self._modulus):
-            step = 1
-        else:
-            step = (number - self._last) % self._modulus
-        if step == 0 or step > self._modulus // 2:
+        """Whether the frame is a repetition or older than one before it; counts what `number` shows."""
+        step = 1 if self._newest is None else self._step(self._newest, number)
+        if step <= 0 and not self._begins_anew(number):
             self._counters.out_of_order += 1
-            self._late = number
             return True
-        if step > 1:
+        if step > 1 and self._gaps:
             self._counters.sequence_gaps += 1
             self._counters.frames_missed += step - 1
-        self._last, self._late = number, None
+        self._newest, self._late_run = number, 0
         return False
+
+    def _step(self, before: int, number: int) -> int:
+        """How far `number` is ahead of `before`; 0 or negative for a repeated or older one."""
+        step = (number - before) % self._modulus
+        return step if step <= self._modulus // 2 else step - self._modulus
+
+    def _begins_anew(self, number: int) -> bool:
+        rising = self._late_run > 0 and self._step(self._late, number) > 0
+        self._late, self._late_run = number, self._late_run + 1 if rising else 1
+        return self._late_run >= self.LATE_RUN
 
 
 class DelimitedParser(Generic[F]):

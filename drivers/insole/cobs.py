@@ -21,8 +21,6 @@ SHORTEST = HEADER.size + 2 + 2
 LONGEST = HEADER.size + 2 * MAX_CELLS + 2
 PASCAL_PER_COUNT = 100.0
 MISSING_CELL = 0xFFFF
-TICKS_PER_SECOND = 1_000_000
-TICKS_MODULUS = 1 << 32
 
 _CELLS = {n: struct.Struct(f"<{n}H") for n in range(1, MAX_CELLS + 1)}
 

@@ -1,53 +1,77 @@
 """One foot's insole: frames of its line become pressure, force and centre of pressure."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from drivers.component import Kind
+from drivers.errors import SettingsError
 from drivers.freshness import Freshness
+from drivers.insole import calibration as calibrations
 from drivers.insole import layout as layouts
-from drivers.insole.formats import FORMATS
+from drivers.insole.calibration import Cells
+from drivers.insole.formats import CLOCKS, parser_maker
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import Foot
-from drivers.insole.load import load_of
+from drivers.insole.layout import Foot, Layout
+from drivers.insole.load import Stance, load_of
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line
 from drivers.samples import Channel, Quality, State
 
 FEET: tuple[Foot, ...] = ("left", "right")
+CONTACT = {0: "in the air", 1: "on the ground"}
 
 
 class Insole:
     """An insole on a serial port (a `Component`).
 
     Channels: `force` (N), `cop_x` and `cop_y` (m; foot frame: origin at the heel, x forward, y left; null
-    below the force threshold), `cell_0` … (Pa).
+    below the force threshold), `cell_0` … (Pa), `contact` (0 or 1), `load_share` (0 to 1 of what both feet
+    carry; null without the other foot).
+
+    `beside` is the folder that files named in the settings are looked for in; `line` is given where two feet
+    share a port.
 
     Raises:
-        SettingsError: the layout does not exist or is wrong.
+        SettingsError: the layout or calibration does not exist or is wrong.
 
     """
 
     kind = Kind.INSOLE
 
-    def __init__(self, name: str, settings: InsoleSettings, line: Line[InsoleFrame] | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        settings: InsoleSettings,
+        line: Line[InsoleFrame] | None = None,
+        beside: Path | None = None,
+    ) -> None:
         self.name = name
         self.settings = settings
         self.foot: Foot | None = settings.foot or _foot_in(name)
-        self.line = line if line is not None else line_for(settings)
-        layout = layouts.load(settings.layout)
+        layout = layouts.load(settings.layout, beside)
         self.layout = layout if self.foot is None else layout.for_foot(self.foot)
-        self.channels = _channels(name, len(self.layout.cells))
+        if not layout.cells:
+            raise SettingsError(
+                f"[insole.{name}]: layout {layout.name} has no `cells`: add their places and areas"
+            )
+        self.line = line if line is not None else line_for(settings, beside)
+        self.channels = _channels(name, len(layout.cells))
         self.latest = Latest(name, self.channels, settings.stale_after_s)
+        self.other: Insole | None = None  # the other foot's, where there is one
+        self._cells = _calibration(settings, layout, beside)
+        self._stance = Stance(settings.force_threshold)
         self._indices = tuple(range(len(self.channels)))
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._fault: str | None = None  # what the device's own frames say is wrong
-        self._other_feet = 0  # frames of the other foot since the last of ours
+        self._foreign = 0  # frames of the other foot since the last of ours
+        self._saturated = 0
+        self._clock = CLOCKS[settings.format].make()
 
     def start(self) -> None:
         self._freshness.reset()
-        self.latest.clear()
-        self._fault, self._other_feet = None, 0
+        self.disconnected()
+        self._saturated = 0
         self.line.start(self)
 
     def stop(self) -> None:
@@ -68,25 +92,43 @@ class Insole:
         if frame.late:
             return
         if self.foot is not None and frame.foot is not None and frame.foot != self.foot:
-            self._other_feet += 1
+            self._foreign += 1
             return
-        self._other_feet = 0
+        if frame.ticks is not None:
+            taken_ns = self._clock.stamp(frame.ticks, stamp_ns)
+            if taken_ns is None:
+                return
+            stamp_ns = taken_ns
+        self._foreign = 0
         self._fault = self._fault_in(frame)
         self._freshness.seen(stamp_ns)
-        pressures = self._pressures(frame)
-        load = load_of(pressures, self.layout, self.settings.force_threshold)
-        self.latest.update(stamp_ns, self._indices, (*load, *pressures))
+        self._update(stamp_ns, self._pressures(frame))
 
     def disconnected(self) -> None:
         """The port went away: nothing that it said before is true any more."""
         self.latest.clear()
         self._freshness.disconnected()
+        self._fault, self._foreign = None, 0
+        self._clock = CLOCKS[self.settings.format].make()
+
+    def _update(self, stamp_ns: int, pressures: tuple[float | None, ...]) -> None:
+        load = load_of(pressures, self.layout, self.settings.force_threshold)
+        contact = self._stance.contact(load.force)
+        others = None if self.other is None else self.other.latest.read(0, stamp_ns)[0]
+        share = self._stance.share(load.force, others)
+        self.latest.update(stamp_ns, self._indices, (*load, *pressures, contact, share))
 
     def _pressures(self, frame: InsoleFrame) -> tuple[float | None, ...]:
         count = len(self.layout.cells)
-        if not frame.calibrated or len(frame.cells) != count:
+        if len(frame.cells) != count:
             return (None,) * count
-        return frame.cells
+        if frame.calibrated:
+            self._saturated += frame.saturated
+            return frame.cells
+        if self._cells is None:
+            return (None,) * count
+        self._saturated += frame.saturated or self._cells.saturated(frame.cells)
+        return self._cells.pressures(frame.cells)
 
     def _fault_in(self, frame: InsoleFrame) -> str | None:
         if len(frame.cells) != len(self.layout.cells):
@@ -94,7 +136,7 @@ class Insole:
                 f"{self.name} sends {len(frame.cells)} cells and the layout {self.layout.name} has "
                 f"{len(self.layout.cells)}: correct `layout` in [insole.{self.name}]"
             )
-        if not frame.calibrated:
+        if not frame.calibrated and self._cells is None:
             return (
                 f"{self.name} sends the converter's counts and has no calibration: pressure is unknown "
                 f"(gwrms calibrate insole measures one)"
@@ -106,7 +148,7 @@ class Insole:
         return None
 
     def _wrong_foot(self) -> str | None:
-        if not self._other_feet:
+        if not self._foreign:
             return None
         other = FEET[self.foot == "left"]
         return (
@@ -117,25 +159,53 @@ class Insole:
     def _counters(self) -> Mapping[str, int]:
         return {
             **self.line.parser.counters.as_dict(),
+            "saturated": self._saturated,
             "stale": self._freshness.stale,
             "reconnects": self.line.reconnects,
+            "clock_restarts": self._clock.restarts,
         }
 
 
-def line_for(settings: InsoleSettings) -> Line[InsoleFrame]:
-    """The line that `settings` describe."""
-    return Line(settings.port, settings.baudrate, settings.format, FORMATS[settings.format])
+def line_for(settings: InsoleSettings, beside: Path | None = None) -> Line[InsoleFrame]:
+    """The line that `settings` describe.
+
+    Raises:
+        SettingsError: the format needs a description that the layout does not have.
+
+    """
+    make_parser = parser_maker(settings.format, layouts.load(settings.layout, beside))
+    return Line(settings.port, settings.baudrate, settings.format, make_parser)
 
 
-def insoles(settings: Mapping[str, InsoleSettings]) -> list[Insole]:
+def pair(insoles: list[Insole]) -> None:
+    """Let the two feet of one wearer know each other, so that each can say its share of the load."""
+    by_foot = {insole.foot: insole for insole in insoles}
+    if len(insoles) == 2 and {"left", "right"} == set(by_foot):
+        by_foot["left"].other, by_foot["right"].other = by_foot["right"], by_foot["left"]
+
+
+def insoles(settings: Mapping[str, InsoleSettings], beside: Path | None = None) -> list[Insole]:
     """The insoles of a robot; those that name the same port share its line.
 
     Raises:
-        SettingsError: a layout is wrong.
+        SettingsError: a layout or calibration is wrong.
 
     """
     lines: dict[str, Line[InsoleFrame]] = {}
-    return [Insole(name, one, lines.setdefault(one.port, line_for(one))) for name, one in settings.items()]
+    made = []
+    for name, one in settings.items():
+        if one.port not in lines:
+            lines[one.port] = line_for(one, beside)
+        made.append(Insole(name, one, lines[one.port], beside))
+    pair(made)
+    return made
+
+
+def _calibration(settings: InsoleSettings, layout: Layout, beside: Path | None) -> Cells | None:
+    calibration = layout.calibration
+    if settings.calibration is not None:
+        calibration = calibrations.load((beside or Path()) / settings.calibration)
+    return None if calibration is None else Cells(calibration, len(layout.cells))
 
 
 def _foot_in(name: str) -> Foot | None:
@@ -144,4 +214,8 @@ def _foot_in(name: str) -> Foot | None:
 
 def _channels(name: str, cells: int) -> tuple[Channel, ...]:
     units = {"force": "N", "cop_x": "m", "cop_y": "m"} | {f"cell_{cell}": "Pa" for cell in range(cells)}
-    return tuple(Channel(f"{name}.{quantity}", name, quantity, unit) for quantity, unit in units.items())
+    return (
+        *(Channel(f"{name}.{quantity}", name, quantity, unit) for quantity, unit in units.items()),
+        Channel(f"{name}.contact", name, "contact", "", CONTACT),
+        Channel(f"{name}.load_share", name, "load_share", ""),
+    )

@@ -19,5 +19,18 @@ class InsoleFrame(msgspec.Struct, frozen=True):
     saturated: bool = False  # the device says that a cell is at its end
     missing: bool = False  # the device says that cells are missing
     sequence: int | None = None
-    ticks: int | None = None  # the device's clock, in its own unit
+    ticks: int | None = None  # the device's clock, µs
     late: bool = False  # repeated, or older than a frame before it
+    more: dict[str, float | list[float]] = {}  # what else the frame carries
+
+
+def flat(frame: InsoleFrame) -> dict[str, object]:
+    """What `frame` carries: `pressures` (Pa) where it is calibrated, else `counts`; `time` in s."""
+    line: dict[str, object] = {"frame": "insole"}
+    numbers = {"foot": frame.foot, "sequence": frame.sequence, "bits": frame.bits}
+    line |= {key: value for key, value in numbers.items() if value is not None}
+    if frame.ticks is not None:
+        line["time"] = frame.ticks / 1e6
+    line["pressures" if frame.calibrated else "counts"] = frame.cells
+    line |= {key: True for key in ("saturated", "missing", "late") if getattr(frame, key)}
+    return line | frame.more

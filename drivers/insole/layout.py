@@ -11,6 +11,8 @@ from typing import Literal
 import msgspec
 
 from drivers.errors import SettingsError
+from drivers.insole.calibration import Calibration
+from drivers.insole.description import CsvDescription, FrameDescription
 
 Foot = Literal["left", "right"]
 Cell = tuple[float, float, float]
@@ -22,15 +24,19 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Cells of one foot.
 
     The foot frame has its origin at the heel, on the foot's centre line, x forward, y left. `cells` are
-    (x in m, y in m, area in m²), in the order in which the device sends them, as seen on `foot`.
+    (x in m, y in m, area in m²), in the order in which the device sends them, as seen on `foot`; a layout
+    without cells only describes a stream.
     """
 
     name: str
-    cells: tuple[Cell, ...]
+    cells: tuple[Cell, ...] = ()
     foot: Foot = "left"
+    csv: CsvDescription | None = None  # of the stream, for `insole-csv`
+    frame: FrameDescription | None = None  # of the stream, for `insole-frame`
+    calibration: Calibration | None = None  # typical of the device; a measured one is better
 
     def __post_init__(self) -> None:
-        if not self.cells:
+        if not self.cells and not (self.csv or self.frame):
             raise ValueError("`cells` is empty: list [x, y, area] of each cell")
         for number, (x, y, area) in enumerate(self.cells):
             if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(area) and area > 0):

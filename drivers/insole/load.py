@@ -31,3 +31,24 @@ def load_of(pressures: Sequence[float | None], layout: Layout, force_threshold: 
         sum(map(mul, known, layout.moments_x)) / force,
         sum(map(mul, known, layout.moments_y)) / force,
     )
+
+
+class Stance:
+    """Whether a foot is on the ground, and how much of both feet's load it carries."""
+
+    def __init__(self, force_threshold: float) -> None:
+        self._threshold = force_threshold
+        self._down = False
+
+    def contact(self, force: float | None) -> float | None:
+        """1 on the ground, 0 in the air; it lifts at half the force at which it lands."""
+        if force is None:
+            return None
+        self._down = force >= self._threshold * (0.5 if self._down else 1.0)
+        return float(self._down)
+
+    def share(self, force: float | None, others: float | None) -> float | None:
+        """0 to 1; `None` where a foot is unknown or nobody stands."""
+        if force is None or others is None or force + others < self._threshold:
+            return None
+        return force / (force + others)

@@ -28,3 +28,20 @@ def cobs_frame(
     body = struct.pack("<BBHIBB", 0x31, flags, sequence & 0xFFFF, time_us & 0xFFFFFFFF, len(counts), bits)
     body += struct.pack(f"<{len(counts)}H", *counts)
     return cobs(body + struct.pack("<H", crc16_ccitt_false(body))) + b"\0"
+
+
+def eighteen_cell_frame(foot: int, cells: Sequence[int]) -> bytes:
+    """The frame seen on printed soles: AAh, foot, 18 big-endian u16, sum of all before."""
+    body = struct.pack(">BB18H", 0xAA, foot, *cells)
+    return body + bytes([sum(body) & 0xFF])
+
+
+class Sender:
+    """A device that goes on counting its frames and its time."""
+
+    def __init__(self) -> None:
+        self.sequence = 0
+
+    def frame(self, counts: Sequence[int], flags: int = CALIBRATED) -> bytes:
+        self.sequence += 1
+        return cobs_frame(counts, flags=flags, sequence=self.sequence, time_us=self.sequence * 5000)

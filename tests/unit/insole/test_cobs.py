@@ -112,11 +112,18 @@ def test_gaps_repetitions_and_late_frames_are_told_apart_for_each_foot() -> None
     assert counters.out_of_order == 2
 
 
-def test_device_that_counts_anew_is_believed_from_its_second_frame() -> None:
+def test_device_that_counts_anew_is_believed_after_a_run_of_rising_frames() -> None:
     parser = InsoleCobsParser()
-    sequences = [30_000, 30_001, 0, 1, 2, 3]
-    frames = parser.feed(b"".join(cobs_frame([1], sequence=s) for s in sequences))
-    assert [frame.late for frame in frames] == [False, False, True, False, False, False]
+    frames = parser.feed(b"".join(cobs_frame([1], sequence=s) for s in (30_000, 30_001, *range(10))))
+    assert [frame.late for frame in frames] == [False] * 2 + [True] * 7 + [False] * 3
+    assert (parser.counters.out_of_order, parser.counters.sequence_gaps) == (7, 0)
+
+
+def test_block_of_late_frames_is_no_new_beginning() -> None:
+    parser = InsoleCobsParser()
+    order = [1, 2, 3, 8, 4, 5, 6, 7, 9]
+    frames = parser.feed(b"".join(cobs_frame([1], sequence=s) for s in order))
+    assert [frame.sequence for frame in frames if not frame.late] == [1, 2, 3, 8, 9]
 
 
 def test_endless_noise_without_a_delimiter_is_bounded_and_counted() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.insole import layout as layouts
-from drivers.insole.load import Load, load_of
+from drivers.insole.load import Load, Stance, load_of
 
 SQUARE = layouts.Layout(
     name="square", cells=((0.0, -0.1, 0.01), (0.0, 0.1, 0.01), (0.2, -0.1, 0.01), (0.2, 0.1, 0.02))
@@ -36,3 +36,17 @@ def test_unloaded_foot_has_force_zero_and_no_centre() -> None:
 def test_missing_cell_makes_the_force_unknown_not_smaller() -> None:
     assert load_of([1000.0, None, 1000.0, 1000.0], SQUARE, 20.0) == Load(None, None, None)
     assert load_of([1000.0], SQUARE, 20.0) == Load(None, None, None)
+
+
+def test_contact_does_not_flicker_around_the_threshold() -> None:
+    stance = Stance(20.0)
+    forces = [0.0, 15.0, 25.0, 15.0, 19.0, 9.0, 15.0, None, 20.0]
+    assert [stance.contact(force) for force in forces] == [0, 0, 1, 1, 1, 0, 0, None, 1]
+
+
+@pytest.mark.parametrize(
+    ("force", "others", "share"),
+    [(300.0, 100.0, 0.75), (0.0, 400.0, 0.0), (5.0, 5.0, None), (None, 400.0, None), (300.0, None, None)],
+)
+def test_share_of_the_load(force: float | None, others: float | None, share: float | None) -> None:
+    assert Stance(20.0).share(force, others) == share

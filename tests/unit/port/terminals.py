@@ -45,11 +45,13 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
         time.sleep(0.005)
 
 
-def send_until(terminal: Terminal, data: bytes, condition: Callable[[], bool], what: str) -> None:
-    """Send `data` again and again, as a sensor does, until `condition` holds."""
+def send_until(
+    terminal: Terminal, data: bytes | Callable[[], bytes], condition: Callable[[], bool], what: str
+) -> None:
+    """Send `data` (or what it gives) again and again, as a sensor does, until `condition` holds."""
 
     def sent() -> bool:
-        terminal.send(data)
+        terminal.send(data if isinstance(data, bytes) else data())
         return condition()
 
     wait_until(sent, what)

@@ -1,5 +1,6 @@
 """A device's clock related to the robot's: wraps, drift, jitter, gaps, late frames, restarts."""
 
+import itertools
 import math
 import random
 from collections.abc import Iterator
@@ -59,7 +60,7 @@ def test_frames_that_come_in_one_read_are_spread_to_when_they_were_taken() -> No
     for number in range(400):
         received_ns = (number // 4 * 4 + 3) * 5_000_000 + SECOND_NS  # four frames each 20 ms
         stamps.append(clock.stamp(number * 5000, received_ns) or 0)
-    steps = [after - before for before, after in zip(stamps[40:], stamps[41:], strict=False)]
+    steps = [after - before for before, after in itertools.pairwise(stamps[40:])]
     assert set(steps) == {5_000_000}
 
 

@@ -1,0 +1,158 @@
+"""Format `insole-frame`: a fixed binary frame, by a description."""
+
+import binascii
+import math
+import struct
+from collections.abc import Callable
+from functools import reduce
+from operator import xor
+
+from drivers.insole.description import Field, Flag, FrameDescription
+from drivers.insole.frame import InsoleFrame
+from drivers.insole.layout import Foot
+from drivers.insole.order import Order
+from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
+
+LONGEST = 4096
+LETTERS = {
+    "u8": "B",
+    "i8": "b",
+    "u16": "H",
+    "i16": "h",
+    "u32": "I",
+    "i32": "i",
+    "f32": "f",
+    "f64": "d",
+}
+Numbers = tuple[float, ...]
+
+
+def _crc16_modbus(data: bytes) -> int:
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+    return crc
+
+
+# name → size in bytes, how to compute it
+CHECKSUMS: dict[str, tuple[int, Callable[[bytes], int]]] = {
+    "none": (0, lambda _: 0),
+    "sum8": (1, lambda data: sum(data) & 0xFF),
+    "xor8": (1, lambda data: reduce(xor, data, 0)),
+    "crc16-ccitt-false": (2, lambda data: binascii.crc_hqx(data, 0xFFFF)),
+    "crc16-xmodem": (2, lambda data: binascii.crc_hqx(data, 0)),
+    "crc16-modbus": (2, _crc16_modbus),
+}
+
+
+class InsoleFrameParser(FrameScanner[InsoleFrame]):
+    """Parser of `insole-frame`, one or both feet on the line."""
+
+    def __init__(self, description: FrameDescription) -> None:
+        super().__init__()
+        self._description = description
+        self.sync = bytes.fromhex(description.header)
+        self._terminator = bytes.fromhex(description.terminator)
+        self._checksum_size, self._checksum = CHECKSUMS[description.checksum]
+        self._order_mark = "<" if description.byte_order == "little" else ">"
+        self._tail = self._checksum_size + len(self._terminator)
+        self._order = Order(self.counters, _sequence_modulus(description), each_foot=True)
+
+    def _length(self, buffer: bytearray, start: int) -> int:
+        """Header, fields (some of which may count later ones), checksum, terminator."""
+        at = start + len(self.sync)
+        counts: dict[str, int] = {}
+        for field in self._description.fields:
+            count = counts.get(field.count, 0) if isinstance(field.count, str) else field.count
+            layout = struct.Struct(f"{self._order_mark}{count}{LETTERS[field.type]}")
+            if at + layout.size - start > LONGEST or (isinstance(field.count, str) and count < 1):
+                return IMPOSSIBLE
+            if self._is_count(field):
+                if len(buffer) < at + layout.size:
+                    return UNKNOWN
+                counts[field.name] = int(layout.unpack_from(buffer, at)[0])
+            at += layout.size
+        return at + self._tail - start
+
+    def _is_count(self, field: Field) -> bool:
+        return any(other.count == field.name for other in self._description.fields)
+
+    def _decode(self, raw: bytes) -> InsoleFrame | None:
+        body_end = len(raw) - self._tail
+        checksum = raw[body_end : body_end + self._checksum_size]
+        covered = raw[self._description.checksum_from : body_end]
+        order = self._description.byte_order
+        if self._checksum(covered) != int.from_bytes(checksum, order) or not raw.endswith(self._terminator):
+            self.counters.bad_checksums += 1
+            return None
+        frame = self._frame(self._fields(raw))
+        if frame is None:
+            self.counters.malformed += 1
+        return frame
+
+    def _fields(self, raw: bytes) -> dict[str, Numbers]:
+        at = len(self.sync)
+        values: dict[str, Numbers] = {}
+        for field in self._description.fields:
+            count = int(values[field.count][0]) if isinstance(field.count, str) else field.count
+            layout = struct.Struct(f"{self._order_mark}{count}{LETTERS[field.type]}")
+            values[field.name] = layout.unpack_from(raw, at)
+            at += layout.size
+        return values
+
+    def _frame(self, values: dict[str, Numbers]) -> InsoleFrame | None:
+        """The frame of the fields' raw numbers; `None` where its foot or a number is impossible."""
+        description = self._description
+        foot: Foot | None = None
+        if "foot" in values:
+            feet: dict[float, Foot] = {description.foot_left: "left", description.foot_right: "right"}
+            foot = feet.get(values["foot"][0])
+            if foot is None:
+                return None
+        if not all(math.isfinite(number) for numbers in values.values() for number in numbers):
+            return None
+        seconds = sum(values[name][0] * scale for name, scale in description.time.items())
+        ticks = round(seconds * 1e6) if description.time else None
+        sequence = int(values["sequence"][0]) if "sequence" in values else None
+        means = {flag.means for flag in description.flags if _is_set(flag, values)}
+        missing = "missing" in means or f"{foot}_missing" in means
+        saturated = "saturated" in means
+        self.counters.saturated += saturated
+        scale = description.pascal_per_count or _scale_of(description, "cells")
+        return InsoleFrame(
+            cells=tuple(None if missing else number * scale for number in values["cells"]),
+            foot=foot,
+            calibrated=description.pascal_per_count is not None,
+            saturated=saturated,
+            missing=missing,
+            sequence=sequence,
+            ticks=ticks,
+            late=self._order.is_late(foot, sequence, ticks),
+            more=self._more(values),
+        )
+
+    def _more(self, values: dict[str, Numbers]) -> dict[str, float | list[float]]:
+        """The fields without a meaning of their own, scaled."""
+        known = {"cells", "foot", "sequence", *self._description.time}
+        more: dict[str, float | list[float]] = {}
+        for field in self._description.fields:
+            if field.name not in known:
+                scaled = [number * field.scale for number in values[field.name]]
+                more[field.name] = scaled[0] if field.count == 1 else scaled
+        return more
+
+
+def _scale_of(description: FrameDescription, name: str) -> float:
+    return next(field.scale for field in description.fields if field.name == name)
+
+
+def _sequence_modulus(description: FrameDescription) -> int:
+    sizes = [struct.calcsize(LETTERS[field.type]) for field in description.fields if field.name == "sequence"]
+    return 1 << 8 * (sizes[0] if sizes else 4)
+
+
+def _is_set(flag: Flag, values: dict[str, Numbers]) -> bool:
+    number = int(values[str(flag.source)][0])
+    return str(number) == flag.equals if flag.mask is None else bool(number & flag.mask)
