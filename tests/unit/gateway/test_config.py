@@ -133,7 +133,7 @@ def test_two_axes_of_one_drive_share_a_node(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(configs.ConfigError, match="none.toml: cannot be read"):
+    with pytest.raises(configs.ConfigError, match=r"none\.toml: cannot be read"):
         configs.load(tmp_path / "none.toml")
 
 
