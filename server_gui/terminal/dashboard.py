@@ -1,6 +1,7 @@
 """The terminal dashboard: lays the panels out and draws them ten times a second."""
 
 import io
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,22 +17,24 @@ from server_gui.terminal.keys import Keyboard
 
 FRAME_S = 0.1
 PICTURE_SIZE = (118, 27)
+WIDE_COLUMNS, WIDE_LINES = 110, 27
 
 
-def draw(robot: Robot, controls: Controls, where: str) -> RenderableType:
-    """One frame."""
+def draw(robot: Robot, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
+    """One frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24."""
+    columns, lines = size
+    look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
     page = Layout()
     page.split_column(
-        Layout(panels.header(robot, where), size=3),
-        Layout(name="upper", size=2 + 1 + max(6, len(robot.names("joint")))),
+        Layout(panels.header(robot, where, look), size=3 if look.roomy else 1),
+        Layout(panels.joints(robot, look), size=2 + 1 + max(6, len(robot.names("joint")))),
         Layout(name="lower"),
         Layout(panels.footer(robot, controls, where), size=2),
     )
-    page["upper"].update(panels.joints(robot))
-    page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(robot), ratio=2))
+    page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(robot, look), ratio=2))
     page["left"].split_column(
-        Layout(panels.feet_and_trunk(robot), size=6),
-        Layout(panels.parameters(robot, controls)),
+        Layout(panels.feet_and_trunk(robot, look), size=6),
+        Layout(panels.parameters(robot, controls, look)),
     )
     return page
 
@@ -53,7 +56,7 @@ class Dashboard:
         with Keyboard() as keyboard, live:
             next_frame = time.monotonic()
             while tick() and not self._controls.wants_to_quit:
-                live.update(draw(self._robot, self._controls, self._where), refresh=True)
+                live.update(draw(self._robot, self._controls, self._where, console.size), refresh=True)
                 next_frame = max(next_frame + FRAME_S, time.monotonic())
                 for key in keyboard.wait(next_frame - time.monotonic()):
                     self._controls.press(key)
@@ -63,5 +66,7 @@ def save_picture(path: Path, robot: Robot, controls: Controls, where: str) -> No
     """The frame of this moment as an SVG file."""
     width, height = PICTURE_SIZE
     console = Console(record=True, width=width, height=height, file=io.StringIO(), force_terminal=True)
-    console.print(draw(robot, controls, where), height=height)
-    console.save_svg(str(path), title="gwrms demo")
+    console.print(draw(robot, controls, where, PICTURE_SIZE), height=height)
+    svg = console.export_svg(title="gwrms demo")
+    # rich names a font on somebody's server; a picture of ours asks nobody for anything.
+    path.write_text(re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL), encoding="utf-8")

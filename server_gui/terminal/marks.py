@@ -80,6 +80,13 @@ def needle(value: float | None, low: float, high: float, width: int) -> str:
     return "".join(cells)
 
 
+def scale(low_rad: float, high_rad: float, width: int) -> str:
+    """The ends and the zero of a needle's range, in degrees, above where they lie."""
+    ends = f"{math.degrees(low_rad):.0f}°", f"{math.degrees(high_rad):.0f}°"
+    zero = _cell(0.0, low_rad, high_rad, width)
+    return (ends[0].ljust(zero) + "0°").ljust(width - len(ends[1])) + ends[1]
+
+
 def degrees(value_rad: float | None) -> str:
     """An angle for people."""
     return NONE if value_rad is None else f"{math.degrees(value_rad):+.1f}°"

@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import dataclass
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -24,6 +25,7 @@ from server_gui.terminal.marks import (
     bar,
     degrees,
     needle,
+    scale,
     side_colour,
     sparkline,
     state_text,
@@ -33,22 +35,39 @@ FULL_FORCE_N = 1000.0
 JOINT_LOW_RAD, JOINT_HIGH_RAD = math.radians(-30), math.radians(75)
 SHOWN_PROCESSES = 8
 TILT_RAD = math.radians(15)
-SPARK_WIDTH = 34
 SPARK_SPAN_RAD = math.radians(20)  # at least: a joint at rest is a flat line, not a magnified one
 ROWS_A_BLOCK = 6
 
 
-def header(robot: Robot, where: str) -> RenderableType:
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How much room there is: columns of the drawings, 0 where one is left out."""
+
+    angle: int
+    past: int
+    foot: int
+    parameter: int
+    share: int
+    roomy: bool  # frames, limits and process numbers
+
+
+WIDE = Look(angle=28, past=34, foot=20, parameter=20, share=12, roomy=True)
+NARROW = Look(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
+
+
+def header(robot: Robot, where: str, look: Look) -> RenderableType:
     """Which robot, how it is reached, how old what is shown is, what is wrong."""
     row = Table.grid(expand=True, padding=(0, 2))
     row.add_column(ratio=1)
     row.add_column(justify="right")
     name = robot.description.robot if robot.description is not None else where
-    row.add_row(Text.assemble((name, "bold"), ("  " + where, DIM)), _link(robot))
+    row.add_row(Text.assemble((name, "bold"), ("  " + where, DIM)), _link(robot, look))
+    if not look.roomy:
+        return row
     return Panel(row, title="[bold]GWRMS[/]", title_align="left", box=box.ROUNDED, border_style=DIM)
 
 
-def _link(robot: Robot) -> Text:
+def _link(robot: Robot, look: Look) -> Text:
     link = robot.link
     age_s = robot.age_s()
     if link.state is not ConnectionState.CONNECTED:
@@ -58,7 +77,8 @@ def _link(robot: Robot) -> Text:
     trip = NONE if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     text = Text.assemble(
         state_text("stale" if robot.is_stale() else "ok"),
-        f"  age {age}  {robot.rate_hz():.0f} Hz  round trip {trip}  ",
+        f"  age {age}  {robot.rate_hz():.0f} Hz  ",
+        f"round trip {trip}  " if look.roomy else "",
     )
     lost = link.missed + link.dropped
     text.append(f"lost {lost}", style=WARN if lost else DIM)
@@ -67,15 +87,15 @@ def _link(robot: Robot) -> Text:
     return text
 
 
-def joints(robot: Robot) -> RenderableType:
+def joints(robot: Robot, look: Look) -> RenderableType:
     """Every joint with its drive's state and its angle over the last seconds."""
     stale = robot.is_stale()
     grid = Table(box=None, expand=True, padding=(0, 1), header_style=DIM)
-    grid.add_column("joint", no_wrap=True)
-    grid.add_column("drive", no_wrap=True)
+    for title in ("joint", "drive"):
+        grid.add_column(title, no_wrap=True)
     grid.add_column("angle", justify="right", no_wrap=True, min_width=7)
-    grid.add_column("−30°    0°               75°", no_wrap=True)
-    grid.add_column("last seconds", no_wrap=True, width=SPARK_WIDTH)
+    grid.add_column(scale(JOINT_LOW_RAD, JOINT_HIGH_RAD, look.angle), no_wrap=True, min_width=look.angle)
+    grid.add_column("last seconds" if look.past else "", no_wrap=True, width=look.past)
     for name in robot.names("joint"):
         channel = f"{name}.position"
         value = robot.values.get(channel)
@@ -85,8 +105,8 @@ def joints(robot: Robot) -> RenderableType:
             Text(name.replace("_", " "), style=side_colour(name)),
             _drive(robot, name, stale),
             Text(degrees(value), style=colour),
-            Text(needle(value, JOINT_LOW_RAD, JOINT_HIGH_RAD, 28), style=colour),
-            Text(sparkline(past, *_spark_range(past), SPARK_WIDTH), style=colour),
+            Text(needle(value, JOINT_LOW_RAD, JOINT_HIGH_RAD, look.angle), style=colour),
+            Text(sparkline(past, *_spark_range(past), look.past), style=colour),
         )
     return _panel(grid, "Joints", robot)
 
@@ -116,7 +136,7 @@ def _part_state(robot: Robot, name: str) -> Text:
     return text
 
 
-def feet_and_trunk(robot: Robot) -> RenderableType:
+def feet_and_trunk(robot: Robot, look: Look) -> RenderableType:
     """What each foot carries, and how the trunk leans."""
     stale = robot.is_stale()
     grid = Table.grid(expand=True, padding=(0, 1))
@@ -129,17 +149,19 @@ def feet_and_trunk(robot: Robot) -> RenderableType:
         share = None if force is None else force / FULL_FORCE_N
         label = Text(name.replace("_insole", " foot").replace("_", " "), style=side_colour(name))
         number = _part_state(robot, name) if force is None else Text(f"{force:.0f} N", style=colour)
-        grid.add_row(label, number, Text(bar(share, 20), style=colour))
+        grid.add_row(label, number, Text(bar(share, look.foot), style=colour))
     for name in robot.names("imu"):
         for quantity, words in (("tilt_forward", "forward"), ("tilt_side", "to the side")):
             tilt = robot.values.get(f"{name}.{quantity}")
             colour = OLD if stale or tilt is None else "default"
             number = _part_state(robot, name) if tilt is None else Text(degrees(tilt), style=colour)
-            grid.add_row(f"{name} {words}", number, Text(needle(tilt, -TILT_RAD, TILT_RAD, 20), style=colour))
+            grid.add_row(
+                f"{name} {words}", number, Text(needle(tilt, -TILT_RAD, TILT_RAD, look.foot), style=colour)
+            )
     return _panel(grid, "Feet and trunk", robot)
 
 
-def parameters(robot: Robot, controls: Controls) -> RenderableType:
+def parameters(robot: Robot, controls: Controls, look: Look) -> RenderableType:
     """The gait parameters as the controller holds them; the chosen one can be moved."""
     grid = Table.grid(expand=True, padding=(0, 1))
     for justify in ("left", "left", "right", "left", "left"):
@@ -151,21 +173,27 @@ def parameters(robot: Robot, controls: Controls) -> RenderableType:
         style = "bold" if chosen else "default"
         value = Text(NONE if held.value is None else f"{held.value:.10g}", style=style)
         grid.add_row(
-            "▶" if chosen else " ", Text(name, style=style), value, held.unit, _range(held, infos.get(name))
+            "▶" if chosen else " ",
+            Text(name, style=style),
+            value,
+            held.unit,
+            _range(held, infos.get(name), look),
         )
     if not robot.parameters:
         grid.add_row("", Text("not known yet", style=OLD), "", "", "")
     return _panel(grid, "Gait parameters", robot, _age(robot.parameters_at_ns))
 
 
-def _range(held: ParameterValue, info: ParameterInfo | None) -> Text:
+def _range(held: ParameterValue, info: ParameterInfo | None, look: Look) -> Text:
     if held.problem is not None or info is None or info.min is None or info.max is None:
         return Text(held.problem or "no limits known", style=WARN)
-    where = needle(held.value, info.min, info.max, 20)
-    return Text.assemble(f"{info.min:g} ", (where, DIM), f" {info.max:g}")
+    where = needle(held.value, info.min, info.max, look.parameter)
+    if not look.roomy:
+        return Text(where, style=DIM)
+    return Text.assemble(f"{info.min:>6g} ", (where, DIM), f" {info.max:g}")
 
 
-def resources(robot: Robot) -> RenderableType:
+def resources(robot: Robot, look: Look) -> RenderableType:
     """The robot's computer: CPU, memory, and who uses them most."""
     seen = robot.resources
     if seen is None:
@@ -176,14 +204,16 @@ def resources(robot: Robot) -> RenderableType:
         grid.add_column(justify="right", no_wrap=True)
     cpu = None if seen.cpu.percent is None else seen.cpu.percent / 100
     memory = seen.memory.used / seen.memory.total
-    grid.add_row(Text("CPU"), Text(bar(cpu, 12)), _percent(seen.cpu.percent), "")
-    grid.add_row(Text("memory"), Text(bar(memory, 12)), f"{100 * memory:.0f} %", _mib(seen.memory.used))
+    grid.add_row(Text("CPU"), Text(bar(cpu, look.share)), _percent(seen.cpu.percent), "")
+    grid.add_row(
+        Text("memory"), Text(bar(memory, look.share)), f"{100 * memory:.0f} %", _mib(seen.memory.used)
+    )
     grid.add_row(
         Text("this gateway", style=DIM), "", _percent(seen.gateway.cpu_percent), _mib(seen.gateway.rss_bytes)
     )
     if isinstance(seen.processes, list):
         for process in seen.processes[:SHOWN_PROCESSES]:
-            pid = Text(str(process.pid), style=DIM)
+            pid = Text(str(process.pid) if look.roomy else "", style=DIM)
             grid.add_row(process.name, pid, _percent(process.cpu_percent), _mib(process.memory_bytes))
     return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
 
@@ -200,7 +230,7 @@ def footer(robot: Robot, controls: Controls, where: str) -> RenderableType:
         ("q", "bold"),
         " quit",
     )
-    keys.append("      software stop, not safety-rated", style=DIM)
+    keys.append("  software stop, not safety-rated", style=DIM)
     news = _news(robot, controls, where)
     for text in (keys, news):
         text.no_wrap, text.overflow = True, "ellipsis"

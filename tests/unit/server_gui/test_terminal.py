@@ -94,9 +94,9 @@ def a_robot(at_ns: int = 0) -> Robot:
     return robot
 
 
-def screen(robot: Robot, controls: Controls) -> str:
-    console = Console(width=118, height=27, file=io.StringIO(), record=True, force_terminal=True)
-    console.print(draw(robot, controls, "127.0.0.1:7420"), height=27)
+def screen(robot: Robot, controls: Controls, size: tuple[int, int] = (118, 27)) -> str:
+    console = Console(width=size[0], height=size[1], file=io.StringIO(), record=True, force_terminal=True)
+    console.print(draw(robot, controls, "127.0.0.1:7420", size), height=size[1])
     return console.export_text()
 
 
@@ -227,13 +227,24 @@ def test_needle_marks_zero_and_the_value() -> None:
     assert marks.needle(9.0, 0.0, 1.0, 3) == "──◆"
 
 
-def test_live_values_are_shown_in_degrees_and_newtons(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scale_stands_above_the_ends_and_the_zero_of_its_needle() -> None:
+    low, high = math.radians(-30), math.radians(75)
+    assert marks.scale(low, high, 22) == "-30°  0°           75°"
+    assert marks.needle(None, low, high, 22).index("┼") == 6
+
+
+@pytest.mark.parametrize("size", [(118, 27), (80, 24), (160, 45)])
+def test_live_values_are_shown_in_degrees_and_newtons(
+    monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
     robot = a_robot()
     _feed(robot, {"left_knee.position": [math.radians(30)], "left_insole.force": [512.0]})
     monkeypatch.setattr("time.monotonic_ns", lambda: 1_000_000)
-    text = screen(robot, Controls(robot, Recorder()))
+    text = screen(robot, Controls(robot, Recorder()), size)
+    assert "left knee" in text
     assert "+30.0°" in text
     assert "512 N" in text
+    assert "▶ gait.step_length" in " ".join(text.split())
     assert "● ok" in text
     assert "old" not in text
 
