@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "get": ("gateway.cli.parameters:get", "read parameters from the devices"),
     "set": ("gateway.cli.parameters:set_", "change parameters, all or none, read back"),
     "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
+    "eds": ("eds.cli:main", "what an EDS or DCF file says, and what is wrong with it"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
     "sim": ("hil_sim.cli:main", "the simulated robot, ready for a gateway"),
 }

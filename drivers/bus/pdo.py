@@ -36,6 +36,7 @@ class Tpdo:
     extended: bool
     enabled: bool
     transmission_type: int  # 0–240 on SYNC, 252/253 on request, 254/255 on event
+    event_timer_s: float  # 0: only when something changes
     objects: tuple[MappedObject, ...]
 
     @property
@@ -48,12 +49,23 @@ class Tpdo:
         """What makes the device send it, in words."""
         if self.transmission_type <= 240:
             return "on SYNC"
-        return "on request" if self.transmission_type in (252, 253) else "by itself"
+        if self.transmission_type in (252, 253):
+            return "on request"
+        return f"every {self.event_timer_s:g} s" if self.event_timer_s else "when it changes"
+
+    @property
+    def cyclic(self) -> bool:
+        """Whether it comes also while nothing changes."""
+        return 1 <= self.transmission_type <= 240 or (
+            self.transmission_type >= 254 and self.event_timer_s > 0
+        )
 
 
 def read_tpdos(sdo: SdoChannel, description: Description) -> tuple[Tpdo, ...]:
     """Every TPDO that the device has, enabled or not; raises `DriverError`."""
-    return tuple(tpdo for number in _numbers(description) if (tpdo := _read_tpdo(sdo, number)) is not None)
+    return tuple(
+        tpdo for number in _numbers(description) if (tpdo := _read_tpdo(sdo, description, number)) is not None
+    )
 
 
 def _numbers(description: Description) -> Iterable[int]:
@@ -61,7 +73,7 @@ def _numbers(description: Description) -> Iterable[int]:
     return known or range(USUAL_TPDOS)
 
 
-def _read_tpdo(sdo: SdoChannel, number: int) -> Tpdo | None:
+def _read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | None:
     parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
     try:
         cob_id = unsigned(sdo.upload(parameter, 1))
@@ -69,16 +81,25 @@ def _read_tpdo(sdo: SdoChannel, number: int) -> Tpdo | None:
         return None  # the EDS knows it, this device does not
     enabled = not cob_id & _NOT_VALID
     transmission_type = unsigned(sdo.upload(parameter, 2)[:1])
-    objects = _read_mapping(sdo, mapping) if enabled else ()
     extended = bool(cob_id & _EXTENDED)
     return Tpdo(
-        number + 1,
-        cob_id & (0x1FFF_FFFF if extended else 0x7FF),
-        extended,
-        enabled,
-        transmission_type,
-        objects,
+        number=number + 1,
+        cob_id=cob_id & (0x1FFF_FFFF if extended else 0x7FF),
+        extended=extended,
+        enabled=enabled,
+        transmission_type=transmission_type,
+        event_timer_s=_event_timer_s(sdo, description, parameter) if transmission_type >= 254 else 0,
+        objects=_read_mapping(sdo, mapping) if enabled else (),
     )
+
+
+def _event_timer_s(sdo: SdoChannel, description: Description, parameter: int) -> float:
+    if not description.has(parameter, 5):
+        return 0
+    try:
+        return unsigned(sdo.upload(parameter, 5)[:2]) / 1000
+    except DeviceAbort:
+        return 0
 
 
 def _read_mapping(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...]:

@@ -20,7 +20,7 @@ from drivers.component import Kind
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
-from drivers.joint.plan import Plan, Polled, make_plan
+from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.quantities import AXIS_OFFSET, POSITION, STATUSWORD, channels, quantities
 from drivers.joint.quick_stop import StopOutcome, quick_stop
 from drivers.joint.reading import DriveReading, read_drive
@@ -140,8 +140,8 @@ class JointDrive:
             bus.subscribe(can_id, handler)
             self._undo.append(partial(bus.unsubscribe, can_id, handler))
         for hz, polled in (
-            (self.settings.poll_hz, plan.polled_at(fast=True)),
-            (self.settings.slow_poll_hz, plan.polled_at(fast=False)),
+            (self.settings.poll_hz, plan.polled_often),
+            (self.settings.slow_poll_hz, plan.polled_seldom),
         ):
             if hz and polled:
                 self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, polled)))
@@ -164,12 +164,12 @@ class JointDrive:
 
         return on_frame
 
-    def _poll(self, polled: tuple[Polled, ...], sdo: SdoChannel) -> None:
+    def _poll(self, polled: tuple[Source, ...], sdo: SdoChannel) -> None:
         for one in polled:
             data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
             self._take(one, int.from_bytes(data, "little", signed=one.quantity.signed), time.monotonic_ns())
 
-    def _take(self, one: Polled, counts: int, stamp_ns: int) -> None:
+    def _take(self, one: Source, counts: int, stamp_ns: int) -> None:
         indices: tuple[int, ...] = (one.channel,)
         values: tuple[float | None, ...] = (counts * one.linear.scale + one.linear.offset,)
         if one.quantity.name == STATUSWORD:

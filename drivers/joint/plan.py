@@ -1,6 +1,6 @@
 """Where each of a joint's values comes from: a TPDO, a poll by SDO, or nowhere."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.bus.pdo import Tpdo
@@ -14,8 +14,8 @@ MIN_BITS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Polled:
-    """A quantity that no TPDO brings."""
+class Source:
+    """A quantity with the channel and the scaling that are its own."""
 
     quantity: Quantity
     channel: int
@@ -27,54 +27,56 @@ class Plan:
     """How a joint is read, and what an integrator should know about it."""
 
     decoders: tuple[tuple[Tpdo, Decoder], ...]
-    polled: tuple[Polled, ...]
+    polled_often: tuple[Source, ...]  # position and statusword that no TPDO brings
+    polled_seldom: tuple[Source, ...]  # all else, and what TPDOs bring only when it changes
     notes: tuple[str, ...]
     position_from: Tpdo | None
 
-    def polled_at(self, *, fast: bool) -> tuple[Polled, ...]:
-        """What is polled often, and what is not."""
-        return tuple(polled for polled in self.polled if polled.quantity.fast is fast)
-
 
 def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: DriveReading) -> Plan:
-    """Prefer the first enabled TPDO that carries a quantity; poll the rest."""
+    """Decode every enabled TPDO; poll what none of them brings, or keeps fresh."""
     linears = scalings(settings, reading.scaling)
     wanted = {
-        (q.index, q.subindex): (channel, q, linear)
+        (q.index, q.subindex): Source(q, channel, linear)
         for channel, q in enumerate(found)
         if (linear := _linear(q, linears)) is not None
     }
     names = [quantity.name for quantity in found]
-    decoders = []
-    position_from = None
-    for tpdo in reading.tpdos:
-        fields = _take_fields(tpdo, wanted)
-        if fields:
-            decoder = make_decoder(tpdo, fields, statusword=names.index(STATUSWORD), state=len(names))
-            decoders.append((tpdo, decoder))
-            if names.index(POSITION) in decoder.channels:
-                position_from = tpdo
-    polled = tuple(Polled(quantity, channel, linear) for channel, quantity, linear in wanted.values())
-    notes = (
-        *contradictions(settings, reading.scaling),
-        *_unscaled_notes(found, linears),
-        *_polling_notes(settings, polled, reading.tpdos),
+    mapped = [(tpdo, fields) for tpdo in reading.tpdos if (fields := _fields(tpdo, wanted))]
+    brought = {field.channel for _, fields in mapped for field in fields}
+    fresh = {field.channel for tpdo, fields in mapped if tpdo.cyclic for field in fields}
+    absent = [one for one in wanted.values() if one.channel not in brought]
+    often = tuple(one for one in absent if one.quantity.fast)
+    seldom = tuple(one for one in wanted.values() if one.channel not in fresh and one not in often)
+    return Plan(
+        decoders=tuple(
+            (tpdo, make_decoder(tpdo, fields, statusword=names.index(STATUSWORD), state=len(names)))
+            for tpdo, fields in mapped
+        ),
+        polled_often=often,
+        polled_seldom=seldom,
+        notes=(
+            *contradictions(settings, reading.scaling),
+            *_unscaled_notes(found, linears),
+            *_polling_notes(settings, often, reading.tpdos),
+        ),
+        position_from=_bringer(names.index(POSITION), mapped),
     )
-    return Plan(tuple(decoders), polled, notes, position_from)
 
 
-Wanted = dict[tuple[int, int], tuple[int, Quantity, Linear]]
+def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], Source]) -> list[Field]:
+    """What this TPDO carries of what is wanted."""
+    return [
+        Field(one.channel, mapped.at, mapped.bits, one.quantity.signed, one.linear)
+        for mapped in tpdo.objects
+        if mapped.bits >= MIN_BITS and (one := wanted.get((mapped.index, mapped.subindex))) is not None
+    ]
 
 
-def _take_fields(tpdo: Tpdo, wanted: Wanted) -> list[Field]:
-    """What this TPDO carries of what is still wanted; it is not wanted any more."""
-    fields = []
-    for mapped in tpdo.objects:
-        key = (mapped.index, mapped.subindex)
-        if mapped.bits >= MIN_BITS and key in wanted:
-            channel, quantity, linear = wanted.pop(key)
-            fields.append(Field(channel, mapped.at, mapped.bits, quantity.signed, linear))
-    return fields
+def _bringer(channel: int, mapped: Sequence[tuple[Tpdo, list[Field]]]) -> Tpdo | None:
+    """The TPDO that brings a channel; one that comes cyclically rather than one that does not."""
+    bringers = [tpdo for tpdo, fields in mapped if any(field.channel == channel for field in fields)]
+    return next((tpdo for tpdo in bringers if tpdo.cyclic), bringers[0] if bringers else None)
 
 
 def _linear(quantity: Quantity, linears: Mapping[str, Linear | None]) -> Linear | None:
@@ -89,10 +91,10 @@ def _unscaled_notes(found: tuple[Quantity, ...], linears: Mapping[str, Linear | 
     ]
 
 
-def _polling_notes(settings: JointSettings, polled: tuple[Polled, ...], tpdos: tuple[Tpdo, ...]) -> list[str]:
-    names = [one.quantity.name for one in polled if one.quantity.fast]
-    if not names:
+def _polling_notes(settings: JointSettings, polled: tuple[Source, ...], tpdos: tuple[Tpdo, ...]) -> list[str]:
+    if not polled:
         return []
+    names = [one.quantity.name for one in polled]
     enabled = [tpdo for tpdo in tpdos if tpdo.enabled and tpdo.objects]
     why = f"none of its {len(enabled)} enabled TPDOs carries it" if enabled else "no TPDO is enabled"
     how = f"asked by SDO at {settings.poll_hz:g} Hz" if settings.poll_hz else "not asked for (poll_hz is 0)"

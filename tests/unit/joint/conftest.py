@@ -42,11 +42,12 @@ def drive_objects(axes: int = 1) -> Objects:
     return objects
 
 
-def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 255) -> Objects:
+def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 1) -> Objects:
     """Communication and mapping parameter of one TPDO; `mapped` as in 1A00h."""
     objects = {
         (0x1800 + number - 1, 1): cob_id.to_bytes(4, "little"),
         (0x1800 + number - 1, 2): bytes([transmission_type]),
+        (0x1800 + number - 1, 5): (0).to_bytes(2, "little"),
         (0x1A00 + number - 1, 0): bytes([len(mapped)]),
     }
     for subindex, entry in enumerate(mapped, start=1):
@@ -62,7 +63,7 @@ def drive_eds(objects: Objects) -> str:
     sections = []
     for index, subindex in sorted(objects):
         name = f"{index:04X}" if index in types else f"{index:04X}sub{subindex}"
-        data_type = types.get(index, 7 if len(objects[index, subindex]) == 4 else 5)
+        data_type = types.get(index, {1: 5, 2: 6, 4: 7}[len(objects[index, subindex])])
         sections.append(f"[{name}]\nParameterName={name}\nDataType={data_type}\nAccessType=rw\n")
     return "\n".join(sections)
 

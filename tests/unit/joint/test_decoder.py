@@ -18,7 +18,7 @@ def tpdo(*bits: int) -> Tpdo:
     for number, width in enumerate(bits):
         objects.append(MappedObject(0x2000 + number, 0, width, at))
         at += width
-    return Tpdo(1, 0x181, extended=False, enabled=True, transmission_type=1, objects=tuple(objects))
+    return Tpdo(1, 0x181, False, True, 1, 0, tuple(objects))
 
 
 def test_statusword_and_position_with_the_state_made_of_it() -> None:

@@ -122,6 +122,31 @@ def test_a_drive_without_any_tpdo_is_polled_for_position_and_state(joint: Make, 
         knee.stop()
 
 
+def test_what_a_tpdo_brings_only_when_it_changes_is_kept_fresh_by_sdo(joint: Make, channel: str) -> None:
+    objects = drive_objects()
+    objects |= tpdo(1, 0x182, 0x60410010, transmission_type=255) | tpdo(2, 0x282, 0x60640020)
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, slow_poll_hz=50)
+        knee.start()
+        until(lambda: read(knee, "state") == DriveState.SWITCH_ON_DISABLED)
+        assert (0x6064, 0) not in {(int.from_bytes(r[1:3], "little"), r[3]) for r in fake.requests}
+        knee.stop()
+
+
+def test_a_tpdo_with_an_event_timer_needs_no_help(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(1, 0x182, *STATUS_AND_POSITION, transmission_type=255)
+    objects[0x1800, 5] = (10).to_bytes(2, "little")
+    with FakeNode(channel, 2, objects):
+        knee = joint(objects)
+        knee.start()
+        until(lambda: knee.node.ready)
+        assert knee.reading is not None
+        assert knee.reading.tpdos[0].trigger == "every 0.01 s"
+        until(lambda: read(knee, "error_code") is not None)
+        assert read(knee, "statusword") is None
+        knee.stop()
+
+
 def test_polling_can_be_forbidden(joint: Make, channel: str) -> None:
     objects = drive_objects()
     with FakeNode(channel, 2, objects):
@@ -171,7 +196,7 @@ def test_what_the_drive_does_on_quick_stop_and_lost_master_is_read(joint: Make, 
         until(lambda: knee.node.ready)
         assert knee.reading is not None
         assert knee.reading.options == {"quick_stop": 2, "abort_connection": 1}
-        assert knee.reading.tpdos[0].trigger == "by itself"
+        assert knee.reading.tpdos[0].trigger == "on SYNC"
         knee.stop()
 
 

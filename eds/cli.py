@@ -1,0 +1,141 @@
+"""`gwrms eds`: what an EDS or DCF file says, and what is wrong with it."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import eds
+from eds.description import Description, EdsError
+from eds.report import ObjectRow, PdoRow, grouped_findings, joint_text, object_rows, pdo_rows
+
+_DESCRIPTION = """\
+Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the
+file's defaults have them (a gateway reads them from the device itself), its objects with limits, and what had
+to be repaired.
+"""
+
+_EPILOG = """\
+exit code
+  0 when every file can be used, 1 when one cannot, 2 for wrong usage
+
+examples
+  gwrms eds drive.eds
+  gwrms eds --brief *.eds *.dcf
+  gwrms eds --json --node-id 5 drive.eds
+"""
+
+
+def _node_id(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 127:
+        raise argparse.ArgumentTypeError(f"{text} is no node id: give a number from 1 to 127")
+    return int(text)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms eds",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("files", nargs="+", metavar="FILE", type=Path, help="an .eds or .dcf file")
+    parser.add_argument(
+        "--node-id", type=_node_id, default=1, metavar="N", help="node id for COB-IDs that depend on it (1)"
+    )
+    parser.add_argument("--brief", action="store_true", help="leave out the objects")
+    parser.add_argument("--json", action="store_true", help="one JSON object a file and line")
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """Report each file; one that cannot be used does not hide the others."""
+    arguments = _parser().parse_args(argv)
+    failed = False
+    for path in arguments.files:
+        try:
+            description = eds.load(path, arguments.node_id)
+        except EdsError as error:
+            failed = True
+            sys.stderr.write(f"gwrms eds: {error}\n")
+            continue
+        if arguments.json:
+            sys.stdout.write(json.dumps(_as_json(description, brief=arguments.brief)) + "\n")
+        else:
+            sys.stdout.write("\n".join(_as_text(description, brief=arguments.brief)) + "\n\n")
+    return int(failed)
+
+
+def _as_json(description: Description, *, brief: bool) -> dict[str, object]:
+    return {
+        "file": str(description.path),
+        "vendor": description.vendor,
+        "product": description.product,
+        "vendor_id": description.vendor_id,
+        "product_code": description.product_code,
+        "joint": joint_text(description),
+        "pdos": [asdict(row) for row in pdo_rows(description)],
+        "findings": [asdict(finding) for finding in description.findings],
+        **({} if brief else {"objects": [_object_json(row) for row in object_rows(description)]}),
+    }
+
+
+def _object_json(row: ObjectRow) -> dict[str, object]:
+    return {key: value.hex() if isinstance(value, bytes) else value for key, value in asdict(row).items()}
+
+
+def _as_text(description: Description, *, brief: bool) -> Iterator[str]:
+    rows = list(object_rows(description))
+    yield str(description.path)
+    vendor, product = description.vendor or "vendor unknown", description.product or "product unknown"
+    yield f"  device      {vendor}: {product}"
+    yield f"  identity    vendor {_hex(description.vendor_id)}, product {_hex(description.product_code)}"
+    yield f"  a joint?    {joint_text(description)}"
+    yield f"  objects     {len({row.index for row in rows})} with {len(rows)} values"
+    yield "  PDO defaults"
+    yield from (_pdo_text(row, description) for row in pdo_rows(description))
+    if not brief:
+        yield "  objects: index, type, access, limits, default"
+        yield from (_object_text(row) for row in rows)
+    yield "  findings"
+    findings = grouped_findings(description)
+    for severity, where, text, often in findings:
+        yield f"    {severity:<8}{where} {text}" + (f" (and {often - 1} more alike)" if often > 1 else "")
+    if not findings:
+        yield "    none"
+
+
+def _hex(number: int | None) -> str:
+    return "unknown" if number is None else f"0x{number:X}"
+
+
+def _pdo_text(row: PdoRow, description: Description) -> str:
+    names = []
+    for index, subindex, bits in row.mapped:
+        variable = description.variable(index, subindex)
+        names.append(f"{index:04X}:{subindex:02X} {variable.qualname if variable else '?'} ({bits} bits)")
+    state = "" if row.enabled else " disabled"
+    mapped = ", ".join(names) or "empty"
+    return f"    {row.name:<7}{_hex(row.cob_id):<12}type {row.transmission_type}{state}: {mapped}"
+
+
+def _object_text(row: ObjectRow) -> str:
+    limits = (
+        ""
+        if row.minimum is None and row.maximum is None
+        else f"[{_bound(row.minimum)} … {_bound(row.maximum)}]"
+    )
+    default = "" if row.default is None else f"= {_value(row.default)}"
+    configured = "" if row.value is None else f" (DCF: {_value(row.value)})"
+    left = f"    {row.index:04X}:{row.subindex:02X} {row.data_type:<15}{row.access:<6}"
+    return f"{left}{row.name}  {limits}{' ' if limits else ''}{default}{configured}".rstrip()
+
+
+def _bound(limit: float | None) -> str:
+    return "" if limit is None else str(limit)
+
+
+def _value(value: object) -> str:
+    return value.hex(" ") if isinstance(value, bytes) else str(value)

@@ -1,0 +1,128 @@
+"""What an EDS or DCF says about a device, as rows that a person or a program can read."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from canopen.objectdictionary import ODVariable
+
+from eds.datatypes import DATA_TYPES
+from eds.description import Description
+
+FIRST_OBJECT = 0x1000  # below are data types
+AXIS_OFFSET = 0x800
+MAX_AXES = 8
+JOINT_OBJECTS = ((0x6041, "statusword"), (0x6064, "position actual value"))
+
+# Communication and mapping parameters (CiA 301 §7.5.2): name, first communication, first mapping object.
+_PDOS = (("TPDO", 0x1800, 0x1A00), ("RPDO", 0x1400, 0x1600))
+_NOT_VALID = 0x8000_0000
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectRow:
+    """One object or sub-object. Limits and default are `None` where the file gives none."""
+
+    index: int
+    subindex: int
+    name: str
+    data_type: str
+    access: str
+    minimum: float | None
+    maximum: float | None
+    default: object
+    value: object  # a DCF's
+
+
+@dataclass(frozen=True, slots=True)
+class PdoRow:
+    """One PDO as the file's defaults, or a DCF's values, have it."""
+
+    name: str
+    cob_id: int | None
+    enabled: bool
+    transmission_type: int | None
+    mapped: tuple[tuple[int, int, int], ...]  # index, sub-index, bits
+
+
+def object_rows(description: Description) -> Iterator[ObjectRow]:
+    """Every object of the device, by index and sub-index."""
+    for variable in _variables(description):
+        data_type = DATA_TYPES.get(variable.data_type or 0)
+        yield ObjectRow(
+            variable.index,
+            variable.subindex,
+            variable.qualname,
+            "?" if data_type is None else data_type.name,
+            variable.access_type,
+            variable.min,
+            variable.max,
+            variable.default,
+            variable.value,
+        )
+
+
+def pdo_rows(description: Description) -> Iterator[PdoRow]:
+    """Every PDO that the file describes."""
+    for kind, communication, mapping in _PDOS:
+        for number in range(512):
+            cob_id = _number(description, communication + number, 1)
+            if not description.has(communication + number, 1):
+                continue
+            count = _number(description, mapping + number, 0) or 0
+            entries = (_number(description, mapping + number, sub) for sub in range(1, min(count, 64) + 1))
+            yield PdoRow(
+                f"{kind}{number + 1}",
+                None if cob_id is None else cob_id & 0x1FFF_FFFF,
+                cob_id is not None and not cob_id & _NOT_VALID,
+                _number(description, communication + number, 2),
+                tuple((entry >> 16, entry >> 8 & 0xFF, entry & 0xFF) for entry in entries if entry),
+            )
+
+
+def axes(description: Description) -> int:
+    """How many joints the device can be: axes with the objects that a joint needs."""
+    return sum(
+        all(description.has(index + axis * AXIS_OFFSET) for index, _ in JOINT_OBJECTS)
+        for axis in range(MAX_AXES)
+    )
+
+
+def joint_text(description: Description) -> str:
+    """Whether the device can be a joint, and what it lacks."""
+    count = axes(description)
+    if count:
+        return "yes" if count == 1 else f"yes, {count} axes"
+    missing = [f"0x{index:04X} ({name})" for index, name in JOINT_OBJECTS if not description.has(index)]
+    return f"no, {' and '.join(missing)} missing"
+
+
+def grouped_findings(description: Description) -> list[tuple[str, str, str, int]]:
+    """Findings as (severity, first place, text, how often): what stands in thirty sections is told once."""
+    first: dict[tuple[str, str], str] = {}
+    often: Counter[tuple[str, str]] = Counter()
+    for finding in description.findings:
+        key = (finding.severity, finding.text)
+        first.setdefault(key, finding.where)
+        often[key] += 1
+    return [(severity, first[severity, text], text, often[severity, text]) for severity, text in first]
+
+
+def _variables(description: Description) -> Iterator[ODVariable]:
+    dictionary = description.object_dictionary
+    for index in dictionary:
+        if index < FIRST_OBJECT:
+            continue
+        entry = dictionary[index]
+        if isinstance(entry, ODVariable):
+            yield entry
+        else:
+            yield from (entry[subindex] for subindex in entry)
+
+
+def _number(description: Description, index: int, subindex: int) -> int | None:
+    variable = description.variable(index, subindex)
+    if variable is None:
+        return None
+    value = variable.default if variable.value is None else variable.value
+    return value if isinstance(value, int) else None
