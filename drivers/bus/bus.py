@@ -36,6 +36,8 @@ _STATE_WORDS = {
 class BusUser:
     """What is told when a bus comes, goes, and that time passes: in the bus's thread, never for long."""
 
+    ready = True  # whether it knows which frames it needs
+
     def bus_opened(self) -> None:
         """Frames can come from now on. In the caller's thread where the bus was open already."""
 
@@ -74,7 +76,15 @@ class CanBus:
     @property
     def trouble(self) -> str | None:
         """Why it is not open, or what its controller says about the wire; `None` when nothing is wrong."""
-        return self.problem or _STATE_WORDS.get(self.state)
+        transport = self._transport
+        warning = None if transport is None else transport.warning
+        return self.problem or _STATE_WORDS.get(self.state) or warning
+
+    @property
+    def dropped(self) -> int:
+        """Frames that came and were lost since the bus opened, as far as the interface tells."""
+        transport = self._transport
+        return 0 if transport is None else transport.dropped
 
     def start(self) -> None:
         """Keep the bus open, nodes or not; idempotent, returns at once."""
@@ -177,6 +187,7 @@ class CanBus:
         tick_ns = round(TICK_S * 1e9)
         handler_of = self._handlers.get
         next_tick_ns = time.monotonic_ns()
+        accepted: frozenset[int] | None = None
         while not self._stopping.is_set():
             frames = transport.receive(TICK_S)
             self.frames += len(frames)
@@ -193,8 +204,16 @@ class CanBus:
             now_ns = time.monotonic_ns()
             if now_ns >= next_tick_ns:
                 next_tick_ns = now_ns + tick_ns
+                accepted = self._accept(transport, accepted)
                 for user in self._users:
                     user.tick(now_ns)
+
+    def _accept(self, transport: Transport, before: frozenset[int] | None) -> frozenset[int] | None:
+        """Once all is ready only what is subscribed matters; before, any frame helps to say what is wrong."""
+        wanted = frozenset(self._handlers) if all(user.ready for user in self._users) else None
+        if wanted != before:
+            transport.accept(wanted)
+        return wanted
 
     def _unhandled(self, can_id: int, data: bytes) -> None:
         if can_id & ERROR:

@@ -18,12 +18,18 @@ FrameHandler = Callable[[int, bytes], None]  # stamp_ns, data; in the bus's thre
 class Transport(Protocol):
     """An open CAN interface. One thread receives; any thread sends.
 
-    `receive` waits up to `timeout_s` and returns what came, oldest first, perhaps nothing. Both methods raise
-    `drivers.errors.Unavailable` when the interface is gone; the transport is then closed and of no more use.
+    `receive` waits up to `timeout_s` and returns what came, oldest first, perhaps nothing. It and `send`
+    raise `drivers.errors.Unavailable` when the interface is gone; the transport is then of no more use.
     """
+
+    dropped: int  # frames that came and were lost, as far as the interface tells
+    warning: str | None  # what is wrong with it although it is open, in words
 
     def receive(self, timeout_s: float) -> Sequence[Frame]: ...
 
     def send(self, can_id: int, data: bytes) -> None: ...
+
+    def accept(self, can_ids: frozenset[int] | None) -> None:
+        """Only these identifiers matter (`None`: all): the interface may keep the others to itself."""
 
     def close(self) -> None: ...

@@ -17,13 +17,24 @@ def _socketcand(settings: CanSettings) -> Transport:
     return SocketcandTransport(host, port, str(settings.channel))
 
 
+def _socketcan(settings: CanSettings) -> Transport:
+    if settings.more:  # such as CAN FD: only python-can knows these keys
+        return _python_can(settings)
+    from drivers.bus.socketcan import open_socketcan
+
+    return open_socketcan(settings)
+
+
 def _python_can(settings: CanSettings) -> Transport:
     from drivers.bus.python_can import PythonCanTransport
 
     return PythonCanTransport(settings)
 
 
-_OWN: dict[str, Callable[[CanSettings], Transport]] = {"socketcand": _socketcand}
+_OWN: dict[str, Callable[[CanSettings], Transport]] = {
+    "socketcand": _socketcand,
+    "socketcan": _socketcan,
+}
 
 
 def open_transport(settings: CanSettings) -> Transport:

@@ -15,6 +15,8 @@ class PythonCanTransport:
 
     def __init__(self, settings: CanSettings) -> None:
         """Open it; raises `Unavailable`."""
+        self.dropped = 0  # python-can does not tell
+        self.warning: str | None = None
         self._where = f"{settings.interface} channel {settings.channel}"
         keys = settings.more if settings.bitrate is None else {**settings.more, "bitrate": settings.bitrate}
         try:
@@ -43,6 +45,9 @@ class PythonCanTransport:
             self._bus.send(message)
         except (can.CanError, OSError, ValueError) as error:
             raise Unavailable(f"{self._where} does not send: {error}") from error
+
+    def accept(self, can_ids: frozenset[int] | None) -> None:
+        """Most interfaces filter in Python, which costs more than it saves."""
 
     def close(self) -> None:
         self._bus.shutdown()

@@ -65,7 +65,8 @@ class SocketcandTransport:
 
     def __init__(self, host: str, port: int, channel: str) -> None:
         """Connect and enter raw mode; raises `Unavailable`."""
-        self.dropped = 0
+        self.dropped = 0  # messages that were no frames
+        self.warning: str | None = None
         self._where = f"socketcand at {host}:{port}"
         self._parser = SocketcandParser()
         self._early: list[str] = []
@@ -105,6 +106,9 @@ class SocketcandTransport:
             self._socket.sendall(send_message(can_id, data).encode("ascii"))
         except OSError as error:
             raise Unavailable(f"{self._where} is gone ({error})") from error
+
+    def accept(self, can_ids: frozenset[int] | None) -> None:
+        """The protocol's raw mode has no filters."""
 
     def close(self) -> None:
         self._socket.close()
