@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
+from drivers.identify import recognise
 from drivers.parsing import Parser
 from drivers.port import SerialPort
 
 F = TypeVar("F")
 Listening = TypeVar("Listening", contravariant=True)
 
+TAIL = 2048  # bytes that are kept to tell what speaks there instead
+UNREAD = 256  # bytes without a frame that are no beginning of one any more
 SILENCE_S = 1.0  # a sensor that streams says something within this time
 
 
@@ -36,8 +39,8 @@ class Line(Generic[F]):
         self._make_parser = make_parser
         self._port = SerialPort(path, baudrate, self._received, self._opened, self._closed)
         self._users: tuple[User[F], ...] = ()
-        self._bytes = 0  # since the port was opened
-        self._frames = 0
+        self._unread = 0  # bytes since the last frame, or since the port was opened
+        self._unread_tail = b""
         self._last_byte_ns: int | None = None
 
     def start(self, user: User[F]) -> None:
@@ -59,20 +62,23 @@ class Line(Generic[F]):
         opened_ns = self._port.opened_ns
         if opened_ns is None:
             return self._port.problem or f"{self.path} is being opened"
-        if self._bytes and not self._frames:
-            return (
-                f"{self._bytes} bytes came from {self.path} at {self._port.baudrate} baud and "
-                f"no {self.format_name} frame among them: wrong baud rate, wrong format or another device "
-                f"(gwrms sensor {self.path} finds out)"
-            )
         silent_s = (now_ns - max(opened_ns, self._last_byte_ns or 0)) / 1e9
         if silent_s > SILENCE_S:
             return f"no byte from {self.path} for {silent_s:.1f} s: check the sensor's power and its TX wire"
-        return None
+        if self._unread < UNREAD:
+            return None
+        spoken = recognise(self._unread_tail)
+        why = f"wrong baud rate or wrong format (gwrms sensor {self.path} finds out)"
+        if spoken is not None and spoken.format_name != self.format_name:
+            why = f"another device is there, it speaks {spoken.format_name}"
+        return (
+            f"{self._unread} bytes came from {self.path} at {self._port.baudrate} baud "
+            f"and no {self.format_name} frame among them: {why}"
+        )
 
     def _opened(self) -> None:
         self.reconnects += 1
-        self._bytes = self._frames = 0
+        self._unread, self._unread_tail = 0, b""
         self._last_byte_ns = None
         self.parser.finish()
 
@@ -81,10 +87,13 @@ class Line(Generic[F]):
             user.disconnected()
 
     def _received(self, data: bytes, stamp_ns: int) -> None:
-        self._bytes += len(data)
         self._last_byte_ns = stamp_ns
         frames = self.parser.feed(data)
-        self._frames += len(frames)
+        if frames:
+            self._unread, self._unread_tail = 0, b""
+        else:
+            self._unread += len(data)
+            self._unread_tail = (self._unread_tail + data)[-TAIL:]
         for frame in frames:
             for user in self._users:
                 user.received(frame, stamp_ns)

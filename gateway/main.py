@@ -20,6 +20,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "set": ("gateway.cli.parameters:set_", "change parameters, all or none, read back"),
     "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
     "eds": ("eds.cli:main", "what an EDS or DCF file says, and what is wrong with it"),
+    "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
+    "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
     "sim": ("hil_sim.cli:main", "the simulated robot, ready for a gateway"),
 }

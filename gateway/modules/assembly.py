@@ -5,15 +5,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-import msgspec
-
 import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.component import Component, Kind
 from drivers.errors import DriverError
 from drivers.imu.device import Imu
-from drivers.insole.device import Insole, line_for
+from drivers.insole.device import Insole, line_for, pair
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.drive import JointDrive
 from gateway.config import RobotConfig
@@ -42,8 +40,9 @@ def assemble(config: RobotConfig) -> Robot:
     lines: dict[str, Any] = {}
     for name, insole in config.insole.items():
         _add(robot, Kind.INSOLE, name, _insole(config.path, name, insole, lines))
+    pair([one for one in robot.components.values() if isinstance(one, Insole)])
     for name, imu in config.imu.items():
-        _add(robot, Kind.IMU, name, lambda name=name, imu=imu: Imu(name, imu))  # type: ignore[misc]
+        _add(robot, Kind.IMU, name, lambda name=name, imu=imu: Imu(name, imu, config.path.parent))  # type: ignore[misc]
     return robot
 
 
@@ -70,11 +69,9 @@ def _insole(
     path: Path, name: str, settings: InsoleSettings, lines: dict[str, Any]
 ) -> Callable[[], Component]:
     def build() -> Component:
-        layout = settings.layout
-        beside = str(path.parent / layout) if layout.endswith(".toml") else layout
         if settings.port not in lines:
-            lines[settings.port] = line_for(settings)
-        return Insole(name, msgspec.structs.replace(settings, layout=beside), lines[settings.port])
+            lines[settings.port] = line_for(settings, path.parent)
+        return Insole(name, settings, lines[settings.port], path.parent)
 
     return build
 

@@ -1,0 +1,1 @@
+"""Commands for one sensor at a time: `gwrms sensor` and `gwrms calibrate`."""

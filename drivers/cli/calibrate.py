@@ -1,0 +1,196 @@
+"""`gwrms calibrate`: an insole's calibration or an IMU's zero, shown before it is written."""
+
+import argparse
+import datetime
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import msgspec
+
+from drivers.cli.sensor import run_parsed
+from drivers.errors import Unavailable
+from drivers.imu import zero
+from drivers.imu.device import Imu
+from drivers.imu.formats import FORMATS as IMU_FORMATS
+from drivers.imu.settings import ImuSettings
+from drivers.insole import fit as fitting
+from drivers.insole import layout as layouts
+from drivers.insole.calibration import CellCalibration, loaded_counts
+from drivers.insole.formats import FORMATS as INSOLE_FORMATS
+from drivers.insole.formats import parser_maker
+from drivers.insole.frame import InsoleFrame
+from drivers.line import Line
+from drivers.samples import State
+
+STANDARD_GRAVITY = 9.80665
+AVERAGE_S = 2.0
+USAGE = "usage: gwrms calibrate insole|imu PORT --write FILE …  (each explains itself with --help)\n"
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run `gwrms calibrate` and return its exit code."""
+    kinds = {"insole": _insole_options, "imu": _imu_options}
+    if not arguments or arguments[0] not in kinds:
+        helped = bool(arguments) and arguments[0] in ("-h", "--help")
+        (sys.stdout if helped else sys.stderr).write(USAGE)
+        return 0 if helped else 2
+    kind, *rest = arguments
+    parser = argparse.ArgumentParser(prog=f"gwrms calibrate {kind}")
+    parser.add_argument("port", metavar="PORT")
+    parser.add_argument("--write", type=Path, required=True, metavar="FILE", help="where the result goes")
+    return run_parsed(parser, kinds[kind](parser), rest)
+
+
+def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
+    parser.description = (
+        "Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks "
+        "before it writes. Name the file in [insole.NAME] as `calibration`."
+    )
+    parser.add_argument(
+        "--format", choices=INSOLE_FORMATS, default="insole-cobs", help="default: %(default)s"
+    )
+    parser.add_argument("--baud", type=int, default=230400, help="default: %(default)s")
+    parser.add_argument("--layout", default="insole-16", help="a shipped layout or a .toml file")
+    parser.add_argument("--foot", choices=("left", "right"), help="where both feet are on the port")
+    parser.add_argument("--falling", type=float, metavar="FULL_SCALE", help="fewer counts are more load")
+    parser.add_argument("--saturation", type=float, help="counts from which a cell says no more")
+    parser.add_argument("--power", action="store_true", help="fit a power law (two different loads or more)")
+    return _insole
+
+
+def _imu_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
+    parser.description = (
+        "Takes the present posture as upright and writes it. Stand upright and still; name the file in "
+        "[imu.NAME] as `zero`."
+    )
+    parser.add_argument(
+        "--format", choices=tuple(IMU_FORMATS), default="witmotion", help="default: %(default)s"
+    )
+    parser.add_argument("--baud", type=int, default=115200, help="default: %(default)s")
+    parser.add_argument("--axes", nargs=3, help="as in [imu.NAME]")
+    parser.add_argument(
+        "--mounting", nargs=3, type=float, default=(0.0, 0.0, 0.0), help="as in [imu.NAME], rad"
+    )
+    return _imu
+
+
+class _Average:
+    """A line's user that averages the cells' counts of one foot."""
+
+    def __init__(self, foot: str | None, cells: int) -> None:
+        self._foot = foot
+        self._cells = cells
+        self.sums: list[float] | None = None
+        self.frames = 0
+
+    def received(self, frame: InsoleFrame, _stamp_ns: int) -> None:
+        wanted = frame.foot is None or self._foot in (None, frame.foot)
+        if not wanted or len(frame.cells) != self._cells or frame.calibrated:
+            return
+        before = self.sums or [0.0] * self._cells
+        self.sums = [total + (count or 0.0) for total, count in zip(before, frame.cells, strict=True)]
+        self.frames += 1
+
+    def disconnected(self) -> None:
+        self.sums, self.frames = None, 0
+
+
+def _insole(options: argparse.Namespace) -> int:
+    layout = layouts.load(options.layout)
+    line = Line(options.port, options.baud, options.format, parser_maker(options.format, layout))
+    base = CellCalibration(
+        polarity="falling" if options.falling else "rising",
+        full_scale=options.falling,
+        saturation=options.saturation,
+    )
+    rising = loaded_counts(base)
+
+    def measure() -> list[float]:
+        return [rising(count) for count in _average(line, options.foot, len(layout.cells))]
+
+    _say("Take all load off the insole (shoe on, foot lifted), then press Enter.")
+    _read()
+    tares = measure()
+    _say("tare: " + " ".join(f"{tare:.0f}" for tare in tares))
+    loads: list[fitting.Load] = []
+    while (mass := _mass()) is not None:
+        loads.append(fitting.Load(mass * STANDARD_GRAVITY, tuple(measure())))
+    fitted = fitting.fit(layout, tares, loads, base, options.power)
+    for load, force in zip(loads, fitted.forces, strict=True):
+        _say(f"  load {load.force:7.1f} N   measured {force:7.1f} N   off by {force - load.force:+6.1f} N")
+    _say(f"  error {fitted.rms_error:.1f} N (rms)")
+    return _write(options.write, fitting.text(fitted, _now()))
+
+
+def _imu(options: argparse.Namespace) -> int:
+    settings = {"port": options.port, "baudrate": options.baud, "format": options.format}
+    settings |= {"mounting": options.mounting} | ({"axes": options.axes} if options.axes else {})
+    imu = Imu("trunk", msgspec.convert(settings, ImuSettings))
+    imu.start()
+    try:
+        threading.Event().wait(AVERAGE_S)
+        quality = imu.quality(time.monotonic_ns())
+        if quality.state is not State.OK:
+            raise Unavailable(quality.problem or f"nothing came from {options.port}")
+        measured = imu.zero_now()
+    finally:
+        imu.stop()
+    angle = math.degrees(2 * math.acos(min(1.0, abs(measured[0]))))
+    _say(f"upright is {angle:.1f}° from how the IMU is mounted")
+    return _write(options.write, zero.text(measured, _now()))
+
+
+def _average(line: Line[InsoleFrame], foot: str | None, cells: int) -> list[float]:
+    average = _Average(foot, cells)
+    line.start(average)
+    try:
+        threading.Event().wait(AVERAGE_S)
+        problem = line.problem(time.monotonic_ns())
+    finally:
+        line.stop(average)
+    if average.sums is None or not average.frames:
+        raise Unavailable(problem or f"no uncalibrated frame of {cells} cells came from {line.path}")
+    return [total / average.frames for total in average.sums]
+
+
+def _mass() -> float | None:
+    """The next known load in kg; `None` when there are no more."""
+    while True:
+        _say("Put a known load on the whole insole, type its mass in kg and press Enter (empty: done).")
+        text = _read()
+        if not text:
+            return None
+        try:
+            mass = float(text)
+        except ValueError:
+            mass = math.nan
+        if 0.1 <= mass <= 500.0:
+            return mass
+        _say(f"{text!r} is no mass between 0.1 and 500 kg")
+
+
+def _write(path: Path, content: str) -> int:
+    _say(f"Write this to {path}? [y/N]")
+    if _read().lower() not in ("y", "yes"):
+        _say("nothing written")
+        return 1
+    path.write_text(content, encoding="utf-8")
+    _say(f"written to {path}")
+    return 0
+
+
+def _read() -> str:
+    return sys.stdin.readline().strip()
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

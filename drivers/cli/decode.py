@@ -1,0 +1,103 @@
+"""`gwrms sensor decode`: raw bytes of a sensor as JSON lines, one a frame, and the counters last."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import msgspec
+
+from drivers.imu import frame as imu_frame
+from drivers.imu.formats import FORMATS as IMU_FORMATS
+from drivers.imu.witmotion_can import WitmotionCanParser
+from drivers.insole import frame as insole_frame
+from drivers.insole import layout as layouts
+from drivers.insole.calibration import Cells
+from drivers.insole.formats import FORMATS as INSOLE_FORMATS
+from drivers.insole.formats import parser_maker
+from drivers.insole.frame import InsoleFrame
+from drivers.insole.layout import Layout
+from drivers.insole.load import load_of
+from drivers.parsing import Parser
+
+CHUNK = 65536
+FORCE_THRESHOLD = 20.0  # N, below it there is no centre of pressure
+FORMATS = (*IMU_FORMATS, "witmotion-can", *INSOLE_FORMATS)
+
+Flatten = Callable[[Any], dict[str, object]]
+
+
+def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
+    parser.description = (
+        'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}.'
+    )
+    parser.add_argument("--format", required=True, choices=FORMATS, help="the language of the bytes")
+    parser.add_argument(
+        "--layout", help=f"an insole's layout file, or one that ships: {', '.join(layouts.shipped())}"
+    )
+    parser.add_argument("capture", nargs="?", metavar="CAPTURE", help="a file; without it, standard input")
+    return run
+
+
+def run(options: argparse.Namespace) -> int:
+    """Decode the capture to standard output.
+
+    Raises:
+        SettingsError: the layout is wrong, or the format needs one.
+        OSError: the capture cannot be read.
+
+    """
+    parser, flatten = _reader(options.format, options.layout)
+    if options.capture is None:
+        _decode(sys.stdin.buffer, parser, flatten)
+    else:
+        with Path(options.capture).open("rb") as capture:
+            _decode(capture, parser, flatten)
+    return 0
+
+
+def _reader(name: str, layout_name: str | None) -> tuple[Parser[Any], Flatten]:
+    if name in IMU_FORMATS:
+        return IMU_FORMATS[name].make_parser(), imu_frame.flat
+    if name == "witmotion-can":
+        return WitmotionCanParser(), imu_frame.flat
+    layout = layouts.load(layout_name) if layout_name else None
+    return parser_maker(name, layout)(), (insole_frame.flat if layout is None else _with_load(layout))
+
+
+def _decode(source: BinaryIO, parser: Parser[Any], flatten: Flatten) -> None:
+    write = sys.stdout.write
+    read = getattr(source, "read1", source.read)  # what is there already, so that a pipe is shown live
+    while data := read(CHUNK):
+        for frame in parser.feed(data):
+            write(_line(flatten(frame)))
+        sys.stdout.flush()
+    for frame in parser.finish():
+        write(_line(flatten(frame)))
+    write(_line({"counters": parser.counters.as_dict()}))
+    sys.stdout.flush()
+
+
+def _line(values: dict[str, object]) -> str:
+    return msgspec.json.encode(values).decode("utf-8") + "\n"
+
+
+def _with_load(layout: Layout) -> Flatten:
+    """Adds pressure, force and centre of pressure where the layout says enough."""
+    count = len(layout.cells)
+    cells = Cells(layout.calibration, count) if layout.calibration is not None and count else None
+
+    def flatten(frame: InsoleFrame) -> dict[str, object]:
+        line = insole_frame.flat(frame)
+        if count != len(frame.cells):
+            return line
+        if not frame.calibrated:
+            if cells is None:
+                return line
+            line["pressures"] = cells.pressures(frame.cells)
+        pressures: Any = line["pressures"]
+        on_foot = layout if frame.foot is None else layout.for_foot(frame.foot)
+        return line | load_of(pressures, on_foot, FORCE_THRESHOLD)._asdict()
+
+    return flatten

@@ -1,0 +1,144 @@
+"""`gwrms sensor record` and `replay`: raw bytes into a file, and again out of a pseudo-terminal."""
+
+import argparse
+import os
+import pty
+import sys
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import msgspec
+
+from drivers.errors import Unavailable
+from drivers.port import SerialPort
+
+TICK_S = 0.01
+DEFAULT_BAUDRATE = 115200
+
+
+class About(msgspec.Struct, frozen=True):
+    """What the bytes alone do not say; stands beside a capture, as CAPTURE.json."""
+
+    baudrate: int
+    seconds: float
+
+
+def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
+    parser.description = "Records a port's raw bytes, and beside them FILE.json with baud rate and duration."
+    parser.add_argument("port", metavar="PORT")
+    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument("--baud", type=int, default=DEFAULT_BAUDRATE, help="default: %(default)s")
+    parser.add_argument("--seconds", type=float, help="for so long; default: until Ctrl-C")
+    return record
+
+
+def replay_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
+    parser.description = (
+        "Sends a capture's bytes out of a pseudo-terminal, at the pace at which they were recorded. "
+        'Prints {"ready": true, "port": …} when it can be opened.'
+    )
+    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument(
+        "--link", type=Path, help="a path that points to the pseudo-terminal while it is there"
+    )
+    parser.add_argument(
+        "--baud", type=int, default=DEFAULT_BAUDRATE, help="the pace where FILE.json is missing"
+    )
+    parser.add_argument("--speed", type=float, default=1.0, help="times faster than recorded")
+    parser.add_argument("--loop", action="store_true", help="again and again, until Ctrl-C")
+    return replay
+
+
+def record(options: argparse.Namespace) -> int:
+    """Record until the time is up or Ctrl-C.
+
+    Raises:
+        Unavailable: the port cannot be opened, or nothing came.
+
+    """
+    done = threading.Event()
+    with options.file.open("xb") as file:
+
+        def keep(data: bytes, _stamp_ns: int) -> None:
+            file.write(data)
+
+        port = SerialPort(options.port, options.baud, keep)
+        began = time.monotonic()
+        port.start()
+        try:
+            done.wait(options.seconds)
+        except KeyboardInterrupt:
+            done.set()
+        finally:
+            problem = port.problem
+            port.stop()
+        size = file.tell()
+    if not size:
+        options.file.unlink()
+        raise Unavailable(problem or f"{options.port} sent nothing: check the sensor's power and its TX wire")
+    about = About(options.baud, time.monotonic() - began)
+    _beside(options.file).write_bytes(msgspec.json.encode(about))
+    sys.stdout.write(f"{size} bytes in {about.seconds:.1f} s\n")
+    return 0
+
+
+def replay(options: argparse.Namespace) -> int:
+    """Send the capture once, or in a loop."""
+    data = options.file.read_bytes()
+    seconds = _seconds(options.file, len(data), options.baud) / options.speed
+    share = max(1, round(len(data) * TICK_S / max(seconds, TICK_S)))
+    pause = threading.Event()
+    with _terminal(options.link) as (master, path):
+        sys.stdout.write(msgspec.json.encode({"ready": True, "port": path}).decode() + "\n")
+        sys.stdout.flush()
+        try:
+            while True:
+                for at in range(0, len(data), share):
+                    _send(master, data[at : at + share])
+                    pause.wait(TICK_S)
+                if not options.loop:
+                    return 0
+        except KeyboardInterrupt:
+            return 0
+
+
+def _beside(file: Path) -> Path:
+    return file.with_name(file.name + ".json")
+
+
+def _seconds(file: Path, size: int, baudrate: int) -> float:
+    """How long the capture took; without its description, as long as a busy line takes."""
+    try:
+        return msgspec.json.decode(_beside(file).read_bytes(), type=About).seconds
+    except FileNotFoundError:
+        return size * 10 / baudrate
+
+
+@contextmanager
+def _terminal(link: Path | None) -> Iterator[tuple[int, str]]:
+    master, slave = pty.openpty()
+    try:
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        path = os.ttyname(slave)
+        if link is not None:
+            link.symlink_to(path)
+        # The other end stays open here, so that a reader that comes and goes ends nothing.
+        yield master, str(link or path)
+    finally:
+        if link is not None and link.is_symlink():
+            link.unlink()
+        os.close(slave)
+        os.close(master)
+
+
+def _send(master: int, data: bytes) -> None:
+    """As a serial line does: what nobody reads is lost."""
+    try:
+        os.write(master, data)
+    except BlockingIOError:
+        return

@@ -1,0 +1,73 @@
+"""Which format a stream of bytes is in: every parser tries, and the one that explains most of it wins."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from drivers.imu.formats import FORMATS as IMU_FORMATS
+from drivers.insole import layout as layouts
+from drivers.insole.formats import parser_maker
+from drivers.parsing import Parser
+
+FEWEST_FRAMES = 3
+FEWEST_SHARE = 0.5  # of the bytes
+NUMBERS_LINE = re.compile(rb"[ \t]*[^,;\t\r\n]{0,24}([,;\t][ ]*-?[0-9.eE+-]*){2,}\r?")
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """How well a format explains some bytes."""
+
+    format_name: str
+    layout: str | None  # the shipped layout whose description fits, for insole formats that need one
+    frames: int
+    share: float  # of the bytes, 0 to 1
+    cells: int | None = None  # of an insole
+
+
+def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
+    """Every format (and shipped description) that a serial stream can be in."""
+    for name, imu in IMU_FORMATS.items():
+        yield name, None, imu.make_parser
+    yield "insole-cobs", None, parser_maker("insole-cobs", None)
+    yield "insole-csv", None, parser_maker("insole-csv", None)
+    for name in layouts.shipped():
+        layout = layouts.load(name)
+        if layout.frame is not None:
+            yield "insole-frame", name, parser_maker("insole-frame", layout)
+
+
+def matches(data: bytes) -> list[Match]:
+    """The formats that fit `data`, the best first."""
+    found = [match for candidate in candidates() if (match := _try(data, *candidate)) is not None]
+    if not found and (lines := _number_lines(data)) is not None:
+        found.append(lines)
+    return sorted(found, key=lambda match: (match.share, match.frames), reverse=True)
+
+
+def recognise(data: bytes) -> Match | None:
+    """The format that fits `data` best, if any does."""
+    return next(iter(matches(data)), None)
+
+
+def _try(data: bytes, name: str, layout: str | None, make_parser: Callable[[], Parser[Any]]) -> Match | None:
+    parser = make_parser()
+    frames = parser.feed(data)
+    # The first and the last frame are cut by where the reading began and ended.
+    dropped, whole = parser.counters.bytes_dropped, len(data)
+    longest = whole // max(1, len(frames))
+    share = 1.0 - max(0, dropped - longest) / max(1, whole)
+    if len(frames) < FEWEST_FRAMES or share < FEWEST_SHARE:
+        return None
+    cells = len(frames[-1].cells) if hasattr(frames[-1], "cells") else None
+    return Match(name, layout, len(frames), share, cells)
+
+
+def _number_lines(data: bytes) -> Match | None:
+    """Lines of numbers whose columns nobody has named yet."""
+    lines = data.split(b"\n")[1:-1]
+    fits = [line for line in lines if NUMBERS_LINE.fullmatch(line)]
+    if len(fits) < FEWEST_FRAMES or len(fits) < 0.9 * len(lines):
+        return None
+    return Match("insole-csv", None, len(fits), len(fits) / len(lines))

@@ -1,0 +1,1 @@
+"""Tests: `gwrms sensor` and `gwrms calibrate`."""

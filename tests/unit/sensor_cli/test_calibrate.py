@@ -1,0 +1,137 @@
+"""`gwrms calibrate`: known loads give back the gain they were made with, and nothing is written unasked."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.cli import calibrate
+from drivers.errors import Unavailable
+from drivers.imu import zero
+from drivers.insole import layout as layouts
+from drivers.insole.calibration import CellCalibration, Cells, load
+from drivers.insole.fit import BadFit, Load, fit, text
+from tests.unit.imu.encode import witmotion
+from tests.unit.insole.encode import Sender
+from tests.unit.port.terminals import Terminal
+from tests.unit.sensor_cli.test_sensor import Talking
+
+LAYOUT = layouts.load("insole-16")
+TARES = [float(10 + cell) for cell in range(16)]
+
+
+def loads(gain: float, exponent: float, *depths: float) -> list[Load]:
+    """Loads that an insole of this law reads `depths` counts above its tare under."""
+    made = []
+    for depth in depths:
+        force = sum(area * gain * depth**exponent for area in LAYOUT.areas)
+        made.append(Load(force, tuple(tare + depth for tare in TARES)))
+    return made
+
+
+def test_linear_gain_is_found() -> None:
+    fitted = fit(LAYOUT, TARES, loads(120.0, 1.0, 100.0, 300.0), CellCalibration())
+    assert fitted.calibration.cell["3"].gain == pytest.approx(120.0)
+    assert fitted.calibration.cell["3"].tare == 13
+    assert fitted.rms_error == pytest.approx(0.0, abs=1e-6)
+
+
+def test_power_law_is_found() -> None:
+    fitted = fit(LAYOUT, TARES, loads(4.0, 1.4, 100.0, 300.0, 900.0), CellCalibration(), power=True)
+    assert fitted.calibration.cell["0"].exponent == pytest.approx(1.4)
+    assert fitted.calibration.cell["0"].gain == pytest.approx(4.0)
+
+
+def test_written_text_is_a_calibration(tmp_path: Path) -> None:
+    base = CellCalibration(polarity="falling", full_scale=4095, saturation=4000)
+    fitted = fit(LAYOUT, TARES, loads(50.0, 1.0, 200.0), base)
+    path = tmp_path / "left.toml"
+    path.write_text(text(fitted, "2026-11-21T08:00:00Z"))
+    cells = Cells(load(path), 16)
+    assert cells.pressures([4095 - 10 - 200] + [4095.0] * 15)[0] == pytest.approx(10_000)
+
+
+def test_load_that_was_not_felt_is_refused() -> None:
+    with pytest.raises(BadFit, match="did not feel"):
+        fit(LAYOUT, TARES, [Load(700.0, tuple(TARES))], CellCalibration())
+    with pytest.raises(BadFit, match="too few loads"):
+        fit(LAYOUT, TARES, [], CellCalibration())
+    with pytest.raises(BadFit, match="two different ones"):
+        fit(LAYOUT, TARES, loads(1.0, 1.0, 50.0), CellCalibration(), power=True)
+
+
+@pytest.fixture
+def terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Terminal]:
+    monkeypatch.setattr(calibrate, "AVERAGE_S", 0.5)
+    terminal = Terminal(tmp_path / "sensor")
+    terminal.plug_in()
+    yield terminal
+    terminal.unplug()
+
+
+def answer(monkeypatch: pytest.MonkeyPatch, *lines: str) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines) + "\n"))
+
+
+def insole_stream(depth: int) -> bytes:
+    sender = Sender()
+    return b"".join(sender.frame([100 + depth] * 16, flags=0) for _ in range(20))
+
+
+@pytest.mark.parametrize(("said", "written"), [("y", True), ("n", False), ("", False)])
+def test_guided_calibration_shows_its_fit_and_writes_only_when_told(
+    said: str,
+    written: bool,
+    terminal: Terminal,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    answer(monkeypatch, "", "70", "x", "", said)
+    averages = iter([[100.0] * 16, [300.0] * 16])
+    monkeypatch.setattr(calibrate, "_average", lambda *_: next(averages))
+    file = tmp_path / "left.toml"
+    code = calibrate.main(["insole", str(terminal.path), "--write", str(file)])
+    out = capsys.readouterr().out
+    assert "error 0.0 N" in out
+    assert "'x' is no mass" in out
+    assert (code == 0, file.exists()) == (written, written)
+    if written:
+        cells = Cells(load(file), 16)
+        force = sum(p * a for p, a in zip(cells.pressures([300.0] * 16), LAYOUT.areas, strict=True) if p)
+        assert force == pytest.approx(70 * 9.80665)
+
+
+def test_counts_are_averaged_from_the_port(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(monkeypatch, "", "")
+    with Talking(terminal, insole_stream(7)), pytest.raises(BadFit):
+        calibrate.main(["insole", str(terminal.path), "--write", str(tmp_path / "x.toml")])
+    assert "tare: 107 107" in capsys.readouterr().out
+
+
+def test_silent_insole_is_named(terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer(monkeypatch, "")
+    with pytest.raises(Unavailable, match="16 cells came"):
+        calibrate.main(["insole", str(terminal.path), "--write", str(tmp_path / "x.toml")])
+
+
+def test_zero_of_an_imu_is_written(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(monkeypatch, "y")
+    file = tmp_path / "trunk.zero.toml"
+    with Talking(terminal, witmotion(0x53, 0, round(6 / 180 * 32768), 0, 0) * 10):
+        assert calibrate.main(["imu", str(terminal.path), "--write", str(file)]) == 0
+    assert "6.0°" in capsys.readouterr().out
+    assert zero.load(file)[0] < 1.0
+
+
+def test_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert calibrate.main([]) == 2
+    assert calibrate.main(["shoe"]) == 2
+    assert calibrate.main(["--help"]) == 0
+    assert calibrate.main(["insole", "--help"]) == 0
+    assert "usage" in capsys.readouterr().out
