@@ -1,10 +1,14 @@
 """`gwrms describe`: what a robot is made of, and what is wrong with it."""
 
-from collections.abc import Iterator
+import re
+import textwrap
+from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, exact, say, say_json, table
-from gateway.messages import Description, ParameterInfo
+from gateway.messages import ChannelInfo, Description, ParameterInfo
+
+PAGE = 100  # columns
 
 
 def main(argv: list[str]) -> int:
@@ -29,13 +33,7 @@ def _chapters(robot: Description) -> Iterator[str]:
         ("COMPONENT", "KIND", "STATE", "PROBLEM"),
         [(part.name, part.kind, part.state, part.problem or "") for part in robot.components],
     )
-    yield table(
-        ("CHANNEL", "UNIT", "STATES"),
-        [
-            (channel.name, channel.unit, ", ".join((channel.enum or {}).values()))
-            for channel in robot.channels
-        ],
-    )
+    yield _channels(robot.channels)
     if robot.parameters:
         yield table(
             ("PARAMETER", "UNIT", "RANGE", "LARGEST STEP", "ACCESS", "OBJECT", "PROBLEM"),
@@ -43,6 +41,29 @@ def _chapters(robot: Description) -> Iterator[str]:
             right=(3,),
         )
     yield _stop(robot)
+
+
+def _channels(channels: list[ChannelInfo]) -> str:
+    """The channels by component, numbered ones as one, and once for each state what it can be."""
+    by_component: dict[str, dict[str, str]] = {}
+    for channel in channels:
+        quantity, unit = (
+            re.sub(r"_\d+$", "_*", channel.quantity),
+            f" [{channel.unit}]" if channel.unit else "",
+        )
+        by_component.setdefault(channel.component, {})[quantity] = quantity + unit
+    words = {channel.quantity: list(channel.enum.values()) for channel in channels if channel.enum}
+    rows = [(name, quantities.values()) for name, quantities in by_component.items()]
+    return "CHANNELS (component.quantity)\n" + _wrapped(rows) + "\nSTATES\n" + _wrapped(words.items())
+
+
+def _wrapped(rows: Iterable[tuple[str, Iterable[str]]]) -> str:
+    lines = [(name, ", ".join(words)) for name, words in rows]
+    width = max((len(name) for name, _ in lines), default=0) + 2
+    return "".join(
+        textwrap.fill(text, PAGE, initial_indent=name.ljust(width), subsequent_indent=" " * width) + "\n"
+        for name, text in lines
+    )
 
 
 def _parameter(info: ParameterInfo) -> tuple[str, ...]:
@@ -56,19 +77,18 @@ def _stop(robot: Description) -> str:
     if not robot.stop.drives:
         return held
     return held + table(
-        ("DRIVE", "605Ah", "6007h", "STOPS IF THE GATEWAY DIES", "WARNING"),
+        ("DRIVE", "ON QUICK STOP (605Ah)", "ON LOST COMMUNICATION (6007h)", "ARMED"),
         [
             (
                 name,
-                _option(drive.quick_stop_option),
-                _option(drive.abort_connection_option),
-                "yes" if drive.armed else "no",
-                drive.warning or "",
+                _option(drive.quick_stop_option, drive.quick_stop),
+                _option(drive.abort_connection_option, drive.abort_connection),
+                "stops if the gateway dies" if drive.armed else "no",
             )
             for name, drive in robot.stop.drives.items()
         ],
     )
 
 
-def _option(code: int | None) -> str:
-    return NONE if code is None else str(code)
+def _option(code: int | None, words: str | None) -> str:
+    return NONE if code is None else f"{code}: {words or 'not known'}"

@@ -63,7 +63,7 @@ def check_names(what: str, asked: Iterable[str], known: Sequence[str]) -> None:
 
     """
     for glob in asked:
-        if not fnmatch.filter(known, glob):
+        if not any(fnmatch.fnmatchcase(name, glob) for name in known):
             raise UnknownName(
                 f"the robot has no {what} {glob!r}{did_you_mean(glob, known)} (gwrms describe lists them)"
             )

@@ -95,12 +95,20 @@ def _facts(snapshot: ResourceSnapshot) -> Iterator[tuple[str, str]]:
     for name in ("disk", "network", "thermal", "kernel"):
         found = getattr(snapshot, name)
         if found is not msgspec.UNSET:
-            yield name, ", ".join(f"{key} {value}" for key, value in msgspec.to_builtins(found).items())
+            known = msgspec.to_builtins(found).items()
+            yield (
+                name,
+                ", ".join(
+                    f"{key} {value:.1f}" if isinstance(value, float) else f"{key} {value}"
+                    for key, value in known
+                ),
+            )
 
 
 def _values(robot: Robot, arguments: argparse.Namespace) -> int:
     description = robot.describe()
-    check_names("channel", arguments.channels, channel_names(description))
+    names = [name for name in channel_names(description) if not name.startswith("resource.")]
+    check_names("channel", arguments.channels, names)
     snapshot = robot.components(*arguments.channels) if arguments.module == "component" else robot.status()
     if arguments.json:
         say_json(snapshot)

@@ -9,7 +9,8 @@ import msgspec
 from gateway.messages import ChannelInfo
 
 NONE = "–"
-PRECISION = 4  # decimals of a measured value; a written parameter is shown whole
+DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole
+OTHER_DECIMALS = 4
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Iterable[int] = ()) -> str:
@@ -48,9 +49,9 @@ def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
     """A channel's value: a state as its word, a number with few decimals, a dash where there is none."""
     if value is None:
         return NONE
-    pure = channel is not None and not channel.unit and value.is_integer()
-    if channel is None or not pure:
-        return f"{value:.{PRECISION}f}"
+    unit = "" if channel is None else channel.unit
+    if channel is None or unit or not value.is_integer():
+        return f"{value:.{DECIMALS.get(unit, OTHER_DECIMALS)}f}"
     return (channel.enum or {}).get(str(int(value)), str(int(value)))
 
 

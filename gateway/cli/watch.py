@@ -1,15 +1,18 @@
 """`gwrms watch`: channels, live."""
 
 import argparse
+import fnmatch
 import itertools
 from collections.abc import Iterator, Sequence
 
 from gateway.cli.reach import channel_names, check_names, parser, reach
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
-from gateway.messages import ChannelInfo, Description
+from gateway.messages import ChannelInfo, Description, ModuleName
 
 Row = tuple[int, dict[str, float | None]]
+
+MIN_WIDTH = 12
 
 EPILOG = """A missing or stale value is a dash (null with --json), never the old number. Time is the
 robot's, in seconds since the first line. Rows that were lost on the way are said on stderr.
@@ -32,7 +35,8 @@ def main(argv: list[str]) -> int:
     with reach(arguments, "watch") as robot:
         description = robot.describe()
         check_names("channel", arguments.channels, channel_names(description))
-        rows = itertools.islice(_rows(robot, arguments.channels, arguments.rate), arguments.count)
+        modules = _modules(arguments.channels, description)
+        rows = itertools.islice(_rows(robot, arguments.channels, modules, arguments.rate), arguments.count)
         try:
             if arguments.json:
                 _follow_json(rows)
@@ -59,9 +63,22 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _rows(robot: Robot, channels: Sequence[str], rate_hz: float) -> Iterator[Row]:
+def _modules(globs: Sequence[str], description: Description) -> list[ModuleName]:
+    """The modules that give the channels: the computer's own are the resource module's."""
+    wanted = (
+        known for known in description.channels if any(fnmatch.fnmatchcase(known.name, g) for g in globs)
+    )
+    modules: set[ModuleName] = {
+        "resource" if channel.component == "resource" else "component" for channel in wanted
+    }
+    return sorted(modules)
+
+
+def _rows(
+    robot: Robot, channels: Sequence[str], modules: Sequence[ModuleName], rate_hz: float
+) -> Iterator[Row]:
     dropped = 0
-    for batch in robot.watch(*channels, rate_hz=rate_hz):
+    for batch in robot.watch(*channels, rate_hz=rate_hz, modules=modules):
         dropped = _report_losses(batch, dropped)
         yield from batch.rows()
 
@@ -82,21 +99,21 @@ def _follow_json(rows: Iterator[Row]) -> None:
 def _follow(rows: Iterator[Row], description: Description) -> None:
     channels = {channel.name: channel for channel in description.channels}
     first_ns: int | None = None
-    names: tuple[str, ...] = ()
+    widths: dict[str, int] = {}
     for stamp_ns, values in rows:
         first_ns = stamp_ns if first_ns is None else first_ns
-        if tuple(values) != names:
-            names = tuple(values)
-            say(f"{'s':>9}" + "".join(f"  {_title(name, channels):>12}" for name in names) + "\n")
-        say(f"{(stamp_ns - first_ns) / 1e9:9.3f}" + "".join(_cells(values, channels)) + "\n")
+        if values.keys() != widths.keys():
+            widths = {name: _width(name, channels.get(name)) for name in values}
+            titles = (_title(name, channels.get(name)).rjust(width) for name, width in widths.items())
+            say("  ".join([f"{'s':>9}", *titles]) + "\n")
+        cells = (measured(values[name], channels.get(name)).rjust(width) for name, width in widths.items())
+        say("  ".join([f"{(stamp_ns - first_ns) / 1e9:9.3f}", *cells]) + "\n")
 
 
-def _title(name: str, channels: dict[str, ChannelInfo]) -> str:
-    unit = channels[name].unit if name in channels else ""
-    return f"{name} [{unit}]" if unit else name
+def _title(name: str, channel: ChannelInfo | None) -> str:
+    return f"{name} [{channel.unit}]" if channel is not None and channel.unit else name
 
 
-def _cells(values: dict[str, float | None], channels: dict[str, ChannelInfo]) -> Iterator[str]:
-    for name, value in values.items():
-        width = max(12, len(_title(name, channels)))
-        yield f"  {measured(value, channels.get(name)):>{width}}"
+def _width(name: str, channel: ChannelInfo | None) -> int:
+    words = (channel.enum or {}).values() if channel is not None else ()
+    return max(MIN_WIDTH, len(_title(name, channel)), *map(len, words))

@@ -1,8 +1,10 @@
-"""Ctrl-C and SIGTERM as something that is asked, and noticed between two steps."""
+"""Ctrl-C, SIGTERM and a closed terminal as something that is asked, and noticed between two steps."""
 
 import signal
 from types import FrameType, TracebackType
 from typing import Any, Self
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Ended(Exception):
@@ -14,14 +16,14 @@ class Ended(Exception):
 
 
 class Ending:
-    """While inside, SIGINT and SIGTERM are only noted; `check` raises once one came. For the main thread."""
+    """While inside, `SIGNALS` are only noted; `check` raises once one came. For the main thread."""
 
     def __init__(self) -> None:
         self._asked: int | None = None
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in SIGNALS:
             self._before[number] = signal.signal(number, self._note)
         return self
 

@@ -92,6 +92,28 @@ def test_watch_gives_null_for_what_is_lost(robot: FakeRobot, capsys: pytest.Capt
     assert json.loads(printed(capsys))["values"] == {"left_knee.position": None}
 
 
+@pytest.mark.parametrize(
+    ("channel", "modules"),
+    [
+        ("resource.cpu_percent", ["resource"]),
+        ("left_knee.position", ["component"]),
+        ("*", ["component", "resource"]),
+    ],
+)
+def test_watch_asks_only_the_modules_that_give_its_channels(
+    robot: FakeRobot, channel: str, modules: list[str]
+) -> None:
+    assert run(robot, "watch", channel, "--count", "1", "--rate", "50") == 0
+    assert robot.called("stream.start")[0]["modules"] == modules
+
+
+def test_describe_groups_channels_by_component(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(robot, "describe") == 0
+    lines = printed(capsys).splitlines()
+    assert "trunk         tilt_forward [rad], tilt_side [rad]" in lines
+    assert "state  NOT READY TO SWITCH ON, OPERATION ENABLED, FAULT" in lines
+
+
 def test_watch_says_what_was_lost_on_the_way(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
     robot.seq_step = 2
     assert run(robot, "watch", "left_knee.position", "--count", "3", "--rate", "100") == 0

@@ -65,7 +65,7 @@ def test_child_that_will_not_end_is_killed(tmp_path: Path, monkeypatch: pytest.M
     assert not psutil.pid_exists(child.pid)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signal_is_noticed_between_two_steps(number: signal.Signals) -> None:
     before = signal.getsignal(number)
     with Ending() as ending:
