@@ -243,10 +243,10 @@ class FakeRobot:
             if quantity == "state":
                 channel["enum"] = {str(number): word for number, word in STATES.items()}
             channels.append(channel)
-        for name in ("cpu_percent", "memory_percent"):
-            channels.append(
-                {"name": f"resource.{name}", "component": "resource", "quantity": name, "unit": "%"}
-            )
+        channels += [
+            {"name": f"resource.{name}", "component": "resource", "quantity": name, "unit": "%"}
+            for name in ("cpu_percent", "memory_percent")
+        ]
         kinds = (
             dict.fromkeys(JOINTS, "joint")
             | dict.fromkeys(FEET, "insole")

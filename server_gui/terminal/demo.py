@@ -143,14 +143,16 @@ def _headless(session: Session, seconds: float | None, check: Callable[[], None]
     summary = session.begin_summary()
     began = time.monotonic()
     next_line = began + LINE_S
-    while seconds is None or time.monotonic() < began + seconds:
-        check()
-        session.update()
-        if time.monotonic() >= next_line:
-            headless.say(headless.line(session.robot, next_line - began))
-            next_line += LINE_S
-        time.sleep(TICK_S)
-    headless.say(headless.table(summary, session.robot))
+    try:
+        while seconds is None or time.monotonic() < began + seconds:
+            check()
+            session.update()
+            if time.monotonic() >= next_line:
+                headless.say(headless.line(session.robot, next_line - began))
+                next_line += LINE_S
+            time.sleep(TICK_S)
+    finally:
+        headless.say(headless.table(summary, session.robot))  # also of a run that was cut short
     failures = summary.failures()
     if failures:
         raise DemoFailed(f"this was no walk: {'; '.join(failures)}")

@@ -28,10 +28,11 @@ def nothing() -> None:
     pass
 
 
-def until(condition: Callable[[], object]) -> None:
+def until(condition: Callable[[], object], found: Callable[[], object] = lambda: None) -> None:
+    """Wait for a condition; `found` tells what there was instead."""
     deadline = time.monotonic() + DEADLINE_S
     while not condition():
-        assert time.monotonic() < deadline, "the condition was not met in time"
+        assert time.monotonic() < deadline, f"not met in time: {found()}"
         time.sleep(0.05)
 
 
@@ -83,6 +84,9 @@ class Bench:
         result: dict[str, Any] = json.loads(answer)["result"]
         return result
 
+    def until_whole(self) -> None:
+        until(self.is_whole, lambda: self.ask("component.snapshot")["quality"])
+
     def states(self) -> dict[str, str]:
         """Every component's state."""
         quality = self.ask("component.snapshot")["quality"]
@@ -115,7 +119,7 @@ def _is_dead(child: Child) -> bool:
 def bench(tmp_path: Path) -> Iterator[Bench]:
     with ExitStack() as processes:
         bench = Bench(tmp_path, processes)
-        until(bench.is_whole)
+        bench.until_whole()
         yield bench
 
 
@@ -170,7 +174,7 @@ def test_simulator_and_client_outlive_a_killed_gateway(bench: Bench) -> None:
         assert after.columns.keys() == before.columns.keys()
         stream.close()
     bench.simulator.check()
-    until(bench.is_whole)
+    bench.until_whole()
 
 
 def test_gateway_outlives_a_killed_simulator_and_says_what_is_gone(bench: Bench) -> None:
@@ -181,7 +185,7 @@ def test_gateway_outlives_a_killed_simulator_and_says_what_is_gone(bench: Bench)
     assert all(found["problem"] for found in gone["quality"].values())
     bench.gateway.check()
     bench.start_simulator()
-    until(bench.is_whole)
+    bench.until_whole()
     bench.gateway.check()
 
 
