@@ -124,10 +124,12 @@ class Loop:
             os.write(self.wake_writer, b"\0")
 
     def _drain(self) -> None:
-        self._woken = False
         with contextlib.suppress(BlockingIOError):
             while os.read(self._wake_reader, 4096):
                 pass
+        # Only now: a flag cleared before reading could stay set for a byte that was read with the others,
+        # and nobody would wake the loop again.
+        self._woken = False
 
     @staticmethod
     def _call(callback: Callback) -> None:

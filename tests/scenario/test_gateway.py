@@ -1,0 +1,220 @@
+"""The gateway before a whole simulated robot: in one process over a virtual bus and pseudo-terminals."""
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.config import load
+from hil_sim.exoskeleton import JOINTS
+from hil_sim.robot import SimulatedRobot
+from tests.unit.gateway.harness import Client, serving, until
+
+LINGER = ("linger_s = 5", "linger_s = 0.1")
+
+
+def edit(file: Path, *changes: tuple[str, str]) -> Path:
+    """Change a robot's file; every change must apply."""
+    text = file.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[SimulatedRobot]:
+    with SimulatedRobot(tmp_path, virtual_channel=f"scenario {tmp_path.name}") as robot:
+        yield robot
+
+
+@pytest.fixture
+def client(robot: SimulatedRobot) -> Iterator[Client]:
+    with serving(load(edit(robot.config, LINGER))) as address, Client(address) as client:
+        yield client
+
+
+def states(client: Client) -> dict[str, str]:
+    quality = client.call("component.snapshot", channels=["*"])["quality"]
+    return {name: one["state"] for name, one in quality.items()}
+
+
+def all_ok(client: Client) -> bool:
+    return set(states(client).values()) == {"ok"}
+
+
+def test_a_walking_robot_is_seen_live(client: Client) -> None:
+    until(lambda: all_ok(client), "every component is there")
+    first = client.call("component.snapshot")["values"]
+    assert all(first[f"{joint}.position"] is not None for joint in JOINTS)
+
+    def walks() -> bool:
+        now = client.call("component.snapshot")["values"]
+        moved = [abs(now[f"{joint}.position"] - first[f"{joint}.position"]) > 0.02 for joint in JOINTS]
+        return all(moved) and now["trunk.tilt_forward"] is not None
+
+    until(walks, "all joints move")
+    forces: set[tuple[bool, bool]] = set()
+
+    def both_feet() -> bool:
+        values = client.call("component.snapshot", channels=["*.force"])["values"]
+        forces.add(tuple(values[f"{side}_insole.force"] > 200.0 for side in ("left", "right")))
+        return {(True, False), (False, True)} <= forces
+
+    until(both_feet, "the feet alternate")
+
+
+def test_describe_tells_what_the_drives_do_by_themselves(client: Client) -> None:
+    until(lambda: all_ok(client), "every component is there")
+    described = client.call("robot.describe")
+    drives = described["stop"]["drives"]
+    assert set(drives) == set(JOINTS)
+    assert all(isinstance(one["quick_stop_option"], int) for one in drives.values())
+    assert all("ramp" in one["quick_stop"] for one in drives.values())
+    channels = {one["name"]: one for one in described["channels"]}
+    assert channels["left_knee.position"]["unit"] == "rad"
+    assert "operation enabled" in channels["left_knee.state"]["enum"].values()
+    step = next(one for one in described["parameters"] if one["name"] == "gait.step_length")
+    assert (step["unit"], step["access"], step["problem"]) == ("m", "rw", None)
+
+
+def test_a_parameter_is_written_and_the_device_has_it(client: Client, robot: SimulatedRobot) -> None:
+    until(lambda: all_ok(client), "every component is there")
+    client.call("control.acquire", ttl_s=60)
+    answer = client.call("parameter.write", changes={"gait.step_length": 0.45})
+    assert answer["before"] == {"gait.step_length": 0.4}
+    assert answer["after"] == {"gait.step_length": 0.45}
+    assert robot.exoskeleton.controller.dictionary[0x2001, 0].value == 450
+    read = client.call("parameter.read", names=["gait.*"])["values"]
+    assert read["gait.step_length"]["value"] == 0.45
+    assert client.refused("parameter.write", changes={"gait.step_length": 0.7}).kind == "out_of_limit"
+
+
+def test_a_stop_halts_every_drive_against_the_controller_and_holds(
+    client: Client, robot: SimulatedRobot
+) -> None:
+    until(lambda: set(_words(client)) == {"operation enabled"}, "the robot walks")
+    answer = client.call("robot.stop", reason="scenario")
+    assert answer["held"] is True
+    assert set(answer["drives"]) == set(JOINTS)
+    assert "unreachable" not in answer["drives"].values()
+    until(lambda: "operation enabled" not in _words(client), "no drive is enabled")
+    since_ns = client.call("clock.read")["monotonic_ns"]
+
+    def stands_a_while() -> bool:
+        moved = {joint: drive.joint.velocity for joint, drive in robot.exoskeleton.drives.items()}
+        assert (
+            "operation enabled" not in _words(client)
+            or client.call("robot.describe")["stop"]["stopped_again"]
+        )
+        elapsed: int = client.call("clock.read")["monotonic_ns"] - since_ns
+        return elapsed > 1_500_000_000 and all(abs(velocity) < 0.05 for velocity in moved.values())
+
+    until(stands_a_while, "it stands still and stays so")
+
+
+def _words(client: Client) -> list[str]:
+    """Every joint's state in words; "?" where it is unknown."""
+    enums = {one["name"]: one["enum"] for one in client.call("robot.describe")["channels"] if "enum" in one}
+    values = client.call("component.snapshot", channels=["*.state"])["values"]
+    return ["?" if value is None else enums[name][str(int(value))] for name, value in values.items()]
+
+
+def test_every_sample_of_a_stream_arrives_in_order(client: Client) -> None:
+    until(lambda: all_ok(client), "every component is there")
+    client.call("stream.start", modules=["component"], rate_hz=100, channels=["*.position"])
+    data = [client.data() for _ in range(100)]
+    assert [one["seq"] for one in data] == list(range(100))
+    stamps = [stamp_ns for one in data for stamp_ns in one["stamp_ns"]]
+    assert stamps == sorted(stamps)
+    assert data[-1]["dropped"] == 0
+    knee = [value for one in data for value in one["columns"]["left_knee.position"]]
+    assert None not in knee
+    assert len(set(knee)) > 20
+
+
+def test_own_samples_of_every_source_come_by_themselves(client: Client) -> None:
+    until(lambda: all_ok(client), "every component is there")
+    client.call("stream.start", modules=["component"], rate_hz=0)
+    seen: set[str] = set()
+
+    def everybody() -> bool:
+        columns = client.data()["columns"]
+        assert len({name.partition(".")[0] for name in columns}) == 1
+        seen.update(columns)
+        return len({name.partition(".")[0] for name in seen}) == len(JOINTS) + 3
+
+    until(everybody, "every component has sent")
+
+
+class TestMissing:
+    """Hardware that is not there: it is named, the rest is served, and it is found when it comes."""
+
+    def test_a_bus_a_port_and_an_eds_that_are_not_there(self, robot: SimulatedRobot, tmp_path: Path) -> None:
+        (tmp_path / "broken.eds").write_text("[FileInfo\n", encoding="utf-8")
+        port = str(tmp_path / "trunk")
+        file = edit(
+            robot.config,
+            LINGER,
+            (port, f"{port}-unplugged"),
+            ('eds = "joint_drive.eds"', 'eds = "broken.eds"'),
+            (
+                "[joint.left_knee]\n",
+                '[can.other]\ninterface = "socketcan"\nchannel = "nocan7"\n\n[joint.left_knee]\n',
+            ),
+        )
+        knee = file.read_text(encoding="utf-8").index("[joint.left_knee]")
+        text = file.read_text(encoding="utf-8")
+        file.write_text(
+            text[:knee] + text[knee:].replace('bus = "main"', 'bus = "other"', 1), encoding="utf-8"
+        )
+        with serving(load(file)) as address, Client(address) as client:
+            until(
+                lambda: list(states(client).values()).count("ok") == len(JOINTS) + 3 - 3, "the rest is served"
+            )
+            described = {one["name"]: one for one in client.call("robot.describe")["components"]}
+            assert {name for name, one in described.items() if one["state"] != "ok"} == {
+                "left_hip",
+                "left_knee",
+                "trunk",
+            }
+            assert "broken.eds" in described["left_hip"]["problem"]
+            assert "nocan7" in described["left_knee"]["problem"]
+            assert "trunk-unplugged" in described["trunk"]["problem"]
+            values = client.call("component.snapshot")["values"]
+            assert values["left_knee.position"] is None
+            assert values["right_knee.position"] is not None
+            (tmp_path / "trunk-unplugged").symlink_to((tmp_path / "trunk").resolve())
+            until(lambda: states(client)["trunk"] == "ok", "the IMU is plugged in")
+            assert client.call("robot.stop", reason="x")["drives"]["left_hip"] == "unreachable"
+
+    def test_a_robot_that_is_switched_off_is_null_and_comes_back(self, tmp_path: Path) -> None:
+        with ExitStack() as stack:
+            power = stack.enter_context(ExitStack())
+            robot = power.enter_context(SimulatedRobot(tmp_path))
+            address = stack.enter_context(serving(load(edit(robot.config, LINGER))))
+            client = stack.enter_context(Client(address))
+            until(lambda: all_ok(client), "every component is there")
+            power.close()
+            until(lambda: set(states(client).values()) == {"lost"}, "everything is lost")
+            snapshot = client.call("component.snapshot")
+            assert set(snapshot["values"].values()) == {None}
+            assert all(one["problem"] for one in snapshot["quality"].values())
+            read: dict[str, Any] = client.call("parameter.read", names=["gait.step_length"])
+            assert read["values"]["gait.step_length"]["value"] is None
+            assert "gait is not there" in read["values"]["gait.step_length"]["problem"]
+            stack.enter_context(SimulatedRobot(tmp_path))
+            until(lambda: all_ok(client), "it is back")
+            assert client.call("parameter.read")["values"]["gait.step_length"]["value"] == 0.4
+
+
+def test_the_robots_own_file_is_answered_by_hand(client: Client) -> None:
+    """What the manual shows: one line, and half-closed."""
+    client.send(b'{"jsonrpc":"2.0","id":1,"method":"component.snapshot"}\n')
+    answer = client.answer(1)
+    assert json.dumps(answer)
+    assert any(value is not None for value in answer["values"].values())
