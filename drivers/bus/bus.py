@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from drivers.bus.bus_state import BusState, bus_state
 from drivers.bus.frames import ERROR, FrameHandler, Transport
+from drivers.bus.master import NMT_COMMAND, NMT_START, MasterCycles
 from drivers.bus.opening import open_transport
 from drivers.bus.settings import CanSettings, Role
 from drivers.bus.switching import FastSwitching
@@ -66,6 +67,7 @@ class CanBus:
         self._subscribers: dict[int, tuple[FrameHandler, ...]] = {}
         self._users: tuple[BusUser, ...] = ()
         self._owner = BusUser()
+        self._cycles = MasterCycles(name, settings, self.send)
         self._life = threading.Lock()  # the thread's start and end; the thread itself never takes it
         self._lock = threading.Lock()  # users, subscribers and transport
         self._send_lock = threading.Lock()
@@ -138,6 +140,14 @@ class CanBus:
                 raise Unavailable(f"bus {self.name} is not open: {self.problem or 'nobody holds it'}")
             transport.send(can_id, data)
 
+    def start_node(self, node_id: int) -> None:
+        """Let a node that came up send its PDOs (NMT start): a master's part, an observer does nothing.
+
+        Starting a node does not enable its drive: that is the controlword's part.
+        """
+        if self.role is Role.MASTER:
+            self.send(NMT_COMMAND, bytes([NMT_START, node_id]))
+
     def _set_handlers(self, can_id: int, handlers: tuple[FrameHandler, ...]) -> None:
         self._subscribers[can_id] = handlers
         if not handlers:
@@ -146,20 +156,16 @@ class CanBus:
             self._handlers[can_id] = handlers[0] if len(handlers) == 1 else _all(handlers)
 
     def _run(self) -> None:
-        FastSwitching.begin()
         retry_s = FIRST_RETRY_S
-        try:
-            while not self._stopping.is_set():
-                try:
-                    transport = open_transport(self.settings)
-                    retry_s = FIRST_RETRY_S
-                    self._serve(transport)
-                except Unavailable as error:
-                    self.problem = str(error)
-                self._stopping.wait(retry_s)
-                retry_s = min(2 * retry_s, LAST_RETRY_S)
-        finally:
-            FastSwitching.end()
+        while not self._stopping.is_set():
+            try:
+                transport = open_transport(self.settings)
+                retry_s = FIRST_RETRY_S
+                self._serve(transport)
+            except Unavailable as error:
+                self.problem = str(error)
+            self._stopping.wait(retry_s)
+            retry_s = min(2 * retry_s, LAST_RETRY_S)
 
     def _serve(self, transport: Transport) -> None:
         """Hand out frames until told to stop; raises `Unavailable` when the interface goes."""
@@ -168,7 +174,10 @@ class CanBus:
             self._transport, self.problem, self.state = transport, None, BusState.ACTIVE
             self.opened += 1
             users = self._users
+        FastSwitching.begin()
         try:
+            if self.role is Role.MASTER:
+                self._cycles.start()
             for user in users:
                 user.bus_opened()
             self._receive(transport)
@@ -176,6 +185,8 @@ class CanBus:
             problem = str(error)
             raise
         finally:
+            self._cycles.stop()
+            FastSwitching.end()
             with self._send_lock:
                 self._transport = None
             transport.close()

@@ -33,15 +33,15 @@ class CanDevice:
 
     def quality(self, now_ns: int) -> Quality:
         """By its heartbeat, where it has one; else whether it answered when it came up."""
-        age_ms = self.node.silent_ms(now_ns)
+        age_ms = self.node.life.silent_ms(now_ns)
         problem = self.node.problem(now_ns)
         state = State.OK if self.node.ready else State.LOST
-        if self.node.ready and self.node.lost_heartbeat(now_ns):
+        if self.node.ready and self.node.life.lost(now_ns):
             lost = age_ms is not None and age_ms > self.settings.lost_after_s * 1000
             state = State.LOST if lost else State.STALE
-        elif self.node.ready and self.node.active_emcy is not None:
+        elif self.node.ready and self.node.life.active_emcy is not None:
             state = State.FAULT
-            problem = f"it reports {self.node.active_emcy.text(self.node.description.vendor_id)}"
+            problem = f"it reports {self.node.life.active_emcy.text(self.node.description.vendor_id)}"
         words = "; ".join(text for text in (problem, *self.node.findings) if text)
         return Quality(state, age_ms, words or None, self.node.counters())
 

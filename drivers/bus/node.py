@@ -1,34 +1,32 @@
-"""One CANopen node: its life (boot-up, heartbeat, EMCY), and the one worker that asks it by SDO.
+"""One CANopen node: it comes up, is asked by one worker, and starts anew when it reboots or its bus goes.
 
-A node comes up when it answers SDO: then its users read what they need (`boot`), and it is ready. A boot-up
-message or a bus that went away starts that anew. Where it is stuck, `problem` says at which step, in words.
+A node is up when it answers SDO: then its users read what they need (`boot`), and it is ready. Where it is
+stuck, `problem` says at which step, in words.
 """
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Protocol, TypeVar
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.emcy import Emcy, parse_emcy
-from drivers.bus.nmt import NmtState, parse_heartbeat
+from drivers.bus.frames import REMOTE
+from drivers.bus.life import NodeLife
+from drivers.bus.nmt import NmtState
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
-from drivers.bus.settings import NodeTimes
+from drivers.bus.settings import NodeTimes, Role
+from drivers.bus.stuck import why_silent
 from drivers.bus.values import size_of, unsigned
-from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError
+from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
 from eds import Description
 
 T = TypeVar("T")
 
-EMCY_HISTORY = 64
 FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
-HEARTBEATS_MISSED = 2.5  # producer times without a heartbeat, where no time is configured
-
-_PDO_BASES = (0x180, 0x280, 0x380, 0x480)
+HEARTBEAT, EMCY, SDO_REQUEST, SDO_RESPONSE = 0x700, 0x080, 0x600, 0x580
 
 
 class NodeUser(Protocol):
@@ -48,66 +46,52 @@ class Node(BusUser):
         self.bus = bus
         self.node_id = node_id
         self.description = description
-        self.emcy_history: deque[Emcy] = deque(maxlen=EMCY_HISTORY)
-        self.active_emcy: Emcy | None = None
-        self.nmt_state: NmtState | None = None
+        self.life = NodeLife(times.heartbeat_timeout_s)
         self.ready = False
-        self.boots = 0
-        self.emcys = 0
-        self.heartbeats = 0
         self.findings: tuple[str, ...] = ()
         self._times = times
-        self._names: tuple[str, ...] = ()
-        self._users: tuple[NodeUser, ...] = ()
+        self._users: tuple[tuple[NodeUser, str], ...] = ()  # with their names
         self._lock = threading.RLock()
         self._step = "nothing was tried yet"
-        self._heard_ns: int | None = None
-        self._heartbeat_ns: int | None = None
-        self._heartbeat_timeout_s = times.heartbeat_timeout_s
+        self._guard_s = times.guard_time_s if bus.role is Role.MASTER else None
+        self._guard_ns = 0
+        self._guard_problem: str | None = None
         self._generation = 0  # counts what makes an earlier boot worthless
         self._booting: Future[None] | None = None
         self._retry_s = FIRST_RETRY_S
         self._retry_ns = 0
-        self._request_id, response_id = times.sdo_cob_ids or (0x600 + node_id, 0x580 + node_id)
+        self._request_id, response_id = times.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
         self.channel = SdoChannel(f"node {node_id} on {bus.name}", self._send_request, times.sdo_timeout_s)
         self.worker = SdoWorker(self.channel)
-        self._emcy_id = 0x080 + node_id
-        self._handlers = {
-            0x700 + node_id: self._on_heartbeat,
-            response_id: self._on_response,
-        }
+        self._emcy_id = EMCY + node_id
+        self._handlers = {HEARTBEAT + node_id: self._on_heartbeat, response_id: self._on_response}
 
     # What users ask.
 
     def attach(self, user: NodeUser, name: str) -> None:
         """Let `user` live here: the first one opens the bus."""
         with self._lock:
-            if user in self._users:
+            if any(known is user for known, _ in self._users):
                 return
             first = not self._users
-            self._users = (*self._users, user)
-            self._names = (*self._names, name)
-            self.channel.label = f"{'+'.join(self._names)} (node {self.node_id} on {self.bus.name})"
+            self._set_users((*self._users, (user, name)))
+            if not first:
+                self._generation += 1  # a boot that is under way does not know the new user
+                self.ready = False
         if first:
             self._reset()
             self._subscribe()
             self.worker.start()
             self.bus.hold(self)
         else:
-            with self._lock:
-                self._generation += 1  # a boot that is under way does not know the new user
-                self.ready = False
             self._start_boot()
 
     def detach(self, user: NodeUser) -> None:
         """Let it go: the last one closes the bus."""
         with self._lock:
-            if user not in self._users:
-                return
-            at = self._users.index(user)
-            self._users = self._users[:at] + self._users[at + 1 :]
-            self._names = self._names[:at] + self._names[at + 1 :]
-            last = not self._users
+            before = len(self._users)
+            self._set_users(tuple(known for known in self._users if known[0] is not user))
+            last = before > 0 and not self._users
         if last:
             self.worker.stop()
             self.bus.release(self)
@@ -134,31 +118,15 @@ class Node(BusUser):
         """What is wrong with the node now, in words with what to check; `None` when nothing is."""
         if not self.ready:
             return self.bus.trouble or self._step
-        silent_ms = self.silent_ms(now_ns)
-        if silent_ms is not None and self.lost_heartbeat(now_ns):
-            return f"its heartbeat is missing for {silent_ms / 1000:.1f} s: check the node's power and cable"
-        if self.nmt_state is not None and self.nmt_state is not NmtState.OPERATIONAL:
-            return f"it is {self.nmt_state.words} (NMT) and sends no PDOs until its master starts it"
-        return self.bus.trouble
-
-    def silent_ms(self, now_ns: int) -> float | None:
-        """Since its last heartbeat, or anything else it said itself; `None` before the first."""
-        last_ns = self._heard_ns if self._heartbeat_ns is None else self._heartbeat_ns
-        return None if last_ns is None else max(0, now_ns - last_ns) / 1e6
-
-    def lost_heartbeat(self, now_ns: int) -> bool:
-        """Whether a heartbeat that came regularly stays away."""
-        if self._heartbeat_timeout_s is None or self._heartbeat_ns is None:
-            return False
-        return (now_ns - self._heartbeat_ns) / 1e9 > self._heartbeat_timeout_s
+        return self.life.problem(now_ns) or self._guard_problem or self.bus.trouble
 
     def counters(self) -> dict[str, int]:
         """What happened since the node's object was made."""
         sdo = self.channel.counters
         return {
-            "boots": self.boots,
-            "heartbeats": self.heartbeats,
-            "emcys": self.emcys,
+            "boots": self.life.boots,
+            "heartbeats": self.life.heartbeats,
+            "emcys": self.life.emcys,
             "sdo_transfers": sdo.transfers,
             "sdo_timeouts": sdo.timeouts,
             "sdo_aborts": sdo.aborts,
@@ -177,49 +145,46 @@ class Node(BusUser):
     def tick(self, now_ns: int) -> None:
         if not self.ready and now_ns >= self._retry_ns:
             self._start_boot()
+        if self._guard_s is not None and self.ready and now_ns >= self._guard_ns:
+            self._guard_ns = now_ns + round(self._guard_s * 1e9)
+            self._ask_life(now_ns)
+
+    def _ask_life(self, now_ns: int) -> None:
+        """Node guarding: the answer is the node's state and counts as a heartbeat (CiA 301 §7.2.8)."""
+        if self.life.heartbeat_ns is None:
+            self.life.heartbeat_ns = now_ns  # from now on silence counts
+        try:
+            self.bus.send((HEARTBEAT + self.node_id) | REMOTE, b"")
+            self._guard_problem = None
+        except Unavailable as error:
+            self._guard_problem = str(error)
 
     def _on_heartbeat(self, stamp_ns: int, data: bytes) -> None:
-        state = parse_heartbeat(data)
-        if state is None:
-            return
+        first = self.life.heard_ns is None
+        state = self.life.on_heartbeat(stamp_ns, data)
         if state is NmtState.BOOT_UP:
-            self.boots += 1
-            self._reset()
-            self._heard_ns = self._heartbeat_ns = stamp_ns
-            self.nmt_state = state
+            self._begin_anew()
             self._start_boot()
-            return
-        self.heartbeats += 1
-        first = self._heard_ns is None
-        self._heard_ns = self._heartbeat_ns = stamp_ns
-        self.nmt_state = state
-        if first and not self.ready:
+        elif state is not None and first and not self.ready:
             self._retry_ns = 0  # it is there: ask it at the next tick
 
     def _on_response(self, stamp_ns: int, data: bytes) -> None:
-        self._heard_ns = stamp_ns
+        self.life.heard_ns = stamp_ns
         self.channel.on_response(stamp_ns, data)
-
-    def _on_emcy(self, stamp_ns: int, data: bytes) -> None:
-        emcy = parse_emcy(stamp_ns, data)
-        if emcy is None:
-            return
-        self.emcys += 1
-        self._heard_ns = stamp_ns
-        self.emcy_history.append(emcy)
-        self.active_emcy = None if emcy.resets else emcy
 
     # Coming up.
 
     def _reset(self) -> None:
+        self.life.reset()
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
         with self._lock:
             self._generation += 1
             self.ready = False
-            self._heard_ns = self._heartbeat_ns = self.nmt_state = self.active_emcy = None
-            self._heartbeat_timeout_s = self._times.heartbeat_timeout_s
             self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
             users = self._users
-        for user in users:
+        for user, _ in users:
             user.forget()
 
     def _start_boot(self) -> None:
@@ -243,59 +208,42 @@ class Node(BusUser):
 
     def _come_up(self, sdo: SdoChannel) -> None:
         sdo.upload(0x1000, 0, attempts=1, timeout_s=min(self._retry_s, self._times.sdo_timeout_s))
-        self._check_identity(sdo)
-        self._read_heartbeat_time(sdo)
+        self.findings = (*self._settings_findings(), *self._identity_findings(sdo))
+        period_ms = self._optional(sdo, 0x1017, 0)
+        self.life.expect_every(period_ms / 1000 if period_ms else self._guard_s)
         self._follow_emcy(sdo)
-        for user in self._users:
+        for user, _ in self._users:
             user.boot(sdo)
+        self.bus.start_node(self.node_id)
 
     def _explain(self, error: DriverError) -> str:
-        """Where the node is stuck, in words."""
-        if not isinstance(error, DeviceTimeout):
-            return str(error)
-        if self.nmt_state is NmtState.STOPPED:
-            return "it is stopped (NMT) and answers no SDO until its master starts it"
-        if self._heartbeat_ns is not None:
-            state = "" if self.nmt_state is None else f" ({self.nmt_state.words})"
-            return (
-                f"its heartbeat comes{state}, but it answers no SDO on 0x{self._request_id:03X}: "
-                "is another SDO client using this channel?"
-            )
-        if self._heard_ns is not None:
-            return str(error)
-        if any(base + self.node_id in self.bus.unclaimed for base in _PDO_BASES):
-            return (
-                f"PDOs of node {self.node_id} come, but it answers no SDO on 0x{self._request_id:03X}: "
-                "is another SDO client using this channel?"
-            )
-        if self.bus.frames == 0:
-            return f"no frame at all on bus {self.bus.name}: check bitrate, wiring, termination and power"
-        return (
-            f"no frame at all from node {self.node_id}, others are heard on bus {self.bus.name}: "
-            "check its power, cable and node id"
+        bus = self.bus
+        silent = isinstance(error, DeviceTimeout)
+        words = silent and why_silent(
+            self.life, self.node_id, self._request_id, bus.name, bus.frames, bus.unclaimed
         )
+        return words or str(error)
 
-    def _check_identity(self, sdo: SdoChannel) -> None:
+    def _settings_findings(self) -> tuple[str, ...]:
+        unused = self._times.guard_time_s is not None and self._guard_s is None
+        return ("guard_time_s is not used: node guarding is the master's",) if unused else ()
+
+    def _identity_findings(self, sdo: SdoChannel) -> tuple[str, ...]:
         expected = (self.description.vendor_id, self.description.product_code)
         found = (self._optional(sdo, 0x1018, 1), self._optional(sdo, 0x1018, 2))
         names = ("vendor id", "product code")
-        self.findings = tuple(
+        return tuple(
             f"1018h {name} is 0x{is_:X}, the EDS {self.description.path.name} is for 0x{should:X}"
             for name, should, is_ in zip(names, expected, found, strict=True)
             if should and is_ is not None and is_ != should
         )
 
-    def _read_heartbeat_time(self, sdo: SdoChannel) -> None:
-        if self._times.heartbeat_timeout_s is None:
-            period_ms = self._optional(sdo, 0x1017, 0)
-            self._heartbeat_timeout_s = period_ms / 1000 * HEARTBEATS_MISSED if period_ms else None
-
     def _follow_emcy(self, sdo: SdoChannel) -> None:
         cob_id = self._optional(sdo, 0x1014, 0)
         if cob_id is not None and not cob_id & 0x8000_0000 and cob_id & 0x7FF:
-            self.bus.unsubscribe(self._emcy_id, self._on_emcy)
+            self.bus.unsubscribe(self._emcy_id, self.life.on_emcy)
             self._emcy_id = cob_id & 0x7FF
-            self.bus.subscribe(self._emcy_id, self._on_emcy)
+            self.bus.subscribe(self._emcy_id, self.life.on_emcy)
 
     def _optional(self, sdo: SdoChannel, index: int, subindex: int) -> int | None:
         """A number that not every device has."""
@@ -312,18 +260,23 @@ class Node(BusUser):
         size = None if variable is None else size_of(variable.data_type or 0)
         return data if size is None else data[:size]
 
+    def _set_users(self, users: tuple[tuple[NodeUser, str], ...]) -> None:
+        self._users = users
+        names = "+".join(name for _, name in users) or "unused"
+        self.channel.label = f"{names} (node {self.node_id} on {self.bus.name})"
+
     def _send_request(self, data: bytes) -> None:
         self.bus.send(self._request_id, data)
 
     def _subscribe(self) -> None:
         for can_id, handler in self._handlers.items():
             self.bus.subscribe(can_id, handler)
-        self.bus.subscribe(self._emcy_id, self._on_emcy)
+        self.bus.subscribe(self._emcy_id, self.life.on_emcy)
 
     def _unsubscribe(self) -> None:
         for can_id, handler in self._handlers.items():
             self.bus.unsubscribe(can_id, handler)
-        self.bus.unsubscribe(self._emcy_id, self._on_emcy)
+        self.bus.unsubscribe(self._emcy_id, self.life.on_emcy)
 
 
 def shared_node(bus: CanBus, node_id: int, description: Description, times: NodeTimes) -> Node:

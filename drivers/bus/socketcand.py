@@ -8,7 +8,7 @@ import socket
 import time
 from collections.abc import Sequence
 
-from drivers.bus.frames import EXTENDED, Frame
+from drivers.bus.frames import EXTENDED, REMOTE, Frame
 from drivers.errors import Unavailable
 
 CONNECT_TIMEOUT_S = 1.0
@@ -102,6 +102,8 @@ class SocketcandTransport:
         return frames
 
     def send(self, can_id: int, data: bytes) -> None:
+        if can_id & REMOTE:
+            raise Unavailable(f"{self._where}: the protocol has no remote frames, so no node guarding")
         try:
             self._socket.sendall(send_message(can_id, data).encode("ascii"))
         except OSError as error:

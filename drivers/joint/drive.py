@@ -192,7 +192,7 @@ class JointDrive:
 
     def _fault_text(self, now_ns: int) -> str:
         vendor = self._description.vendor_id
-        emcy = self.node.active_emcy
+        emcy = self.node.life.active_emcy
         code = self._fresh("error_code", now_ns)
         if emcy is not None:
             return f"the drive is in fault: {emcy.text(vendor)}"

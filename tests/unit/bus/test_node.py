@@ -7,7 +7,8 @@ import pytest
 
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
-from drivers.bus.node import EMCY_HISTORY, shared_node
+from drivers.bus.life import EMCY_HISTORY
+from drivers.bus.node import shared_node
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
 from drivers.errors import DriverError, SettingsError, Unavailable
@@ -80,7 +81,7 @@ def test_a_node_that_boots_late_is_picked_up(bus: CanBus, channel: str, describe
     with FakeNode(channel, 5, dict(IDENTITY)) as fake:
         fake.boot_up()
         until(lambda: gait.node.ready)
-        assert gait.node.boots == 1
+        assert gait.node.life.boots == 1
         gait.stop()
 
 
@@ -159,7 +160,7 @@ def test_a_boot_up_message_starts_everything_anew_also_when_it_comes_twice(
         asked = len(fake.requests)
         fake.boot_up()
         fake.boot_up()
-        until(lambda: gait.node.boots == 2 and gait.node.ready)
+        until(lambda: gait.node.life.boots == 2 and gait.node.ready)
         assert len(fake.requests) > asked
         gait.stop()
 
@@ -172,7 +173,7 @@ def test_a_heartbeat_that_stays_away_is_told_while_sdo_works(
         gait.start()
         until(lambda: gait.node.ready)
         fake.heartbeat()
-        until(lambda: gait.node.heartbeats)
+        until(lambda: gait.node.life.heartbeats)
         until(lambda: state(gait) is State.LOST)
         assert "its heartbeat is missing for" in problem(gait)
         assert gait.node.upload(0x1000, 0).result(WAIT_S)
@@ -199,8 +200,8 @@ def test_an_emcy_storm_is_bounded_counted_and_told_in_words(
         until(lambda: gait.node.ready)
         for _ in range(500):
             fake.emcy(0x8110, 0x11)
-        until(lambda: gait.node.emcys == 500)
-        assert len(gait.node.emcy_history) == EMCY_HISTORY
+        until(lambda: gait.node.life.emcys == 500)
+        assert len(gait.node.life.emcy_history) == EMCY_HISTORY
         assert state(gait) is State.FAULT
         assert "0x8110 CAN overrun: messages were lost (register: generic, communication)" in problem(gait)
         fake.emcy(0)
@@ -216,7 +217,7 @@ def test_emcys_are_followed_to_the_identifier_the_device_uses(
         gait.start()
         until(lambda: gait.node.ready)
         fake.send(0xA5, bytes.fromhex("11 86 01 00 00 00 00 00"))
-        until(lambda: gait.node.active_emcy)
+        until(lambda: gait.node.life.active_emcy)
         gait.stop()
 
 

@@ -84,7 +84,7 @@ def test_what_changes_in_the_device_is_read_again_after_it_boots(joint: Make, ch
         until(lambda: knee.node.ready)
         fake.objects |= tpdo(1, 0x1A2, 0x60410010, 0x60640020)
         fake.boot_up()
-        until(lambda: knee.node.boots and knee.node.ready)
+        until(lambda: knee.node.life.boots and knee.node.ready)
         fake.send(0x182, struct.pack("<i", 999))
         fake.send(0x1A2, struct.pack("<Hi", 0x0027, 500))
         until(lambda: knee.frames)
@@ -226,7 +226,7 @@ def test_a_drive_in_fault_is_told_with_its_emcy(joint: Make, channel: str) -> No
         until(lambda: quality(knee)[0] is State.FAULT)
         assert "does not say why" in quality(knee)[1]
         fake.emcy(0x8611, 0x01)
-        until(lambda: knee.node.active_emcy)
+        until(lambda: knee.node.life.active_emcy)
         fake.send(0x182, struct.pack("<Hi", 0x0218, 250))
         until(
             lambda: (

@@ -1,0 +1,79 @@
+"""What a node tells about itself unasked: boot-up, heartbeat (or answers to node guarding), EMCY."""
+
+from collections import deque
+
+from drivers.bus.emcy import Emcy, parse_emcy
+from drivers.bus.nmt import NmtState, parse_heartbeat
+
+EMCY_HISTORY = 64
+HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured
+
+
+class NodeLife:
+    """Fed by the bus's thread, read by any. Stamps are ns of the monotonic clock."""
+
+    def __init__(self, configured_timeout_s: float | None) -> None:
+        self.emcy_history: deque[Emcy] = deque(maxlen=EMCY_HISTORY)
+        self.boots = 0
+        self.emcys = 0
+        self.heartbeats = 0
+        self.nmt_state: NmtState | None = None
+        self.active_emcy: Emcy | None = None  # the last one that was not taken back
+        self.heard_ns: int | None = None  # anything that the node itself sent, PDOs excepted
+        self.heartbeat_ns: int | None = None
+        self.timeout_s = configured_timeout_s
+        self._configured_timeout_s = configured_timeout_s
+
+    def reset(self) -> None:
+        """Forget what is no longer true; what is counted stays."""
+        self.nmt_state = self.active_emcy = self.heard_ns = self.heartbeat_ns = None
+        self.timeout_s = self._configured_timeout_s
+
+    def expect_every(self, period_s: float | None) -> None:
+        """The device's own heartbeat period, where no time is configured; `None`: it has no heartbeat."""
+        if self._configured_timeout_s is None:
+            self.timeout_s = period_s * HEARTBEATS_MISSED if period_s else None
+
+    def on_heartbeat(self, stamp_ns: int, data: bytes) -> NmtState | None:
+        """Take a frame of 700h + node id; `None` where it is none."""
+        state = parse_heartbeat(data)
+        if state is None:
+            return None
+        if state is NmtState.BOOT_UP:
+            self.boots += 1
+            self.reset()
+        else:
+            self.heartbeats += 1
+        self.heard_ns = self.heartbeat_ns = stamp_ns
+        self.nmt_state = state
+        return state
+
+    def on_emcy(self, stamp_ns: int, data: bytes) -> None:
+        """Take an EMCY frame."""
+        emcy = parse_emcy(stamp_ns, data)
+        if emcy is None:
+            return
+        self.emcys += 1
+        self.heard_ns = stamp_ns
+        self.emcy_history.append(emcy)
+        self.active_emcy = None if emcy.resets else emcy
+
+    def silent_ms(self, now_ns: int) -> float | None:
+        """Since its last heartbeat, or anything else it said itself; `None` before the first."""
+        last_ns = self.heard_ns if self.heartbeat_ns is None else self.heartbeat_ns
+        return None if last_ns is None else max(0, now_ns - last_ns) / 1e6
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether a heartbeat that came, or is asked for, stays away."""
+        if self.timeout_s is None or self.heartbeat_ns is None:
+            return False
+        return (now_ns - self.heartbeat_ns) / 1e9 > self.timeout_s
+
+    def problem(self, now_ns: int) -> str | None:
+        """What is wrong with a node that came up, in words."""
+        if self.lost(now_ns):
+            silent_s = (self.silent_ms(now_ns) or 0) / 1000
+            return f"its heartbeat is missing for {silent_s:.1f} s: check the node's power and cable"
+        if self.nmt_state not in (None, NmtState.OPERATIONAL):
+            return f"it is {self.nmt_state.words} (NMT) and sends no PDOs until its master starts it"
+        return None
