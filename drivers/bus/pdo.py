@@ -64,7 +64,7 @@ class Tpdo:
 def read_tpdos(sdo: SdoChannel, description: Description) -> tuple[Tpdo, ...]:
     """Every TPDO that the device has, enabled or not; raises `DriverError`."""
     return tuple(
-        tpdo for number in _numbers(description) if (tpdo := _read_tpdo(sdo, description, number)) is not None
+        tpdo for number in _numbers(description) if (tpdo := read_tpdo(sdo, description, number)) is not None
     )
 
 
@@ -73,7 +73,8 @@ def _numbers(description: Description) -> Iterable[int]:
     return known or range(USUAL_TPDOS)
 
 
-def _read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | None:
+def read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | None:
+    """The TPDO at 1800h + `number`; `None` where the device has none. Raises `DriverError`."""
     parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
     try:
         cob_id = unsigned(sdo.upload(parameter, 1))

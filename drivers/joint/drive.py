@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
 
 from drivers.bus.bus import CanBus
@@ -17,6 +18,7 @@ from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.component import Kind
+from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
@@ -24,6 +26,7 @@ from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.quantities import AXIS_OFFSET, POSITION, STATUSWORD, channels, quantities
 from drivers.joint.quick_stop import StopOutcome, quick_stop
 from drivers.joint.reading import DriveReading, read_drive
+from drivers.joint.remap import disable, free_tpdo, remap
 from drivers.joint.settings import JointSettings
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
@@ -112,6 +115,11 @@ class JointDrive:
     def boot(self, sdo: SdoChannel) -> None:
         reading = read_drive(sdo, self._description, self.settings.axis)
         plan = make_plan(self.settings, self._quantities, reading)
+        if self.settings.configure_pdos and (plan.position_from is None or not plan.position_from.cyclic):
+            told = self._remap(sdo, reading)
+            reading = read_drive(sdo, self._description, self.settings.axis)
+            plan = make_plan(self.settings, self._quantities, reading)
+            plan = replace(plan, notes=(told, *plan.notes))
         with self._lock:
             self.forget()
             if self._started:
@@ -125,6 +133,17 @@ class JointDrive:
             self.reading = self._plan = None
             self.latest.clear()
             self._freshness.disconnected()
+
+    def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
+        """Bring the position into a free TPDO; returns what came of it, in words."""
+        free = free_tpdo(reading.tpdos, self.node.node_id, self.node.bus.unclaimed)
+        if free is None:
+            return "configure_pdos: no TPDO of the drive is free, nothing was changed"
+        try:
+            return remap(sdo, self._description, *free, self._offset)
+        except (DeviceAbort, Mismatch) as error:
+            disable(sdo, *free)
+            return f"configure_pdos: {error}"
 
     # How values come.
 

@@ -343,3 +343,50 @@ def test_starting_and_stopping_again_and_again_leaves_nothing(joint: Make, chann
             knee.stop()
         assert quality(knee)[0] is State.LOST
         assert fake.writes == []
+
+
+def test_nothing_is_remapped_unless_it_is_allowed(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(1, 0x80000182)
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects)
+        knee.start()
+        until(lambda: read(knee, "position") is not None)
+        assert fake.writes == []
+        knee.stop()
+
+
+def test_where_it_is_allowed_a_free_tpdo_gets_the_position_and_it_is_told(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(1, 0x182, 0x60610008) | tpdo(2, 0x80000282)
+    with FakeNode(channel, 2, dict(objects)) as fake:
+        fake.objects |= {(0x1A01, 1): bytes(4), (0x1A01, 2): bytes(4)}
+        knee = joint(objects, configure_pdos=True, slow_poll_hz=0)
+        knee.start()
+        until(lambda: knee.node.ready)
+        assert "TPDO2 (0x282) was given statusword and position, sent every 10 ms" in quality(knee)[1]
+        assert {index for index, _, _ in fake.writes} == {0x1801, 0x1A01}  # the enabled one was left alone
+        assert fake.writes[0] == (0x1801, 1, bytes.fromhex("82 02 00 C0"))  # disabled while it changes
+        fake.send(0x282, struct.pack("<Hi", 0x0027, 250))
+        until(lambda: read(knee, "position") is not None)
+        assert read(knee, "position") == pytest.approx(math.pi / 2)
+        knee.stop()
+
+
+def test_a_drive_that_refuses_a_mapping_is_left_as_it_was_and_polled(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(2, 0x80000282)
+    with FakeNode(channel, 2, dict(objects), aborts={(0x1A01, 1): 0x06040041}) as fake:
+        knee = joint(objects, configure_pdos=True)
+        knee.start()
+        until(lambda: read(knee, "position") is not None)
+        assert "the object cannot be mapped to a PDO" in quality(knee)[1]
+        assert fake.objects[0x1801, 1] == bytes.fromhex("82 02 00 C0")
+        knee.stop()
+
+
+def test_without_a_free_tpdo_nothing_is_changed(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(1, 0x182, 0x60610008)
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, configure_pdos=True)
+        knee.start()
+        until(lambda: "no TPDO of the drive is free" in quality(knee)[1])
+        assert fake.writes == []
+        knee.stop()

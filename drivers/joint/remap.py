@@ -1,0 +1,76 @@
+"""Brings position and statusword into a TPDO, where `configure_pdos = true` allows it.
+
+Only a TPDO that is disabled is taken: another master may live on the enabled ones. What is written is read
+back; nothing is stored in the device, and a device that refuses is left with that TPDO disabled, as it was.
+"""
+
+from collections.abc import Collection
+
+from drivers.bus.pdo import TPDO_MAPPING, TPDO_PARAMETER, Tpdo, read_tpdo
+from drivers.bus.sdo_channel import SdoChannel
+from drivers.errors import DeviceAbort, Mismatch
+from eds import Description
+
+_NOT_VALID, _NO_REMOTE = 0x8000_0000, 0x4000_0000
+_EVENT, _ON_SYNC = 255, 1
+EVENT_TIMER_MS = 10
+_BASES = (0x180, 0x280, 0x380, 0x480)  # COB-IDs of TPDO1–4 in the predefined connection set
+
+ENTRIES = ((0x6041, 16), (0x6064, 32))  # statusword, position
+
+
+def free_tpdo(tpdos: Collection[Tpdo], node_id: int, taken: Collection[int]) -> tuple[Tpdo, int] | None:
+    """A disabled TPDO and the identifier it can have; `None` where there is none that is surely nobody's."""
+    used = {tpdo.cob_id for tpdo in tpdos if tpdo.enabled} | set(taken)
+    for tpdo in tpdos:
+        usual = _BASES[tpdo.number - 1] + node_id if tpdo.number <= len(_BASES) else 0
+        cob_id = tpdo.cob_id or usual
+        if not tpdo.enabled and not tpdo.extended and cob_id and cob_id not in used:
+            return tpdo, cob_id
+    return None
+
+
+def remap(sdo: SdoChannel, description: Description, tpdo: Tpdo, cob_id: int, axis_offset: int) -> str:
+    """Map statusword and position into `tpdo`; returns what was done, in words.
+
+    Raises `DeviceAbort` where the device refuses, `Mismatch` where it then holds something else, and
+    `DeviceTimeout` or `Unavailable` where it is silent.
+    """
+    number = tpdo.number - 1
+    parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
+    timed = description.has(parameter, 5)
+    _write(sdo, parameter, 1, cob_id | _NOT_VALID | _NO_REMOTE, 4)
+    _write(sdo, mapping, 0, 0, 1)
+    for subindex, (index, bits) in enumerate(ENTRIES, start=1):
+        _write(sdo, mapping, subindex, (index + axis_offset) << 16 | bits, 4)
+    _write(sdo, mapping, 0, len(ENTRIES), 1)
+    _write(sdo, parameter, 2, _EVENT if timed else _ON_SYNC, 1)
+    if timed:
+        _write(sdo, parameter, 5, EVENT_TIMER_MS, 2)
+    _write(sdo, parameter, 1, cob_id | _NO_REMOTE, 4)
+    _verify(sdo, description, number, cob_id, axis_offset)
+    how = f"every {EVENT_TIMER_MS} ms" if timed else "on SYNC"
+    return f"TPDO{tpdo.number} (0x{cob_id:03X}) was given statusword and position, sent {how}"
+
+
+def _write(sdo: SdoChannel, index: int, subindex: int, value: int, size: int) -> None:
+    sdo.download(index, subindex, value.to_bytes(size, "little"))
+
+
+def _verify(sdo: SdoChannel, description: Description, number: int, cob_id: int, axis_offset: int) -> None:
+    found = read_tpdo(sdo, description, number)
+    wanted = [(index + axis_offset, 0, bits) for index, bits in ENTRIES]
+    if found is None or not found.enabled or found.cob_id != cob_id:
+        raise Mismatch(
+            f"{sdo.label}: 0x{TPDO_PARAMETER + number:04X}:01 was written and is not what it holds"
+        )
+    if [(mapped.index, mapped.subindex, mapped.bits) for mapped in found.objects] != wanted:
+        raise Mismatch(f"{sdo.label}: 0x{TPDO_MAPPING + number:04X} was written and is not what it holds")
+
+
+def disable(sdo: SdoChannel, tpdo: Tpdo, cob_id: int) -> None:
+    """Leave a TPDO that could not be mapped disabled; a device that refuses that too keeps what it has."""
+    try:
+        _write(sdo, TPDO_PARAMETER + tpdo.number - 1, 1, cob_id | _NOT_VALID | _NO_REMOTE, 4)
+    except DeviceAbort:
+        return
