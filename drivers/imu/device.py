@@ -7,7 +7,8 @@ from drivers.freshness import Freshness
 from drivers.imu import zero
 from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame
-from drivers.imu.motion import TrunkMotion, channels
+from drivers.imu.motion import TrunkMotion, channels, felt
+from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion
 from drivers.imu.settings import ImuSettings
 from drivers.latest import Latest
@@ -43,6 +44,7 @@ class Imu:
         self._clock = imu_format.clock.make() if imu_format.clock else None
         stored = IDENTITY if settings.zero is None else zero.load((beside or Path()) / settings.zero)
         self._motion = TrunkMotion(name, settings, imu_format, stored)
+        self.check = ImuCheck(name)
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
 
     def start(self) -> None:
@@ -67,7 +69,9 @@ class Imu:
 
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
-        problem = None if state is State.OK else self.line.problem(now_ns)
+        problem = self.check.problem if state is State.OK else self.line.problem(now_ns)
+        if state is State.OK and problem is not None:
+            state = State.FAULT
         counters = self.line.parser.counters.as_dict()
         counters |= {"stale": self._freshness.stale, "reconnects": self.line.reconnects}
         return Quality(state, age_ms, problem, counters)
@@ -83,6 +87,7 @@ class Imu:
             stamp_ns = taken_ns
         indices, values = self._motion.values(frame, stamp_ns)
         if indices:
+            self.check.update(stamp_ns, *felt(indices, values))
             self._freshness.seen(stamp_ns)
             self.latest.update(stamp_ns, indices, values)
 
@@ -91,4 +96,5 @@ class Imu:
         self.latest.clear()
         self._freshness.disconnected()
         self._motion.restart()
+        self.check.restart()
         self._clock = self._clock_spec.make() if self._clock_spec else None

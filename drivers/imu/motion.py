@@ -57,6 +57,23 @@ def tilt(up: Vector) -> tuple[float, float]:
     return math.atan2(-x, math.hypot(y, z)), math.atan2(-y, math.hypot(x, z))
 
 
+def felt(
+    indices: tuple[int, ...], values: tuple[float | None, ...]
+) -> tuple[Vector | None, Vector | None, Vector | None]:
+    """Acceleration, angular velocity and the direction of up (trunk axes) among a frame's values."""
+    given = {index: value for index, value in zip(indices, values, strict=True) if value is not None}
+
+    def take(where: tuple[int, ...]) -> list[float] | None:
+        return [given[index] for index in where] if where[0] in given else None
+
+    acceleration, rate, orientation = take(ACCELERATION), take(ANGULAR_VELOCITY), take(ORIENTATION)
+    return (
+        None if acceleration is None else (acceleration[0], acceleration[1], acceleration[2]),
+        None if rate is None else (rate[0], rate[1], rate[2]),
+        None if orientation is None else rotation.matrix((*orientation,))[2],  # type: ignore[arg-type]
+    )
+
+
 class TrunkMotion:
     """Turns frames in the sensor's axes into values of the trunk's channels.
 

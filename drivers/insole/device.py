@@ -1,6 +1,6 @@
 """One foot's insole: frames of its line become pressure, force and centre of pressure."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from drivers.component import Kind
@@ -13,6 +13,7 @@ from drivers.insole.formats import CLOCKS, parser_maker
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Foot, Layout
 from drivers.insole.load import Stance, load_of
+from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line
@@ -60,7 +61,11 @@ class Insole:
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         self.other: Insole | None = None  # the other foot's, where there is one
         self._cells = _calibration(settings, layout, beside)
+        self.hip_velocity: Callable[[int], float | None] | None = None  # of the same leg, at a time
         self._stance = Stance(settings.force_threshold)
+        self.check = FootCheck(name, len(layout.cells))
+        self._feet_check = FeetCheck(name)
+        self._swap_check = SwapCheck()
         self._indices = tuple(range(len(self.channels)))
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._fault: str | None = None  # what the device's own frames say is wrong
@@ -78,13 +83,19 @@ class Insole:
         self.line.stop(self)
         self.disconnected()
 
+    def follow_hip(self, hip: Latest) -> None:
+        """Judge left and right by the hip of the same leg, where it has a velocity (flexion positive)."""
+        places = [index for index, channel in enumerate(hip.channels) if channel.quantity == "velocity"]
+        if places:
+            self.hip_velocity = lambda now_ns: hip.read(places[0], now_ns)[0]
+
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
-        problem = self._fault
+        problem = self._fault or self.check.problem or self._feet_check.problem or self._swap_check.problem
         if state is State.OK and problem is not None:
             state = State.FAULT
         elif state is not State.OK:
-            problem = self.line.problem(now_ns) or problem or self._wrong_foot()
+            problem = self.line.problem(now_ns) or self._fault or self._wrong_foot()
         return Quality(state, age_ms, problem, self._counters())
 
     def received(self, frame: InsoleFrame, stamp_ns: int) -> None:
@@ -110,13 +121,29 @@ class Insole:
         self._freshness.disconnected()
         self._fault, self._foreign = None, 0
         self._clock = CLOCKS[self.settings.format].make()
+        self.check.restart()
+        self._feet_check.restart()
+        self._swap_check.restart()
 
     def _update(self, stamp_ns: int, pressures: tuple[float | None, ...]) -> None:
         load = load_of(pressures, self.layout, self.settings.force_threshold)
         contact = self._stance.contact(load.force)
         others = None if self.other is None else self.other.latest.read(0, stamp_ns)[0]
         share = self._stance.share(load.force, others)
+        self.check.update(stamp_ns, pressures, load.force)
+        if self.other is not None:
+            self._check_against(self.other, stamp_ns, load.force, others)
         self.latest.update(stamp_ns, self._indices, (*load, *pressures, contact, share))
+
+    def _check_against(
+        self, other: "Insole", stamp_ns: int, force: float | None, others: float | None
+    ) -> None:
+        self._feet_check.update(stamp_ns, self.check.landings, other.check.landings)
+        if self.hip_velocity is None or other.hip_velocity is None or force is None or others is None:
+            return
+        own_hip, other_hip = self.hip_velocity(stamp_ns), other.hip_velocity(stamp_ns)
+        if own_hip is not None and other_hip is not None:
+            self._swap_check.update(stamp_ns, force - others, own_hip - other_hip)
 
     def _pressures(self, frame: InsoleFrame) -> tuple[float | None, ...]:
         count = len(self.layout.cells)

@@ -40,7 +40,11 @@ def assemble(config: RobotConfig) -> Robot:
     lines: dict[str, Any] = {}
     for name, insole in config.insole.items():
         _add(robot, Kind.INSOLE, name, _insole(config.path, name, insole, lines))
-    pair([one for one in robot.components.values() if isinstance(one, Insole)])
+    feet = [one for one in robot.components.values() if isinstance(one, Insole)]
+    pair(feet)
+    for foot in feet:
+        if (hip := robot.components.get(f"{foot.foot}_hip")) is not None:
+            foot.follow_hip(hip.latest)
     for name, imu in config.imu.items():
         _add(robot, Kind.IMU, name, lambda name=name, imu=imu: Imu(name, imu, config.path.parent))  # type: ignore[misc]
     return robot

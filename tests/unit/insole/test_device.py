@@ -11,7 +11,8 @@ from drivers.errors import SettingsError
 from drivers.insole import layout as layouts
 from drivers.insole.device import Insole, insoles
 from drivers.insole.settings import InsoleSettings
-from drivers.samples import Quality, State
+from drivers.latest import Latest
+from drivers.samples import Channel, Quality, State
 from tests.unit.insole.encode import CALIBRATED, MISSING, RIGHT, Sender, cobs_frame
 from tests.unit.port.terminals import Terminal, send_until, wait_until
 
@@ -189,6 +190,20 @@ def test_calibration_file_turns_counts_into_pressure(
         assert quality(insole).counters["saturated"] > 0
     finally:
         insole.stop()
+
+
+def test_hip_of_the_same_leg_is_followed_by_its_velocity() -> None:
+    insole = Insole("left_insole", InsoleSettings(port="-"))
+    channels = [
+        Channel(f"left_hip.{quantity}", "left_hip", quantity, "") for quantity in ("position", "velocity")
+    ]
+    hip = Latest("left_hip", channels, stale_after_s=0.5)
+    insole.follow_hip(hip)
+    hip.update(1000, (0, 1), (0.1, 2.5))
+    if insole.hip_velocity is None:
+        raise AssertionError("the hip is not followed")
+    assert insole.hip_velocity(1000) == 2.5
+    assert insole.hip_velocity(10**10) is None
 
 
 def test_wrong_calibration_is_refused_when_the_robot_is_built(tmp_path: Path) -> None:

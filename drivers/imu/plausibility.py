@@ -1,0 +1,106 @@
+"""Whether an IMU can be believed: against gravity, against itself, against what a trunk can do."""
+
+import math
+
+from drivers.imu.rotation import Vector
+
+STANDARD_GRAVITY = 9.80665
+SETTLED_S = 10.0
+TIME_CONSTANT_S = 5.0
+DISAGREES = math.radians(6.0)
+SCALE = 0.25  # share by which the mean acceleration may differ from g
+FASTEST = 15.0  # rad/s; no trunk turns faster, not even in a fall
+TOO_FAST = 3  # frames in a period
+PERIOD_S = 10.0
+FROZEN_S = 5.0
+
+
+class ImuCheck:
+    """Watches one IMU in trunk axes; `problem` says in words what is wrong."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self.restart()
+
+    def restart(self) -> None:
+        """The stream begins anew."""
+        self._force: Vector | None = None  # specific force, slow mean
+        self._up: Vector | None = None  # the attitude's up, slow mean
+        self._began_ns: int | None = None
+        self._last_force_ns = self._last_up_ns = 0
+        self._previous: Vector | None = None
+        self._changed_ns = 0
+        self._now_ns = 0
+        self._fast = 0
+        self._period_ns = 0
+        self._too_fast = False
+
+    def update(
+        self, stamp_ns: int, acceleration: Vector | None, angular_velocity: Vector | None, up: Vector | None
+    ) -> None:
+        """What one frame carries: m/s², rad/s, and the direction of up by the attitude."""
+        self._now_ns = stamp_ns
+        if self._began_ns is None:
+            self._began_ns = self._changed_ns = stamp_ns
+        if acceleration is not None:
+            self._force = _slow(self._force, acceleration, (stamp_ns - self._last_force_ns) / 1e9)
+            self._last_force_ns = stamp_ns
+            if acceleration != self._previous:
+                self._previous, self._changed_ns = acceleration, stamp_ns
+        if up is not None:
+            self._up = _slow(self._up, up, (stamp_ns - self._last_up_ns) / 1e9)
+            self._last_up_ns = stamp_ns
+        if angular_velocity is not None:
+            self._count_fast(stamp_ns, math.hypot(*angular_velocity) > FASTEST)
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, with what to check."""
+        if self._began_ns is None or self._now_ns - self._began_ns < SETTLED_S * 1e9:
+            return None
+        if self._too_fast:
+            return (
+                f"{self._name} reports turns faster than {FASTEST:.0f} rad/s, which no trunk does: "
+                "check the range set in the device, and its wires for noise"
+            )
+        if self._force is None:
+            return None
+        if self._now_ns - self._changed_ns > FROZEN_S * 1e9:
+            return f"{self._name} sends the same acceleration again and again: it hangs; restart it"
+        length = math.hypot(*self._force)
+        if abs(length / STANDARD_GRAVITY - 1.0) > SCALE:
+            return (
+                f"{self._name} measures {length:.1f} m/s² on average instead of 9.8: its scale is off; "
+                "check the range set in the device and its format"
+            )
+        return self._against_gravity(length)
+
+    def _against_gravity(self, length: float) -> str | None:
+        force, up = self._force, self._up
+        if force is None or up is None:
+            return None
+        if up[2] < -0.5 and force[2] < 0.0:
+            return f"{self._name} is upside down: correct `axes` in [imu.{self._name}] or turn it over"
+        cosine = sum(a * b for a, b in zip(force, up, strict=True)) / (length * (math.hypot(*up) or 1.0))
+        angle = math.acos(max(-1.0, min(1.0, cosine)))
+        if angle > DISAGREES:
+            return (
+                f"{self._name}'s tilt and gravity disagree by {math.degrees(angle):.0f}°: an angle's sign or "
+                "order is wrong, or it drifts; check `format`, or set attitude = 'filter'"
+            )
+        return None
+
+    def _count_fast(self, stamp_ns: int, fast: bool) -> None:
+        if stamp_ns - self._period_ns > PERIOD_S * 1e9:
+            self._too_fast, self._fast, self._period_ns = self._fast >= TOO_FAST, 0, stamp_ns
+        self._fast += fast
+        self._too_fast = self._too_fast or self._fast >= TOO_FAST
+
+
+def _slow(mean: Vector | None, value: Vector, step_s: float) -> Vector:
+    """The mean moved towards `value`, as a low-pass of the time constant does."""
+    if mean is None:
+        return value
+    share = min(1.0, step_s / TIME_CONSTANT_S)
+    (a, b, c), (x, y, z) = mean, value
+    return (a + share * (x - a), b + share * (y - b), c + share * (z - c))

@@ -1,0 +1,200 @@
+"""Whether an insole can be believed: cells that are stuck or dead, a scale off by ten, feet that are swapped.
+
+Everything is judged over steps, so that standing, sitting and a foot in the air say nothing.
+"""
+
+import math
+from collections.abc import Sequence
+
+STEPS = 10  # landings that make a window
+FORCE_SWING = 150.0  # N; a foot that steps loads and unloads by at least this
+DEAD_SHARE = 0.01  # of the hardest pressed cell
+LOW_PEAK, HIGH_PEAK = 200.0, 4000.0  # N under one foot of somebody who walks
+FROZEN_S = 10.0
+ALONE_S = 30.0
+JUMPS = 20  # in a window: a loose wire
+JUMP_SHARE = 0.5  # of the hardest pressed cell, from one frame to the next and back
+
+
+class StepDetector:
+    """Finds landings in a foot's force whatever its scale and offset: a rise by half of the recent peak."""
+
+    SOONEST_S = 0.4  # between two landings of one foot
+    PEAK_FADES_S = 20.0
+    LEAST_RISE = 20.0  # N
+
+    def __init__(self) -> None:
+        self._peak = 0.0
+        self._extreme: float | None = None
+        self._rising = True
+        self._last_ns = self._landed_ns = 0
+
+    def has_landed(self, stamp_ns: int, force: float) -> bool:
+        """Whether this frame shows a landing."""
+        fade = min(1.0, (stamp_ns - self._last_ns) / 1e9 / self.PEAK_FADES_S)
+        self._peak = max(force, self._peak * (1.0 - fade))
+        self._last_ns = stamp_ns
+        if self._extreme is None:
+            self._extreme = force
+        self._extreme = (max if self._rising else min)(self._extreme, force)
+        turn = max(self.LEAST_RISE, 0.5 * self._peak)
+        if abs(force - self._extreme) < turn:
+            return False
+        self._rising, self._extreme = not self._rising, force
+        if not self._rising or stamp_ns - self._landed_ns < self.SOONEST_S * 1e9:
+            return False
+        self._landed_ns = stamp_ns
+        return True
+
+
+class FootCheck:
+    """Watches one foot's cells and force; `problem` says in words what is wrong."""
+
+    def __init__(self, name: str, cells: int) -> None:
+        self._name = name
+        self._cells = cells
+        self.restart()
+
+    def restart(self) -> None:
+        """The stream begins anew."""
+        self.landings = 0
+        self._steps = StepDetector()
+        self._window_problem: str | None = None
+        self._frozen_since_ns: int | None = None
+        self._previous: tuple[float, ...] | None = None
+        self._before: tuple[float, ...] | None = None
+        self._last_ns = 0
+        self._low = self._high = [0.0] * self._cells
+        self._force_low = self._force_high = 0.0
+        self._clear_window()
+
+    def update(self, stamp_ns: int, pressures: Sequence[float | None], force: float | None) -> None:
+        """One frame."""
+        known = tuple(pressure for pressure in pressures if pressure is not None)
+        if force is None or len(known) != self._cells:
+            return
+        if known != self._previous or force <= 0.0:
+            self._frozen_since_ns = stamp_ns
+        self._count_jumps(known)
+        self._before, self._previous, self._last_ns = self._previous, known, stamp_ns
+        self._low = list(map(min, self._low, known))
+        self._high = list(map(max, self._high, known))
+        self._force_low, self._force_high = min(self._force_low, force), max(self._force_high, force)
+        if self._steps.has_landed(stamp_ns, force):
+            self._land()
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, with what to check."""
+        if self._frozen_since_ns is not None and self._last_ns - self._frozen_since_ns > FROZEN_S * 1e9:
+            return (
+                f"{self._name} sends the same values again and again under load: its cells are unplugged "
+                "or its converter hangs; check the cells' connector and restart it"
+            )
+        return self._window_problem
+
+    def _land(self) -> None:
+        self.landings += 1
+        if self.landings % STEPS == 0:
+            if self._force_high - self._force_low >= FORCE_SWING or self._force_high < LOW_PEAK:
+                self._window_problem = self._judge()
+            self._clear_window()
+
+    def _judge(self) -> str | None:
+        hardest = max(self._high)
+        if self._force_high < LOW_PEAK or self._force_high > HIGH_PEAK:
+            return (
+                f"{self._name} measured at most {self._force_high:.0f} N over {STEPS} steps: its scale is "
+                "off, perhaps by ten; check the calibration's gain and the cells' areas"
+            )
+        for cell, jumps in enumerate(self._jumps):
+            if jumps >= JUMPS:
+                return f"{self._name}: cell {cell} jumps between two values; check it for a loose wire"
+        for cell, (low, high) in enumerate(zip(self._low, self._high, strict=True)):
+            if low == high > 0.0:
+                return f"{self._name}: cell {cell} is stuck at {high / 1e3:.1f} kPa; check its wire"
+            if high < DEAD_SHARE * hardest:
+                return f"{self._name}: cell {cell} felt nothing over {STEPS} steps; check its wire and place"
+        return None
+
+    def _count_jumps(self, known: tuple[float, ...]) -> None:
+        if self._before is None or self._previous is None:
+            return
+        limit = JUMP_SHARE * max(self._high)
+        for cell, (a, b, c) in enumerate(zip(self._before, self._previous, known, strict=True)):
+            if (b - a) * (c - b) < 0.0 and min(abs(b - a), abs(c - b)) > limit > 0.0:
+                self._jumps[cell] += 1
+
+    def _clear_window(self) -> None:
+        self._low, self._high = [math.inf] * self._cells, [0.0] * self._cells
+        self._force_low, self._force_high = math.inf, 0.0
+        self._jumps = [0] * self._cells
+
+
+class FeetCheck:
+    """Watches one foot against the other: both must step."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self.restart()
+
+    def restart(self) -> None:
+        self.problem: str | None = None
+        self._own = self._others = 0
+        self._since_ns = 0
+
+    def update(self, stamp_ns: int, own_landings: int, others_landings: int) -> None:
+        """How often each foot has landed by `stamp_ns`."""
+        if own_landings != self._own or stamp_ns - self._since_ns > ALONE_S * 1e9:
+            if own_landings != self._own:
+                self.problem = None
+            self._own, self._others, self._since_ns = own_landings, others_landings, stamp_ns
+        elif others_landings - self._others >= STEPS:
+            self.problem = (
+                f"{self._name} sends, but does not feel the steps that the other foot makes: "
+                "check the cells' connector and that the insole lies in the shoe"
+            )
+
+
+class SwapCheck:
+    """Watches the feet's force against the hips: a loaded leg's hip extends, a free leg's hip flexes."""
+
+    SETTLED_S = 15.0
+    CORRELATION = 0.3
+    LEAST_FORCE, LEAST_VELOCITY = 80.0, 0.25  # rms of somebody who walks, N and rad/s
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        self.problem: str | None = None
+        self._force2 = self._velocity2 = self._product = 0.0
+        self._began_ns: int | None = None
+        self._last_ns = 0
+
+    def update(self, stamp_ns: int, force_difference: float, velocity_difference: float) -> None:
+        """One leg minus the other: force (N) and hip velocity (rad/s, flexion positive)."""
+        if self._began_ns is None or stamp_ns - self._last_ns > 1e9:
+            self.restart()
+            self._began_ns = self._last_ns = stamp_ns
+        step_s = (stamp_ns - self._last_ns) / 1e9
+        self._last_ns = stamp_ns
+        keep = math.exp(-step_s / self.SETTLED_S)
+        self._force2 = keep * self._force2 + (1 - keep) * force_difference**2
+        self._velocity2 = keep * self._velocity2 + (1 - keep) * velocity_difference**2
+        self._product = keep * self._product + (1 - keep) * force_difference * velocity_difference
+        if stamp_ns - self._began_ns > 2 * self.SETTLED_S * 1e9:
+            self._judge()
+
+    def _judge(self) -> None:
+        force, velocity = math.sqrt(self._force2), math.sqrt(self._velocity2)
+        if force < self.LEAST_FORCE or velocity < self.LEAST_VELOCITY:
+            return
+        correlation = self._product / (force * velocity)
+        if correlation > self.CORRELATION:
+            self.problem = (
+                "left and right are swapped: each foot is loaded while its own hip flexes; "
+                "check the insoles' ports (and the sign of the hips' `direction`)"
+            )
+        elif correlation < 0.0:
+            self.problem = None
