@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
@@ -17,7 +17,6 @@ from drivers.insole.settings import InsoleSettings
 from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
 
-S = TypeVar("S", bound=Struct)
 Table = Mapping[str, Any]
 
 CONTROLWORD = 0x6040
@@ -134,7 +133,7 @@ def _header(table: str, name: str) -> str:
     return f'[{table}."{name}"]' if "." in name else f"[{table}.{name}]"
 
 
-def _struct(where: str, table: Any, kind: type[S]) -> S:
+def _struct(where: str, table: Any, kind: type[Struct]) -> Struct:
     if not isinstance(table, dict):
         raise ConfigError(f"{where} is a table, not {table!r}")
     if kind is ParameterSettings and table and all(isinstance(entry, dict) for entry in table.values()):

@@ -117,9 +117,7 @@ class ComponentInfo(Struct, frozen=True):
     kind: str
     state: str
     problem: str | None = None
-    device: dict[str, str | int] | UnsetType = (
-        UNSET  # what its EDS says
-    )
+    device: dict[str, str | int] | UnsetType = UNSET  # what its EDS says
 
 
 class ChannelInfo(Struct, frozen=True):

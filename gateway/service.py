@@ -105,9 +105,9 @@ class Service:
         )
 
     def _stream_start(self, session: Session, params: messages.StreamStartParams) -> Answer:
-        modules = {name: self._use(name, session) for name in params.modules}
+        modules: dict[str, Future[Any]] = {name: self._use(name, session) for name in params.modules}
 
-        def start(running: Mapping[str, Any]) -> messages.StreamStarted:
+        def start(running: dict[str, Any]) -> messages.StreamStarted:
             for module in running.values():
                 if isinstance(module, Exception):
                     raise module

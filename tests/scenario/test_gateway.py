@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 
 from gateway.config import load
@@ -115,6 +116,26 @@ def test_a_stop_halts_every_drive_against_the_controller_and_holds(
         return elapsed > 1_500_000_000 and all(abs(velocity) < 0.05 for velocity in moved.values())
 
     until(stands_a_while, "it stands still and stays so")
+
+
+def test_a_controller_that_starts_again_under_a_held_stop_is_stopped_again(
+    client: Client, robot: SimulatedRobot, tmp_path: Path
+) -> None:
+    until(lambda: set(_words(client)) == {"operation enabled"}, "the robot walks")
+    client.call("robot.stop", reason="scenario")
+    until(lambda: "operation enabled" not in _words(client), "no drive is enabled")
+    with can.Bus(interface="virtual", channel=f"scenario {tmp_path.name}") as third:
+        # Somebody writes 1 to the controller's start object 2000h: it brings every drive up again.
+        start = can.Message(
+            arbitration_id=0x610, data=bytes.fromhex("2f00200001000000"), is_extended_id=False
+        )
+
+        def stopped_again() -> bool:
+            third.send(start)
+            return any(client.call("robot.describe")["stop"]["stopped_again"].values())
+
+        until(stopped_again, "a drive was enabled and stopped again")
+    until(lambda: "operation enabled" not in _words(client), "no drive stays enabled")
 
 
 def _words(client: Client) -> list[str]:

@@ -1,0 +1,48 @@
+"""`gwrms gateway` as a command: its manual, its exit codes, its errors."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway import daemon
+from gateway.main import main
+from tests.unit.gateway.harness import ROBOT
+
+
+def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gateway", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(
+        part in text for part in ("CONFIG", "--host", "--port", "listening on HOST:PORT", "exit codes")
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "CONFIG"),
+        (["robot.toml", "--port", "seven"], "'seven' is no port; allowed are 0 to 65535"),
+        (["robot.toml", "--port", "65536"], "'65536' is no port"),
+        (["robot.toml", "--prot", "1"], "--prot"),
+    ],
+)
+def test_wrong_usage_ends_with_2(arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gateway", *arguments]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_a_wrong_file_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text("[robot]\n", encoding="utf-8")
+    assert main(["gateway", str(file)]) == 1
+    assert capsys.readouterr().err == f"gwrms gateway: {file}: [robot] lacks the key 'name'\n"
+
+
+def test_a_port_in_use_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(ROBOT, encoding="utf-8")
+    with daemon.listen("127.0.0.1", 0) as taken:
+        assert main(["gateway", str(file), "--port", str(taken.getsockname()[1])]) == 1
+    error = capsys.readouterr().err
+    assert "cannot listen on 127.0.0.1:" in error
+    assert "Traceback" not in error
