@@ -46,7 +46,12 @@ class Description:
 
     def variable(self, index: int, subindex: int = 0) -> ODVariable | None:
         """The description of one object, `None` where the file has none."""
-        return self.object_dictionary.get_variable(index, subindex)
+        found = self.object_dictionary.get_variable(index, subindex)
+        if found is None or found.subindex != subindex:
+            return None
+        # canopen invents entries of arrays that the device does not have.
+        members = getattr(found.parent, "subindices", None)
+        return found if members is None or subindex in members else None
 
     def require(self, objects: Iterable[tuple[int, str]], purpose: str) -> None:
         """Raise `EdsError` that names every one of `objects` (index, name) that the file lacks."""

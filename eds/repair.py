@@ -13,7 +13,6 @@ from eds.numbers import parse_integer, parse_relative
 
 _OBJECT = re.compile(r"[0-9a-f]{4}")
 _SUBOBJECT = re.compile(r"([0-9a-f]{4})sub(?:0x)?([0-9a-f]{1,2})")
-_NAMES = re.compile(r"([0-9a-f]{4})name")
 
 _DEVICE_TEXT = ("VendorName", "ProductName", "OrderCode")
 _DEVICE_NUMBERS = (
@@ -35,9 +34,8 @@ def repair(ini: IniText) -> tuple[Sections, int | None]:
     tree = _object_tree(ini)
     for index, subindices in sorted(tree.items()):
         repaired |= _object(ini, index, sorted(subindices))
-    for name in ini.sections:
-        if (match := _NAMES.fullmatch(name)) and match[1] in tree:
-            repaired |= _compact_names(ini, match[1])
+    for index in tree:
+        repaired |= _compact_names(ini, index)
     _check_lists(ini, tree)
     return repaired, file_node_id
 
@@ -245,7 +243,7 @@ _VALUES: dict[str, Callable[[str], str | None]] = {
 
 def _compact_names(ini: IniText, index: str) -> Sections:
     """Names of a compact array's entries; CiA 306 lets those out that have no name of their own."""
-    source = ini.sections[f"{index}name"]
+    source = ini.sections.get(f"{index}name", {})
     parent = ini.sections.get(index, {})
     count = parse_integer(parent.get("compactsubobj", "")) or 0
     names = {

@@ -38,15 +38,13 @@ def remap(sdo: SdoChannel, description: Description, tpdo: Tpdo, cob_id: int, ax
     """
     number = tpdo.number - 1
     parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
-    timed = description.has(parameter, 5)
     _write(sdo, parameter, 1, cob_id | _NOT_VALID | _NO_REMOTE, 4)
     _write(sdo, mapping, 0, 0, 1)
     for subindex, (index, bits) in enumerate(ENTRIES, start=1):
         _write(sdo, mapping, subindex, (index + axis_offset) << 16 | bits, 4)
     _write(sdo, mapping, 0, len(ENTRIES), 1)
+    timed = description.has(parameter, 5) and _takes_timer(sdo, parameter)
     _write(sdo, parameter, 2, _EVENT if timed else _ON_SYNC, 1)
-    if timed:
-        _write(sdo, parameter, 5, EVENT_TIMER_MS, 2)
     _write(sdo, parameter, 1, cob_id | _NO_REMOTE, 4)
     _verify(sdo, description, number, cob_id, axis_offset)
     how = f"every {EVENT_TIMER_MS} ms" if timed else "on SYNC"
@@ -55,6 +53,15 @@ def remap(sdo: SdoChannel, description: Description, tpdo: Tpdo, cob_id: int, ax
 
 def _write(sdo: SdoChannel, index: int, subindex: int, value: int, size: int) -> None:
     sdo.download(index, subindex, value.to_bytes(size, "little"))
+
+
+def _takes_timer(sdo: SdoChannel, parameter: int) -> bool:
+    """Whether the device sends by a timer; many know the object from their EDS only."""
+    try:
+        _write(sdo, parameter, 5, EVENT_TIMER_MS, 2)
+    except DeviceAbort:
+        return False
+    return True
 
 
 def _verify(sdo: SdoChannel, description: Description, number: int, cob_id: int, axis_offset: int) -> None:

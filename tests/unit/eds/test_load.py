@@ -297,3 +297,13 @@ def test_a_file_is_found_beside_the_robots_file(tmp_path: Path) -> None:
     assert eds.locate("own.eds", tmp_path / "robot.toml") == tmp_path / "own.eds"
     with pytest.raises(eds.EdsError, match=r"no EDS file 'none\.eds'"):
         eds.locate("none.eds", tmp_path / "robot.toml")
+
+
+def test_no_entry_of_an_array_is_invented(tmp_path: Path) -> None:
+    body = "[2000]\nParameterName=List\nObjectType=8\n"
+    body += variable("2000sub0", DataType="5") + variable("2000sub1") + variable("2001")
+    body += variable("2002", ObjectType="8", CompactSubObj="2")
+    description = load(tmp_path, body)
+    assert [subindex for subindex in range(6) if description.has(0x2000, subindex)] == [0, 1]
+    assert [subindex for subindex in range(6) if description.has(0x2001, subindex)] == [0]
+    assert [subindex for subindex in range(6) if description.has(0x2002, subindex)] == [0, 1, 2]
