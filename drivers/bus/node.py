@@ -131,6 +131,8 @@ class Node(BusUser):
             "sdo_timeouts": sdo.timeouts,
             "sdo_aborts": sdo.aborts,
             "sdo_stale": sdo.stale,
+            "bus_opened": self.bus.opened,
+            "bus_dropped": self.bus.dropped,
         }
 
     # What the bus tells.

@@ -22,6 +22,7 @@ class FakeNode:
     silent: bool = False  # hears, answers nothing
     repeat_replies: int = 1  # how often each answer is sent
     deaf_to: set[Object] = field(default_factory=set)  # requests about these are not answered
+    interface: str = "virtual"
     on_write: Callable[[int, int, bytes], None] = lambda index, subindex, data: None
 
     def __post_init__(self) -> None:
@@ -32,7 +33,7 @@ class FakeNode:
         self._upload = b""
 
     def __enter__(self) -> "FakeNode":
-        self.bus = can.Bus(channel=self.channel, interface="virtual")
+        self.bus = can.Bus(channel=self.channel, interface=self.interface)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="fake node")
         self._thread.start()
