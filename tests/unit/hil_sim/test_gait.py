@@ -32,6 +32,14 @@ def test_curves_are_periodic_and_smooth() -> None:
         assert max(abs(b - a) for a, b in pairwise(angles)) < 0.012
 
 
+@pytest.mark.parametrize("step_length", [0.3, 0.4, 0.6])
+def test_the_thigh_trails_behind_the_trunk_in_late_stance(step_length: float) -> None:
+    hips = [math.degrees(leg(phase, shaped(step_length)).hip) for phase in PHASES]
+    trailing = min(hips)
+    assert -25.0 < trailing < -3.0
+    assert 0.4 < PHASES[hips.index(trailing)] < STANCE
+
+
 @pytest.mark.parametrize("step_length", [0.2, 0.3, 0.4, 0.5, 0.6])
 def test_the_hips_range_is_what_the_step_length_needs(step_length: float) -> None:
     hips = [leg(phase, shaped(step_length)).hip for phase in PHASES]
