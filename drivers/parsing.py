@@ -98,56 +98,54 @@ class FrameScanner(Generic[F]):
         """The frame in `raw`; `None`, with the reason counted, where it is not valid."""
         raise NotImplementedError
 
-    def _find(self, buffer: bytearray, start: int) -> int:
-        """Where the next frame could begin; the buffer's end where it has only half a beginning."""
-        found = buffer.find(self.sync, start)
-        if found >= 0:
-            return found
-        for size in range(len(self.sync) - 1, 0, -1):
-            if len(buffer) - size >= start and buffer.endswith(self.sync[:size]):
-                return len(buffer) - size
-        return len(buffer)
+    def _find(self, buffer: bytearray, start: int, end: int) -> int:
+        """Where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
+        return buffer.find(self.sync, start, end + len(self.sync) - 1)
 
     def _first_complete(self) -> tuple[int, int] | None:
         """Start and end of the candidate that ends first, if any has ended."""
         best: tuple[int, int] | None = None
         index = 0
-        while index < len(self._candidates) or self._discover():
+        limit = len(self._buffer)  # what begins behind the best one's end cannot end before it
+        while index < len(self._candidates) or self._discover(limit):
             start = self._candidates[index]
-            if best is not None and start >= best[1]:
+            if start >= limit:
                 break
             length = self._length(self._buffer, start)
             if length == IMPOSSIBLE:
                 del self._candidates[index]
                 continue
             end = start + length
-            if length != UNKNOWN and end <= len(self._buffer) and (best is None or end < best[1]):
-                best = (start, end)
+            if length != UNKNOWN and (end < limit or (best is None and end == limit)):
+                best, limit = (start, end), end
             index += 1
         return best
 
-    def _discover(self) -> bool:
-        start = self._find(self._buffer, self._searched)
-        self._searched = start
-        if len(self._buffer) - start < len(self.sync) or start == len(self._buffer):
+    def _discover(self, limit: int) -> bool:
+        """Follow the next place before `limit` where a frame could begin, if there is one."""
+        start = self._find(self._buffer, self._searched, limit)
+        if start < 0:
+            self._searched = max(self._searched, limit - len(self.sync) + 1)
             return False
         self._candidates.append(start)
         self._searched = start + 1
         return True
 
     def _drop_until(self, end: int) -> None:
-        skipped = bytes(self._buffer[self._begin : end])
-        self.counters.bytes_dropped += len(skipped.strip(self.idle) if self.idle else skipped)
-        self._begin = end
+        if end > self._begin:
+            skipped = bytes(self._buffer[self._begin : end])
+            self.counters.bytes_dropped += len(skipped.strip(self.idle) if self.idle else skipped)
+            self._begin = end
 
     def _trim(self) -> None:
         keep = self._candidates[0] if self._candidates else self._searched
         self._drop_until(keep)
-        del self._buffer[:keep]
-        self._candidates = [start - keep for start in self._candidates]
-        self._searched -= keep
-        self.frame_end -= keep
-        self._begin = 0
+        if keep:
+            del self._buffer[:keep]
+            self._candidates = [start - keep for start in self._candidates]
+            self._searched -= keep
+            self.frame_end -= keep
+            self._begin = 0
 
 
 class Sequence:

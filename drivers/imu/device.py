@@ -7,7 +7,7 @@ from drivers.freshness import Freshness
 from drivers.imu import zero
 from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame
-from drivers.imu.motion import TrunkMotion, channels, felt
+from drivers.imu.motion import TrunkMotion, channels
 from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion
 from drivers.imu.settings import ImuSettings
@@ -63,7 +63,7 @@ class Imu:
             NotUpright: there is no attitude, the trunk moves, or it is far from upright.
 
         """
-        measured = zero.measure(list(self._motion.recent_ups))
+        measured = zero.measure(self._motion.ups_as_mounted())
         self._motion.set_zero(measured)
         return measured
 
@@ -85,11 +85,11 @@ class Imu:
             if taken_ns is None:
                 return
             stamp_ns = taken_ns
-        indices, values = self._motion.values(frame, stamp_ns)
-        if indices:
-            self.check.update(stamp_ns, *felt(indices, values))
+        felt = self._motion.felt(frame, stamp_ns)
+        if felt.indices:
+            self.check.update(stamp_ns, felt.acceleration, felt.angular_velocity, felt.up)
             self._freshness.seen(stamp_ns)
-            self.latest.update(stamp_ns, indices, values)
+            self.latest.update(stamp_ns, felt.indices, felt.values)
 
     def disconnected(self) -> None:
         """The port went away: nothing that it said before is true any more."""

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 from drivers.errors import SettingsError
 from drivers.imu import rotation
@@ -39,8 +40,6 @@ NWU_FROM_NED: Quaternion = (0.0, 1.0, 0.0, 0.0)  # north-east-down to north-west
 RAW_AFTER_NS = 500_000_000
 ZERO_FRAMES = 200  # about a second of the fastest device
 
-Values = tuple[tuple[int, ...], tuple[float | None, ...]]
-
 
 def channels(name: str) -> tuple[Channel, ...]:
     """The channels of the IMU `name`."""
@@ -57,21 +56,14 @@ def tilt(up: Vector) -> tuple[float, float]:
     return math.atan2(-x, math.hypot(y, z)), math.atan2(-y, math.hypot(x, z))
 
 
-def felt(
-    indices: tuple[int, ...], values: tuple[float | None, ...]
-) -> tuple[Vector | None, Vector | None, Vector | None]:
-    """Acceleration, angular velocity and the direction of up (trunk axes) among a frame's values."""
-    given = {index: value for index, value in zip(indices, values, strict=True) if value is not None}
+class Felt(NamedTuple):
+    """What one frame says of the trunk, in trunk axes."""
 
-    def take(where: tuple[int, ...]) -> list[float] | None:
-        return [given[index] for index in where] if where[0] in given else None
-
-    acceleration, rate, orientation = take(ACCELERATION), take(ANGULAR_VELOCITY), take(ORIENTATION)
-    return (
-        None if acceleration is None else (acceleration[0], acceleration[1], acceleration[2]),
-        None if rate is None else (rate[0], rate[1], rate[2]),
-        None if orientation is None else rotation.matrix((*orientation,))[2],  # type: ignore[arg-type]
-    )
+    indices: tuple[int, ...]  # of the channels that it gives
+    values: tuple[float, ...]
+    acceleration: Vector | None
+    angular_velocity: Vector | None
+    up: Vector | None  # the world's up
 
 
 class TrunkMotion:
@@ -95,7 +87,7 @@ class TrunkMotion:
             raise SettingsError(f"[imu.{name}]: {error}") from error
         self._mounted_from_sensor = rotation.multiply(rotation.from_yaw_pitch_roll(*settings.mounting), axes)
         self._filter = ComplementaryFilter()
-        self.recent_ups: deque[Vector] = deque(maxlen=ZERO_FRAMES)  # in trunk axes as mounted, for a zero
+        self.recent: deque[Quaternion] = deque(maxlen=ZERO_FRAMES)  # world from sensor, for a zero
         self.set_zero(zero)
         self.restart()
 
@@ -108,34 +100,35 @@ class TrunkMotion:
     def restart(self) -> None:
         """The stream begins anew."""
         self._filter.restart()
-        self.recent_ups.clear()
+        self.recent.clear()
         self._device_attitude_ns: int | None = None
         self._began_ns: int | None = None
 
-    def values(self, frame: ImuFrame, stamp_ns: int) -> Values:
-        """Channel indices and values that `frame` gives."""
-        indices: list[int] = []
-        values: list[float | None] = []
-        for where, vector in (
-            (ACCELERATION, frame.acceleration),
-            (ANGULAR_VELOCITY, frame.angular_velocity),
-        ):
-            if vector is not None:
-                indices += where
-                values += rotation.transform(self._turn, vector)
+    def felt(self, frame: ImuFrame, stamp_ns: int) -> Felt:
+        """What `frame`, taken at `stamp_ns`, says of the trunk."""
+        indices: tuple[int, ...] = ()
+        values: tuple[float, ...] = ()
+        acceleration = angular_velocity = up = None
+        if frame.acceleration is not None:
+            acceleration = rotation.transform(self._turn, frame.acceleration)
+            indices, values = ACCELERATION, acceleration
+        if frame.angular_velocity is not None:
+            angular_velocity = rotation.transform(self._turn, frame.angular_velocity)
+            indices, values = indices + ANGULAR_VELOCITY, values + angular_velocity
         sensor = self._world_from_sensor(frame, stamp_ns)
         if sensor is not None:
-            self.recent_ups.append(
-                rotation.matrix(rotation.multiply(sensor, rotation.conjugate(self._mounted_from_sensor)))[2]
-            )
             orientation = rotation.multiply(sensor, self._sensor_from_trunk)
-            indices += (*TILT, *ORIENTATION)
-            # The last row of world_from_trunk is the world's up in the trunk's axes.
-            values += (*tilt(rotation.matrix(orientation)[2]), *orientation)
+            up = rotation.up(orientation)
+            indices, values = indices + TILT + ORIENTATION, values + tilt(up) + orientation
+            self.recent.append(sensor)
         if frame.temperature is not None:
-            indices += TEMPERATURE
-            values.append(frame.temperature)
-        return tuple(indices), tuple(values)
+            indices, values = indices + TEMPERATURE, (*values, frame.temperature)
+        return Felt(indices, values, acceleration, angular_velocity, up)
+
+    def ups_as_mounted(self) -> list[Vector]:
+        """The world's up in the axes of the trunk without a zero, of the last second or so."""
+        back = rotation.conjugate(self._mounted_from_sensor)
+        return [rotation.up(rotation.multiply(sensor, back)) for sensor in self.recent]
 
     def _world_from_sensor(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
         """Sensor to a world whose z points up: the device's own attitude, or the filter's."""

@@ -13,6 +13,7 @@ FASTEST = 15.0  # rad/s; no trunk turns faster, not even in a fall
 TOO_FAST = 3  # frames in a period
 PERIOD_S = 10.0
 FROZEN_S = 5.0
+PERIOD_NS = 19_000_000  # for slow means, faster frames are left out
 
 
 class ImuCheck:
@@ -42,12 +43,12 @@ class ImuCheck:
         self._now_ns = stamp_ns
         if self._began_ns is None:
             self._began_ns = self._changed_ns = stamp_ns
-        if acceleration is not None:
+        if acceleration is not None and stamp_ns - self._last_force_ns >= PERIOD_NS:
             self._force = _slow(self._force, acceleration, (stamp_ns - self._last_force_ns) / 1e9)
             self._last_force_ns = stamp_ns
             if acceleration != self._previous:
                 self._previous, self._changed_ns = acceleration, stamp_ns
-        if up is not None:
+        if up is not None and stamp_ns - self._last_up_ns >= PERIOD_NS:
             self._up = _slow(self._up, up, (stamp_ns - self._last_up_ns) / 1e9)
             self._last_up_ns = stamp_ns
         if angular_velocity is not None:

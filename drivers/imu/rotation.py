@@ -56,6 +56,12 @@ def transform(m: Matrix, v: Vector) -> Vector:
     return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
+def up(q: Quaternion) -> Vector:
+    """The direction of the world's z in the axes of the body whose attitude (world from body) is `q`."""
+    w, x, y, z = q
+    return (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+
+
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """`v` turned by the unit quaternion `q`."""
     return transform(matrix(q), v)

@@ -84,10 +84,9 @@ class VectornavParser(FrameScanner[ImuFrame]):
         super().finish()
         return frames
 
-    def _find(self, buffer: bytearray, start: int) -> int:
-        ascii_at, binary_at = buffer.find(ASCII, start), buffer.find(BINARY, start)
-        found = [at for at in (ascii_at, binary_at) if at >= 0]
-        return min(found) if found else len(buffer)
+    def _find(self, buffer: bytearray, start: int, end: int) -> int:
+        found = [at for first in (ASCII, BINARY) if (at := buffer.find(first, start, end)) >= 0]
+        return min(found, default=-1)
 
     def _length(self, buffer: bytearray, start: int) -> int:
         return (_binary_length if buffer[start] == BINARY else _ascii_length)(buffer, start)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import reduce
 from operator import xor
 
-from drivers.insole.description import Field, Flag, FrameDescription
+from drivers.insole.description import Flag, FrameDescription
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Foot
 from drivers.insole.order import Order
@@ -57,6 +57,12 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         self._terminator = bytes.fromhex(description.terminator)
         self._checksum_size, self._checksum = CHECKSUMS[description.checksum]
         self._order_mark = "<" if description.byte_order == "little" else ">"
+        self._layouts = {
+            (field.type, field.count): self._layout(field.type, field.count)
+            for field in description.fields
+            if isinstance(field.count, int)
+        }
+        self._counting = {field.count for field in description.fields if isinstance(field.count, str)}
         self._tail = self._checksum_size + len(self._terminator)
         self._order = Order(self.counters, _sequence_modulus(description), each_foot=True)
 
@@ -66,18 +72,18 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         counts: dict[str, int] = {}
         for field in self._description.fields:
             count = counts.get(field.count, 0) if isinstance(field.count, str) else field.count
-            layout = struct.Struct(f"{self._order_mark}{count}{LETTERS[field.type]}")
+            layout = self._layouts.get((field.type, count)) or self._layout(field.type, count)
             if at + layout.size - start > LONGEST or (isinstance(field.count, str) and count < 1):
                 return IMPOSSIBLE
-            if self._is_count(field):
+            if field.name in self._counting:
                 if len(buffer) < at + layout.size:
                     return UNKNOWN
                 counts[field.name] = int(layout.unpack_from(buffer, at)[0])
             at += layout.size
         return at + self._tail - start
 
-    def _is_count(self, field: Field) -> bool:
-        return any(other.count == field.name for other in self._description.fields)
+    def _layout(self, field_type: str, count: int) -> struct.Struct:
+        return struct.Struct(f"{self._order_mark}{count}{LETTERS[field_type]}")
 
     def _decode(self, raw: bytes) -> InsoleFrame | None:
         body_end = len(raw) - self._tail
@@ -97,7 +103,7 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         values: dict[str, Numbers] = {}
         for field in self._description.fields:
             count = int(values[field.count][0]) if isinstance(field.count, str) else field.count
-            layout = struct.Struct(f"{self._order_mark}{count}{LETTERS[field.type]}")
+            layout = self._layouts.get((field.type, count)) or self._layout(field.type, count)
             values[field.name] = layout.unpack_from(raw, at)
             at += layout.size
         return values

@@ -11,6 +11,7 @@ FORCE_SWING = 150.0  # N; a foot that steps loads and unloads by at least this
 DEAD_SHARE = 0.01  # of the hardest pressed cell
 LOW_PEAK, HIGH_PEAK = 200.0, 4000.0  # N under one foot of somebody who walks
 FROZEN_S = 10.0
+PERIOD_NS = 19_000_000  # a foot's load does not change faster
 ALONE_S = 30.0
 JUMPS = 20  # in a window: a loose wire
 JUMP_SHARE = 0.5  # of the hardest pressed cell, from one frame to the next and back
@@ -69,7 +70,9 @@ class FootCheck:
         self._clear_window()
 
     def update(self, stamp_ns: int, pressures: Sequence[float | None], force: float | None) -> None:
-        """One frame."""
+        """One frame; those that come faster than `PERIOD_NS` are left out."""
+        if 0 <= stamp_ns - self._last_ns < PERIOD_NS:
+            return
         known = tuple(pressure for pressure in pressures if pressure is not None)
         if force is None or len(known) != self._cells:
             return

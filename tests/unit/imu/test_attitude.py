@@ -125,12 +125,12 @@ def motion(attitude: str) -> TrunkMotion:
 
 def feed_raw(trunk: TrunkMotion, seconds: float) -> list[float | None]:
     """Tilt forward at each frame with rates of a still, level device that sends no attitude."""
-    tilts = []
+    tilts: list[float | None] = []
     for number in range(int(seconds * RATE_HZ)):
         stamp = number * STEP_NS
-        trunk.values(ImuFrame("a", acceleration=(0.0, 0.0, STANDARD_GRAVITY)), stamp)
-        indices, values = trunk.values(ImuFrame("r", angular_velocity=(0.0, 0.0, 0.0)), stamp)
-        tilts.append(dict(zip(indices, values, strict=True)).get(TILT[0]))
+        trunk.felt(ImuFrame("a", acceleration=(0.0, 0.0, STANDARD_GRAVITY)), stamp)
+        felt = trunk.felt(ImuFrame("r", angular_velocity=(0.0, 0.0, 0.0)), stamp)
+        tilts.append(dict(zip(felt.indices, felt.values, strict=True)).get(TILT[0]))
     return tilts
 
 
@@ -146,8 +146,8 @@ def test_devices_own_attitude_is_preferred() -> None:
     trunk = motion("auto")
     for number in range(400):
         stamp = number * STEP_NS
-        trunk.values(ImuFrame("q", orientation=rotation.about_y(0.2)), stamp)
-        indices, _ = trunk.values(
+        trunk.felt(ImuFrame("q", orientation=rotation.about_y(0.2)), stamp)
+        felt = trunk.felt(
             ImuFrame("r", angular_velocity=(0.0, 0.0, 0.0), acceleration=(0.0, 0.0, STANDARD_GRAVITY)), stamp
         )
-        assert TILT[0] not in indices
+        assert TILT[0] not in felt.indices

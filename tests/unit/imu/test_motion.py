@@ -16,8 +16,8 @@ STANDARD_GRAVITY = 9.80665
 
 def values(frame: ImuFrame, **settings: object) -> dict[str, float | None]:
     motion = TrunkMotion("trunk", ImuSettings(port="-", **settings), FORMATS["witmotion"])  # type: ignore[arg-type]
-    indices, numbers = motion.values(frame, 0)
-    return dict(zip((list(UNITS)[index] for index in indices), numbers, strict=True))
+    felt = motion.felt(frame, 0)
+    return dict(zip((list(UNITS)[index] for index in felt.indices), felt.values, strict=True))
 
 
 def leaning(forward: float, left: float, yaw: float = 0.0) -> rotation.Quaternion:

@@ -21,12 +21,12 @@ def test_zero_posture_reads_zero_and_others_read_what_they_differ_by() -> None:
     trunk = TrunkMotion("trunk", ImuSettings(port="-"), FORMATS["witmotion"])
     standing = rotation.from_yaw_pitch_roll(-0.03, 0.08, 1.0)
     for number in range(50):
-        trunk.values(ImuFrame("q", orientation=standing), number)
-    trunk.set_zero(zero.measure(list(trunk.recent_ups)))
+        trunk.felt(ImuFrame("q", orientation=standing), number)
+    trunk.set_zero(zero.measure(trunk.ups_as_mounted()))
 
     def tilts(attitude: rotation.Quaternion) -> tuple[float | None, ...]:
-        indices, values = trunk.values(ImuFrame("q", orientation=attitude), 0)
-        got = dict(zip(indices, values, strict=True))
+        felt = trunk.felt(ImuFrame("q", orientation=attitude), 0)
+        got = dict(zip(felt.indices, felt.values, strict=True))
         return got[TILT[0]], got[TILT[1]]
 
     assert tilts(standing) == pytest.approx((0.0, 0.0), abs=1e-9)
