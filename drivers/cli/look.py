@@ -21,6 +21,7 @@ from drivers.insole import layout as layouts
 from drivers.insole.device import insoles
 from drivers.insole.settings import InsoleSettings
 from drivers.port import open_port
+from drivers.samples import State
 
 BAUDRATES = (115200, 230400, 9600, 460800, 921600, 57600, 38400, 19200, 4800)
 LISTEN_S = 1.0
@@ -162,7 +163,9 @@ def _show(components: list[Component], seconds: float | None) -> None:
     try:
         while time.monotonic() < until:
             pause.wait(REFRESH_S)
-            sys.stdout.write("\n".join(map(_line, components)) + "\n")
+            now_ns = time.monotonic_ns()
+            there = [one for one in components if one.quality(now_ns).state is not State.LOST]
+            sys.stdout.write("\n".join(_line(one, now_ns) for one in there or components) + "\n")
             sys.stdout.flush()
     except KeyboardInterrupt:
         return
@@ -171,8 +174,7 @@ def _show(components: list[Component], seconds: float | None) -> None:
             component.stop()
 
 
-def _line(component: Component) -> str:
-    now_ns = time.monotonic_ns()
+def _line(component: Component, now_ns: int) -> str:
     quality = component.quality(now_ns)
     values = []
     for index, channel in enumerate(component.channels):
