@@ -30,7 +30,8 @@ class Sample:
     """Values of one component that were received together.
 
     `indices` are positions in the component's `channels`; `values` stand in the same order, `None`
-    where the device said that it has no value. `stamp_ns` is the robot's monotonic clock on reception.
+    where the device said that it has no value. `stamp_ns` is on the robot's monotonic
+    clock: when it was received, or when it was taken where the device's own clock tells.
     """
 
     component: str
