@@ -9,7 +9,7 @@ from hil_sim.gait.curves import Curve, Leg, LegCurves, measured
 LEG_LENGTH = 0.80  # m, hip to ground of the modelled wearer
 STANCE = 0.62  # share of a stride that the foot is on the ground
 
-# The measured hip angle counts from the pelvis, which tilts forward by this much in quiet walking at every speed
+# The measured hip angle counts from the pelvis, which tilts forward by about this much at every walking speed
 # (mean of the same data sets); the robot's hip counts from its upright trunk.
 PELVIC_TILT = math.radians(12.0)
 
