@@ -59,9 +59,11 @@ class Line(Generic[F]):
 
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with the line, in words with what to check; `None` while frames come."""
+        if self._port.problem is not None:
+            return self._port.problem
         opened_ns = self._port.opened_ns
         if opened_ns is None:
-            return self._port.problem or f"{self.path} is being opened"
+            return f"{self.path} is being opened"
         silent_s = (now_ns - max(opened_ns, self._last_byte_ns or 0)) / 1e9
         if silent_s > SILENCE_S:
             return f"no byte from {self.path} for {silent_s:.1f} s: check the sensor's power and its TX wire"

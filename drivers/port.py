@@ -33,8 +33,8 @@ class SerialPort:
     """A serial port that is held open between `start` and `stop`.
 
     `received(data, stamp_ns)` gets every read, with the robot's monotonic clock right after it; `opened` and
-    `closed` tell when the port came and went. All three run in the port's thread, must return at once and
-    never raise.
+    `closed` tell when the port came and went. All three run in the port's thread and must return at once.
+    What `received` raises is told as `problem`, and reading goes on.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class SerialPort:
     ) -> None:
         self.path = path
         self.baudrate = baudrate
-        self.problem: str | None = None  # why it is not open, in words
+        self.problem: str | None = None  # why it is not open, or what failed since, in words
         self.opened_ns: int | None = None  # since when it is open
         self._received = received
         self._opened = opened
@@ -114,7 +114,10 @@ class SerialPort:
                 return False
             if not data:
                 return False
-            self._received(data, time.monotonic_ns())
+            try:
+                self._received(data, time.monotonic_ns())
+            except Exception as error:  # noqa: BLE001 - one wrong frame must not silence the sensor
+                self.problem = f"internal error at bytes of {self.path}: {type(error).__name__}: {error}"
 
     def _stopped_within(self, seconds: float) -> bool:
         poll = select.poll()

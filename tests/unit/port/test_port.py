@@ -46,6 +46,28 @@ def port_at(path: Path, sink: Received) -> SerialPort:
     return SerialPort(str(path), 115200, sink.received, sink.opened, sink.closed)
 
 
+def test_a_consumer_that_fails_is_told_and_reading_goes_on(terminal: Terminal) -> None:
+    class Failing(Received):
+        def received(self, data: bytes, stamp_ns: int) -> None:
+            super().received(data, stamp_ns)
+            if data.startswith(b"bad"):
+                raise ZeroDivisionError("oops")
+
+    sink = Failing()
+    port = port_at(terminal.path, sink)
+    port.start()
+    try:
+        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        terminal.send(b"bad")
+        wait_until(lambda: port.problem is not None, "the failure to be told")
+        assert "ZeroDivisionError: oops" in str(port.problem)
+        terminal.send(b"good")
+        wait_until(lambda: sink.data.endswith(b"good"), "reading to go on")
+        assert sink.closings == 0
+    finally:
+        port.stop()
+
+
 def test_bytes_arrive_unchanged_with_rising_stamps(terminal: Terminal) -> None:
     sink, everything = Received(), bytes(range(256))
     port = port_at(terminal.path, sink)
