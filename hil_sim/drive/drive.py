@@ -7,6 +7,7 @@ from enum import IntEnum
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import Clock
+from hil_sim.drive.encoder import Encoder
 from hil_sim.drive.mechanics import STEP_S, Joint
 from hil_sim.drive.motion import Hold, Motion, Profile, RampDown, Reference, Track
 from hil_sim.drive.power_state import ENERGISED, Command, PowerState, after, command_of
@@ -19,6 +20,7 @@ STEP_NS = round(STEP_S * 1e9)
 _TICK_NS = 5 * STEP_NS  # the joint is where it is now at each SYNC, and at least this often
 
 FOLLOWING_ERROR = 0x8611  # error codes of CiA 402-2 table 17 and CiA 301
+UNDERVOLTAGE = 0x3220
 MOTOR_TEMPERATURE = 0x4310
 COMMUNICATION = 0x8100
 
@@ -91,6 +93,8 @@ _HALT = 1 << 8
 
 _AMBIENT_C = 25.0
 _HEATING_AT_RATED_C = 35.0  # over ambient, after a long time at rated torque
+_SUPPLY_V = 48.0
+_LOWEST_SUPPLY_V = 36.0
 _THERMAL_TIME_S = 600.0
 _TOO_HOT_C = 100.0
 
@@ -99,6 +103,8 @@ class JointDrive(Node):
     """One drive; `joint` is the mechanical truth behind it.
 
     Positions on the bus are counts at the motor; inside all is rad, s and N·m at the joint.
+    What may be disturbed from outside, at any time: `fault(code)`, `encoder`, `joint` (its `slip`,
+    `friction_factor` and `load`), `temperature_c` (°C, of the motor) and `supply_v` (V, of the DC link).
     """
 
     def __init__(
@@ -114,7 +120,9 @@ class JointDrive(Node):
         self._controlword = 0
         self._mode = Mode.CYCLIC_SYNCHRONOUS_POSITION
         self._error_code = 0
-        self._temperature_c = _AMBIENT_C
+        self.encoder = Encoder()
+        self.temperature_c = _AMBIENT_C
+        self.supply_v = _SUPPLY_V
         self._late_s = 0.0
         self._limited = False
         self._targeted = False  # a target has come since the drive was enabled
@@ -130,12 +138,12 @@ class JointDrive(Node):
             ERROR_CODE: lambda: self._error_code,
             MODE_DISPLAY: lambda: int(self._mode),
             POSITION_DEMAND: lambda: round(self._reference.position * self.counts_per_radian),
-            POSITION_ACTUAL: lambda: round(self.joint.position * self.counts_per_radian),
+            POSITION_ACTUAL: lambda: round(self._position * self.counts_per_radian),
             VELOCITY_ACTUAL: lambda: round(self.joint.velocity * self.counts_per_radian),
             FOLLOWING_ERROR_ACTUAL: lambda: round(self._following_error() * self.counts_per_radian),
             TORQUE_ACTUAL: self._torque_permille,
             CURRENT_ACTUAL: self._torque_permille,  # a motor whose torque is its current
-            TEMPERATURE: lambda: round(self._temperature_c * 10.0),
+            TEMPERATURE: lambda: round(self.temperature_c * 10.0),
         }
         for key, source in sources.items():
             self.dictionary[key].source = source
@@ -164,8 +172,13 @@ class JointDrive(Node):
     def _torque_permille(self) -> int:
         return round(1000.0 * self.joint.torque / self._rated_torque)
 
+    @property
+    def _position(self) -> float:
+        """Where the encoder says that the joint is."""
+        return self.encoder.read(self.joint.motor_position * self.counts_per_radian) / self.counts_per_radian
+
     def _following_error(self) -> float:
-        return self._reference.position - self.joint.position
+        return self._reference.position - self._position
 
     def statusword(self) -> int:
         word = self.power_state.value | _VOLTAGE_ENABLED | _REMOTE
@@ -242,7 +255,7 @@ class JointDrive(Node):
 
     def _hold(self) -> None:
         """Demand the position where the joint is, so that nothing jumps."""
-        self._reference.position, self._reference.velocity = self.joint.position, 0.0
+        self._reference.position, self._reference.velocity = self._position, 0.0
         self._motion = Hold()
         self._targeted = False
 
@@ -339,6 +352,8 @@ class JointDrive(Node):
         if steps <= 0:
             return
         self._advanced_ns += steps * STEP_NS
+        if self.supply_v < _LOWEST_SUPPLY_V and self.power_state is PowerState.OPERATION_ENABLED:
+            self.fault(UNDERVOLTAGE)
         if self.power_state in ENERGISED:
             self._drive_on(steps)
         else:
@@ -354,7 +369,7 @@ class JointDrive(Node):
         reference, joint = self._reference, self.joint
         for _ in range(steps):
             self._motion.step(reference, STEP_S)
-            torque = stiffness * (reference.position - joint.position)
+            torque = stiffness * (reference.position - self._position)
             torque += damping * (reference.velocity - joint.velocity)
             joint.step(min(max(torque, -max_torque), max_torque), max_velocity)
         self._watch(steps * STEP_S)
@@ -377,8 +392,8 @@ class JointDrive(Node):
     def _heat(self, elapsed_s: float) -> None:
         share = self.joint.torque / self._rated_torque
         end_c = _AMBIENT_C + _HEATING_AT_RATED_C * share * share
-        self._temperature_c += (end_c - self._temperature_c) * elapsed_s / _THERMAL_TIME_S
-        if self._temperature_c > _TOO_HOT_C:
+        self.temperature_c += (end_c - self.temperature_c) * elapsed_s / _THERMAL_TIME_S
+        if self.temperature_c > _TOO_HOT_C and self._error_code == 0:
             self.fault(MOTOR_TEMPERATURE)
 
 

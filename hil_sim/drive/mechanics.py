@@ -29,20 +29,32 @@ class Joint:
         self.velocity = 0.0
         self.torque = 0.0
         self.load = 0.0
+        self.friction_factor = 1.0  # worn or dry bearings: every friction times this, at any time
+        self.slipped = 0.0
+
+    @property
+    def motor_position(self) -> float:
+        """Where the motor stands (rad at the joint): ahead of the joint by what the gear has slipped."""
+        return self.position + self.slipped
+
+    def slip(self, radians: float) -> None:
+        """The gear jumps teeth: the motor is ahead of the joint by so much more (rad at the joint)."""
+        self.slipped += radians
 
     def step(self, torque: float, max_velocity: float) -> None:
         """Move on by `STEP_S` under `torque` (N·m at the joint); a load counts against the motor."""
         constants = self.constants
         self.torque = torque
         push = torque - self.load
-        if torque == 0.0 and self.velocity == 0.0 and abs(push) <= constants.holding_friction:
+        holding = constants.holding_friction * self.friction_factor
+        if torque == 0.0 and self.velocity == 0.0 and abs(push) <= holding:
             return
         velocity = self.velocity
         slip = velocity / (abs(velocity) + _STICTION_VELOCITY)
         friction = constants.viscous_friction * velocity + constants.coulomb_friction * slip
-        velocity += (push - friction) / constants.inertia * STEP_S
+        velocity += (push - friction * self.friction_factor) / constants.inertia * STEP_S
         velocity = min(max(velocity, -max_velocity), max_velocity)
-        if torque == 0.0 and abs(velocity) < _STICTION_VELOCITY and abs(push) <= constants.holding_friction:
+        if torque == 0.0 and abs(velocity) < _STICTION_VELOCITY and abs(push) <= holding:
             velocity = 0.0
         self._move(velocity)
 
