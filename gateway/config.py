@@ -16,6 +16,7 @@ from drivers.imu.settings import ImuSettings
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
+from gateway.records.folder import default_folder
 
 Table = Mapping[str, Any]
 
@@ -36,12 +37,16 @@ class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client."""
+    """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client.
+
+    `records` is the folder of journal, held stop and pending reverts, relative to the robot's file.
+    """
 
     host: str = "127.0.0.1"
     port: Annotated[int, Meta(ge=0, le=65535)] = 7420
     role: Role = Role.OBSERVER
     linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
+    records: str | None = None
 
 
 class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -79,6 +84,12 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     insole: dict[str, InsoleSettings] = {}
     imu: dict[str, ImuSettings] = {}
     parameter: dict[str, ParameterSettings] = {}
+
+    @property
+    def records(self) -> Path:
+        """The folder of this robot's records."""
+        given = self.gateway.records
+        return default_folder(self.robot.name) if given is None else self.path.parent / given
 
 
 _SINGLE: Mapping[str, type[Struct]] = {"robot": RobotSettings, "gateway": GatewaySettings}

@@ -19,6 +19,7 @@ host = "127.0.0.1"              # who may reach the gateway: this machine alone
 port = 7420                     # its TCP port
 role = "observer"               # another controller leads the bus (here: `gait`); we send nothing unasked
 linger_s = 5                    # seconds that a module stays awake after its last client
+records = "records"             # folder beside this file: journal, held stop, writes to be taken back
 
 {bus}
 # Joints: flexion of hip and knee and dorsiflexion of the ankle count positive.

@@ -23,6 +23,13 @@ def _descriptors() -> set[str]:
 
 
 @pytest.fixture(autouse=True)
+def records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test sees the records that another one's gateway has kept, nor those of this computer's user."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.delenv("STATE_DIRECTORY", raising=False)
+
+
+@pytest.fixture(autouse=True)
 def nothing_leaks() -> Iterator[None]:
     """Fail a test that leaves a thread, a child process, a socket or a terminal behind."""
     threads = set(threading.enumerate())
