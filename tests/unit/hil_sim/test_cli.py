@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hil_sim.cli import main
+from hil_sim.cli.sim import main
 
 
 @contextmanager

@@ -1,0 +1,1 @@
+"""The simulator's commands: `gwrms sim` and `gwrms sim-fault`."""
