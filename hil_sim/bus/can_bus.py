@@ -13,6 +13,8 @@ _FRAME_BITS = 47
 _EXTENDED_BITS = 18
 _STUFFABLE_BITS = 34
 _STUFFING = 0.074
+# ISO 11898-1: what follows a bit error, at its longest. Superposed error flags, delimiter, intermission.
+_ERROR_FRAME_BITS = 12 + 8 + 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +38,33 @@ class Frame:
 
 
 Receiver = Callable[[Frame, object], None]
+ErrorListener = Callable[[], None]
+
+
+class Disturbance:
+    """What a fault does to the frames of a bus; this one lets them all pass."""
+
+    def leaves(self, frame: Frame, sender: object) -> bool:  # noqa: ARG002 - the shape of a disturbance
+        """Whether a frame that is sent queues for the bus; `CanBus.queue` puts one there past everybody."""
+        return True
+
+    def survives(self, frame: Frame, sender: object) -> bool:  # noqa: ARG002 - the shape of a disturbance
+        """Whether a frame gets over the wire; an error frame ends it otherwise, and it is sent again."""
+        return True
+
+    def arrives(self, frame: Frame, sender: object, receiver: object) -> bool:  # noqa: ARG002 - its shape
+        """Whether one receiver takes a frame that came over the wire."""
+        return True
+
+
+_Waiting = tuple[int, int, Frame, object]  # arbitration, order of sending, frame, sender
 
 
 class CanBus:
     """A bus that carries one frame at a time.
 
     A frame reaches every receiver but its sender, in the order in which frames win arbitration, at the moment
-    its last bit is over. Receivers get the frame and who sent it.
+    its last bit is over. Receivers get the frame and who sent it. `disturbances` may stand in the way.
     """
 
     def __init__(self, clock: Clock, bitrate: int = 1_000_000) -> None:
@@ -50,16 +72,23 @@ class CanBus:
         self.bitrate = bitrate
         self.frames_carried = 0
         self.busy_ns = 0
+        self.disturbances: list[Disturbance] = []
         self._receivers: dict[object, Receiver] = {}
-        self._pending: list[tuple[int, int, Frame, object]] = []
+        self._error_listeners: dict[object, ErrorListener] = {}
+        self._pending: list[_Waiting] = []
         self._queued = 0
         self._transmitting = False
+        self._on_wire: _Waiting | None = None  # also `None` where its sender fell silent in the middle
 
-    def attach(self, participant: object, receive: Receiver) -> None:
+    def attach(self, participant: object, receive: Receiver, on_error: ErrorListener | None = None) -> None:
+        """Take part; `on_error` is told of each error frame."""
         self._receivers[participant] = receive
+        if on_error is not None:
+            self._error_listeners[participant] = on_error
 
     def detach(self, participant: object) -> None:
         self._receivers.pop(participant, None)
+        self._error_listeners.pop(participant, None)
 
     @property
     def pending(self) -> int:
@@ -68,23 +97,53 @@ class CanBus:
 
     def send(self, frame: Frame, sender: object) -> None:
         """Queue a frame; it goes out when it wins the bus."""
+        if all(disturbance.leaves(frame, sender) for disturbance in self.disturbances):
+            self.queue(frame, sender)
+
+    def queue(self, frame: Frame, sender: object) -> None:
+        """Queue a frame whatever disturbs the sending."""
         self._queued += 1
         heapq.heappush(self._pending, (frame.arbitration(), self._queued, frame, sender))
         if not self._transmitting:
             self._start_next()
 
+    def withdraw(self, sender: object) -> None:
+        """The sender's controller is off: what waits of it never goes out, what is on the wire breaks off."""
+        self._pending = [waiting for waiting in self._pending if waiting[3] is not sender]
+        heapq.heapify(self._pending)
+        if self._on_wire is not None and self._on_wire[3] is sender:
+            self._on_wire = None
+
     def _start_next(self) -> None:
-        _, _, frame, sender = heapq.heappop(self._pending)
-        duration_ns = round(frame.bits() * SECOND_NS / self.bitrate)
+        self._on_wire = waiting = heapq.heappop(self._pending)
+        _, _, frame, sender = waiting
+        destroyed = not all(one.survives(frame, sender) for one in self.disturbances)
+        bits = frame.bits() / 2 + _ERROR_FRAME_BITS if destroyed else frame.bits()
+        duration_ns = round(bits * SECOND_NS / self.bitrate)
         self.busy_ns += duration_ns
         self._transmitting = True
-        self.clock.after(duration_ns, lambda: self._finish(frame, sender))
+        self.clock.after(duration_ns, self._destroy if destroyed else self._finish)
 
-    def _finish(self, frame: Frame, sender: object) -> None:
-        self.frames_carried += 1
-        for participant, receive in tuple(self._receivers.items()):
-            if participant is not sender:
-                receive(frame, sender)
-        self._transmitting = False
+    def _finish(self) -> None:
+        if self._on_wire is not None:
+            _, _, frame, sender = self._on_wire
+            self.frames_carried += 1
+            for participant, receive in tuple(self._receivers.items()):
+                if participant is not sender and self._reaches(frame, sender, participant):
+                    receive(frame, sender)
+        self._release()
+
+    def _reaches(self, frame: Frame, sender: object, receiver: object) -> bool:
+        return all(disturbance.arrives(frame, sender, receiver) for disturbance in self.disturbances)
+
+    def _destroy(self) -> None:
+        for on_error in tuple(self._error_listeners.values()):
+            on_error()
+        if self._on_wire is not None:
+            heapq.heappush(self._pending, self._on_wire)
+        self._release()
+
+    def _release(self) -> None:
+        self._transmitting, self._on_wire = False, None
         if self._pending:
             self._start_next()

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from hil_sim.bus.can_bus import CanBus, Frame
-from hil_sim.bus.socketcand import Messages, frame_message, parse_send
+from hil_sim.bus.socketcand import Messages, error_message, frame_message, parse_send
 from hil_sim.clock import MILLISECOND_NS
 from hil_sim.errors import SimulatorError
 from hil_sim.loop import Loop
@@ -65,7 +65,7 @@ class Hub:
         self.port: int = self._listener.getsockname()[1]
         loop.watch(self._listener, selectors.EVENT_READ, self._accept)
         loop.each_turn(self._flush)
-        bus.attach(self, self._receive)
+        bus.attach(self, self._receive, self._receive_error)
 
     def close(self) -> None:
         self._bus.detach(self)
@@ -148,6 +148,12 @@ class Hub:
         for client in self._clients.values():
             if client.raw and client is not sender:
                 message = message or frame_message(frame, self._epoch_s + self._bus.clock.now_s)
+                client.waiting += message
+
+    def _receive_error(self) -> None:
+        message = error_message(self._epoch_s + self._bus.clock.now_s)
+        for client in self._clients.values():
+            if client.raw:
                 client.waiting += message
 
     def _say(self, client: _Client, message: bytes) -> None:

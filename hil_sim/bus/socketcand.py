@@ -5,6 +5,7 @@ import re
 from hil_sim.bus.can_bus import Frame
 
 MAX_PENDING = 4096  # bytes of an unfinished message
+ERROR_CLASS = 0x088  # Linux can/error.h: a protocol violation (0x008) seen as an error on the bus (0x080)
 
 _MESSAGE = re.compile(rb"<([^<>]*)>")
 _EXTENDED_DIGITS = 8
@@ -14,6 +15,11 @@ def frame_message(frame: Frame, stamp_s: float) -> bytes:
     """A received frame; without data the field is empty, and its two spaces stay."""
     identifier = f"{frame.cob_id:08X}" if frame.extended else f"{frame.cob_id:03X}"
     return f"< frame {identifier} {stamp_s:.6f} {frame.data.hex().upper()} >".encode("ascii")
+
+
+def error_message(stamp_s: float) -> bytes:
+    """An error frame, as the interface saw it on the bus."""
+    return f"< error {ERROR_CLASS:03X} {stamp_s:.6f} >".encode("ascii")
 
 
 def parse_send(words: list[bytes]) -> Frame | None:

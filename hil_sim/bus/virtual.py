@@ -3,6 +3,7 @@
 import can
 
 from hil_sim.bus.can_bus import CanBus, Frame
+from hil_sim.bus.socketcand import ERROR_CLASS
 from hil_sim.clock import MILLISECOND_NS
 
 _POLL_NS = MILLISECOND_NS  # a virtual channel cannot be waited for together with anything else
@@ -15,7 +16,7 @@ class VirtualBridge:
         self._bus = bus
         self._outside = can.Bus(interface="virtual", channel=channel)
         self._polling = bus.clock.every(_POLL_NS, self._poll)
-        bus.attach(self, self._receive)
+        bus.attach(self, self._receive, self._receive_error)
 
     def close(self) -> None:
         self._polling.cancel()
@@ -36,6 +37,16 @@ class VirtualBridge:
                 data=frame.data,
                 is_extended_id=frame.extended,
                 is_remote_frame=frame.remote,
+                timestamp=self._bus.clock.now_s,
+            )
+        )
+
+    def _receive_error(self) -> None:
+        self._outside.send(
+            can.Message(
+                arbitration_id=ERROR_CLASS,
+                data=bytes(8),
+                is_error_frame=True,
                 timestamp=self._bus.clock.now_s,
             )
         )
