@@ -31,5 +31,8 @@ STATE_AFTER: dict[int, NmtState] = {
     NmtService.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
 }
 
+# 1029h: what an operational device enters on a communication error; 1 changes nothing (CiA 301 §7.5.2.32).
+STATE_AFTER_ERROR: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
+
 # CiA 301 table 38: SDO, SYNC and EMCY live in PRE-OPERATIONAL and OPERATIONAL, PDOs in OPERATIONAL alone.
 COMMUNICATING = frozenset({NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL})

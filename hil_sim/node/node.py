@@ -17,6 +17,7 @@ BOOT_TIME_NS = 50 * MILLISECOND_NS
 SYNC = (0x1005, 0)
 SDO_SERVERS = (0x1200, 0x127F)
 
+COMMUNICATION_ERROR_BEHAVIOUR = (0x1029, 1)
 EMCY_PDO_TOO_SHORT = 0x8210
 EMCY_HEARTBEAT_LOST = 0x8130
 
@@ -130,6 +131,14 @@ class Node:
         if self.state is NmtState.OPERATIONAL:
             for tpdo in self._tpdos:
                 tpdo.changed(key)
+
+    def bus_off(self) -> None:
+        """The device's CAN controller has left the bus: it acts as 1029h and its profile say."""
+        key = COMMUNICATION_ERROR_BEHAVIOUR
+        behaviour = self.dictionary[key].number() if key in self.dictionary else 0
+        if self.state is NmtState.OPERATIONAL and behaviour in nmt.STATE_AFTER_ERROR:
+            self._enter(nmt.STATE_AFTER_ERROR[behaviour])
+        self._on_communication_lost()
 
     def emergency(self, code: int, vendor: bytes = b"") -> None:
         self._emergencies.occurred(code, vendor)
