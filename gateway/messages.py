@@ -83,6 +83,30 @@ class ParameterWriteParams(Params, frozen=True):
     trial_s: Seconds | None = None
 
 
+class WriteNumberParams(Params, frozen=True):
+    """`parameter.confirm` and `parameter.revert`: the number that the trial's write was answered with."""
+
+    write: int
+
+
+class ComponentParams(Params, frozen=True):
+    """`parameter.store` and `parameter.restore`."""
+
+    component: str
+
+
+class EnableParams(Params, frozen=True):
+    """`robot.enable`; `joints` are globs, none means all."""
+
+    joints: Globs | None = None
+
+
+class TailParams(Params, frozen=True):
+    """`journal.tail`."""
+
+    n: Annotated[int, Meta(ge=1, le=1000)] = 20
+
+
 class StopParams(Struct, frozen=True):
     """`robot.stop`; takes whatever it is given, because a stop is never refused for its form."""
 
@@ -147,6 +171,24 @@ class ParameterInfo(Struct, frozen=True):
     problem: str | None = None
 
 
+class TrialInfo(Struct, frozen=True):
+    """A write that is on trial, or still to be taken back."""
+
+    write: int
+    who: str
+    values: dict[str, float]  # what was written
+    before: dict[str, float]  # what it reverts to
+    left_s: float | None  # until it reverts by itself; None: it is being taken back
+    problem: str | None = None  # why it could not be taken back yet
+
+
+class RecordsInfo(Struct, frozen=True):
+    """Where the journal is kept, and why it cannot be written."""
+
+    folder: str
+    problem: str | None = None
+
+
 class DriveReaction(Struct, frozen=True):
     """What one drive does by itself: option codes as the drive holds them, `None` where they are unknown."""
 
@@ -186,6 +228,8 @@ class Description(Struct, frozen=True):
     clock: Clock
     stop: StopInfo
     guard: GuardInfo
+    trials: list[TrialInfo] = []
+    records: RecordsInfo | None = None
 
 
 class CpuUse(Struct, frozen=True):
@@ -315,11 +359,37 @@ class ParameterValues(Struct, frozen=True):
 
 
 class Written(Struct, frozen=True):
-    """Result of `parameter.write`: values as the device holds them."""
+    """Result of `parameter.write`: values as the device holds them.
+
+    On trial, `trial_s` is the time until it reverts by itself, and `before` is what it reverts to, which may
+    name more parameters than were asked for: those of the trials that this one replaces.
+    """
 
     write: int
     before: dict[str, float]
     after: dict[str, float]
+    trial_s: float | None = None
+
+
+class Confirmed(Struct, frozen=True):
+    """Result of `parameter.confirm`: what stays written."""
+
+    write: int
+    values: dict[str, float]
+
+
+class Reverted(Struct, frozen=True):
+    """Result of `parameter.revert`: in words, what became of each parameter."""
+
+    write: int
+    outcome: dict[str, str]
+
+
+class Stored(Struct, frozen=True):
+    """Result of `parameter.store` and `parameter.restore`: in words, what the device has done."""
+
+    component: str
+    result: str
 
 
 StopOutcome = Literal["confirmed", "unconfirmed", "unreachable"]
@@ -330,6 +400,27 @@ class Stopped(Struct, frozen=True):
 
     drives: dict[str, StopOutcome]
     held: bool
+
+
+class Reset(Struct, frozen=True):
+    """Result of `robot.reset`: each drive's state in words; `problems` says which were not led there."""
+
+    drives: dict[str, str]
+    problems: dict[str, str]
+    held: bool
+
+
+class Enabled(Struct, frozen=True):
+    """Result of `robot.enable`: each drive's state in words, and which were not led there, and why."""
+
+    drives: dict[str, str]
+    problems: dict[str, str]
+
+
+class JournalEntries(Struct, frozen=True):
+    """Result of `journal.tail`: the newest entries, oldest first."""
+
+    entries: list[dict[str, Any]]
 
 
 class Method(Struct, frozen=True):
@@ -355,5 +446,12 @@ METHODS: Final[dict[str, Method]] = {
     "parameter.list": Method(ParameterParams, ParameterValues),
     "parameter.read": Method(ParameterParams, ParameterValues),
     "parameter.write": Method(ParameterWriteParams, Written),
+    "parameter.confirm": Method(WriteNumberParams, Confirmed),
+    "parameter.revert": Method(WriteNumberParams, Reverted),
+    "parameter.store": Method(ComponentParams, Stored),
+    "parameter.restore": Method(ComponentParams, Stored),
+    "robot.reset": Method(Params, Reset),
+    "robot.enable": Method(EnableParams, Enabled),
+    "journal.tail": Method(TailParams, JournalEntries),
 }
 STREAM_DATA: Final = "stream.data"

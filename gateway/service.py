@@ -1,13 +1,12 @@
 """What the gateway answers: parameters are checked, the method's module is started, its answer given."""
 
 import time
-import uuid
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from pathlib import Path
 from typing import Any
 
 from gateway import messages, wire
+from gateway.boot import boot_id
 from gateway.config import RobotConfig
 from gateway.futures import gather, then
 from gateway.loop import Loop
@@ -30,6 +29,13 @@ MODULE_OF: Mapping[str, str] = {
     "parameter.list": "control",
     "parameter.read": "control",
     "parameter.write": "control",
+    "parameter.confirm": "control",
+    "parameter.revert": "control",
+    "parameter.store": "control",
+    "parameter.restore": "control",
+    "robot.reset": "control",
+    "robot.enable": "control",
+    "journal.tail": "control",
 }
 
 
@@ -74,11 +80,12 @@ class Service:
         # What a client asked for just before it vanished is still done (a stop above all).
         return self.registry.use(name, None if session.closed else session)
 
-    def _hello(self, _session: Session, params: messages.HelloParams) -> messages.Hello:
+    def _hello(self, session: Session, params: messages.HelloParams) -> messages.Hello:
         if params.protocol != wire.PROTOCOL:
             raise wire.refuse(
                 wire.Kind.BAD_PARAMS, f"this gateway speaks protocol {wire.PROTOCOL}, not {params.protocol}"
             )
+        session.who = f"{params.client} ({session.peer})"
         return messages.Hello(wire.PROTOCOL, self._config.robot.name, CLIENT_ROLE, self._boot_id)
 
     def _clock(self) -> messages.Clock:
@@ -102,6 +109,8 @@ class Service:
             clock=self._clock(),
             stop=robot.stop,
             guard=messages.GuardInfo(),
+            trials=robot.trials,
+            records=robot.records,
         )
 
     def _stream_start(self, session: Session, params: messages.StreamStartParams) -> Answer:
@@ -131,11 +140,3 @@ class Service:
                 f"this connection has no stream {params.stream}; it may have ended before",
             )
         return messages.Done()
-
-
-def boot_id() -> str:
-    """What changes whenever the monotonic clock begins anew: the kernel's boot, else this process."""
-    try:
-        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-    except OSError:
-        return str(uuid.uuid4())

@@ -52,6 +52,7 @@ class Session:
         handle: "Callable[[Session, wire.Request], Answer]",
     ) -> None:
         self.peer = peer
+        self.who = peer  # how the journal calls it
         self.outlets: dict[int, Outlet] = {}
         self.closed = False
         self._loop = loop

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, cast
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
 from gateway import messages
 from gateway.futures import then
-from gateway.modules.lease import Leases
+from gateway.modules.lease import RENEWED, Leases
 from gateway.modules.stop import Drive, Stop
 from gateway.modules.tuning import Tuning
+from gateway.records.records import Records
 from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ class Described:
     channels: list[messages.ChannelInfo]
     parameters: list[messages.ParameterInfo]
     stop: messages.StopInfo
+    trials: list[messages.TrialInfo]
+    records: messages.RecordsInfo
 
 
 class ControlModule:
@@ -35,7 +38,7 @@ class ControlModule:
     def __init__(self, context: "Context") -> None:
         self._context = context
         self._component = cast("ComponentModule", context.needs["component"])
-        self._leases = Leases()
+        self._leases = Leases(context.loop, self._lease_changed)
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
             "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
             "control.release": self._release,
@@ -43,6 +46,7 @@ class ControlModule:
             "parameter.read": lambda _session, params: self._tuning.read(params.names),
             "parameter.write": self._write,
             "robot.stop": self._stop_robot,
+            "journal.tail": lambda _session, params: self._tail(params.n),
         }
 
     def start(self) -> None:
@@ -54,12 +58,14 @@ class ControlModule:
         }
         absent = {name: why for name, why in self._component.absent.items() if name in joints}
         self._drives = drives
+        self._records = Records(self._context.config.records)
         self._tuning = Tuning(self._context.config, self._component)
         self._stop = Stop(self._context.loop, drives, absent)
 
     def stop(self) -> None:
         self._stop.close()
         self._tuning.close()
+        self._records.close()
 
     def describe(self) -> "Future[Described]":
         """Waits for a cold start, so that it says what is there."""
@@ -74,7 +80,21 @@ class ControlModule:
             stopped_again=self._stop.again,
             drives={name: reaction(drive) for name, drive in self._drives.items()},
         )
-        return Described(self._component.components(), self._component.channels(), self._tuning.infos(), stop)
+        return Described(
+            components=self._component.components(),
+            channels=self._component.channels(),
+            parameters=self._tuning.infos(),
+            stop=stop,
+            trials=[],
+            records=self._records.info,
+        )
+
+    def _lease_changed(self, session: "Session", what: str) -> None:
+        if what != RENEWED:
+            self._records.journal.append(session.who, what)
+
+    def _tail(self, count: int) -> "Future[messages.JournalEntries]":
+        return then(self._records.journal.tail(count), messages.JournalEntries)
 
     def _release(self, session: "Session", params: messages.ReleaseParams) -> messages.Done:
         self._leases.release(session, params.lease)
@@ -86,10 +106,17 @@ class ControlModule:
         self._leases.require(session)
         return self._tuning.write(params.changes)
 
-    def _stop_robot(self, _session: "Session", params: messages.StopParams) -> "Future[messages.Stopped]":
+    def _stop_robot(self, session: "Session", params: messages.StopParams) -> "Future[messages.Stopped]":
         self._context.keep(True)  # a held stop keeps the bus, clients or not
         self._tuning.interrupt()
-        return self._stop.stop(str(params.reason), lambda name: self._component.when_ready([name]))
+        stopped = self._stop.stop(str(params.reason), lambda name: self._component.when_ready([name]))
+        journal = self._records.journal  # told after the drives were, and nobody waits for it
+        journal.append(session.who, "stop", reason=str(params.reason))
+        return then(stopped, lambda answer: self._journal_stop(session, answer))
+
+    def _journal_stop(self, session: "Session", stopped: messages.Stopped) -> messages.Stopped:
+        self._records.journal.append(session.who, "stop answered", result=stopped.drives)
+        return stopped
 
 
 def reaction(drive: Drive) -> messages.DriveReaction:

@@ -2,9 +2,11 @@
 
 import secrets
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from gateway.loop import Loop, Timer
 from gateway.messages import Lease
 from gateway.wire import Kind, refuse
 
@@ -12,51 +14,68 @@ if TYPE_CHECKING:
     from gateway.session import Session
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Held:
     session: "Session"
     token: str
     expires_ns: int
+    timer: Timer
 
 
 class Leases:
-    """Who may write now. It belongs to the loop's thread."""
+    """Who may write now. It belongs to the loop's thread.
 
-    def __init__(self) -> None:
+    `changed(session, what)` is told what has happened to whose lease: taken, renewed, given back, or why it
+    ended. After all but the first two nobody may write until somebody takes it anew.
+    """
+
+    def __init__(self, loop: Loop, changed: "Callable[[Session, str], None]") -> None:
+        self._loop = loop
+        self._changed = changed
         self._lease: _Held | None = None
 
     def acquire(self, session: "Session", ttl_s: float) -> Lease:
         """Take or renew the lease; raises `RpcError` (lease_held) where another connection has it."""
-        held, now_ns = self._current(), time.monotonic_ns()
-        if held is None:
-            session.on_close(lambda: self._drop(session))
-        elif held.session is not session:
-            left_s = (held.expires_ns - now_ns) / 1e9
+        held = self._lease
+        if held is not None and held.session is not session:
+            left_s = (held.expires_ns - time.monotonic_ns()) / 1e9
             raise refuse(
                 Kind.LEASE_HELD,
-                f"{held.session.peer} has the lease for up to {left_s:.1f} s more; ask again then",
+                f"{held.session.who} has the lease for up to {left_s:.1f} s more; ask again then",
             )
-        token = secrets.token_hex(8) if held is None else held.token
-        self._lease = _Held(session, token, now_ns + round(ttl_s * 1e9))
-        return Lease(token, ttl_s)
+        if session.closed:
+            raise refuse(Kind.NO_LEASE, "the connection has ended")
+        expires_ns = time.monotonic_ns() + round(ttl_s * 1e9)
+        timer = self._loop.call_later(ttl_s, lambda: self._end(session, "lease ran out"))
+        if held is None:
+            session.on_close(lambda: self._end(session, "lease lost with the connection"))
+            held = self._lease = _Held(session, secrets.token_hex(8), expires_ns, timer)
+            self._changed(session, TAKEN)
+        else:
+            held.timer.cancel()
+            held.expires_ns, held.timer = expires_ns, timer
+            self._changed(session, RENEWED)
+        return Lease(held.token, ttl_s)
 
     def release(self, session: "Session", token: str | None) -> None:
         """Give it back; raises `RpcError` (no_lease) where there is nothing to give."""
         self.require(session)
         if token is not None and self._lease is not None and token != self._lease.token:
             raise refuse(Kind.NO_LEASE, f"the lease of this connection is not {token!r}")
-        self._lease = None
+        self._end(session, "lease given back")
 
     def require(self, session: "Session") -> None:
         """Raise `RpcError` (no_lease) where the connection may not write."""
-        held = self._current()
-        if held is None or held.session is not session:
+        held = self._lease
+        if held is None or held.session is not session or time.monotonic_ns() >= held.expires_ns:
             raise refuse(Kind.NO_LEASE, "this connection holds no lease; call control.acquire first")
 
-    def _current(self) -> _Held | None:
+    def _end(self, session: "Session", why: str) -> None:
         held = self._lease
-        return held if held is not None and time.monotonic_ns() < held.expires_ns else None
-
-    def _drop(self, session: "Session") -> None:
-        if self._lease is not None and self._lease.session is session:
+        if held is not None and held.session is session:
+            held.timer.cancel()
             self._lease = None
+            self._changed(session, why)
+
+
+TAKEN, RENEWED = "lease taken", "lease renewed"

@@ -59,11 +59,12 @@ def read_verified(journal: Path) -> list[Entry]:
 
 
 class Journal:
-    """One robot's journal. Any thread may append."""
+    """One robot's journal; any thread may append. Where it is `unusable`, every entry fails and says so."""
 
-    def __init__(self, path: Path, boot_id: str) -> None:
+    def __init__(self, path: Path, boot_id: str, unusable: str | None = None) -> None:
         self.path = path
-        self.problem: str | None = None  # why the last entry could not be written
+        self.problem = unusable  # why the last entry could not be written
+        self._unusable = unusable
         self._boot_id = boot_id
         self._head = Head()
         self._file: BinaryIO | None = None
@@ -99,6 +100,9 @@ class Journal:
     # In the journal's thread.
 
     def _append(self, fields: Entry) -> None:
+        if self._unusable is not None:
+            log.error("the journal cannot be written: %s; lost: %s", self._unusable, fields)
+            raise OSError(None, self._unusable)
         try:
             file = self._file or self._open()
             data, head = line(self._head, fields)
@@ -155,6 +159,8 @@ class Journal:
         return f"{why}; the journal begins anew, the old one is {kept.name}"
 
     def _tail(self, count: int) -> list[Entry]:
+        if self._unusable is not None:
+            raise OSError(None, self._unusable)
         file = self._file or self._open()
         return [msgspec.json.decode(one) for one in _last_lines(file, count)]
 

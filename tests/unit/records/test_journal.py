@@ -1,6 +1,5 @@
 """The journal: durable, hash-chained, and it finds one altered byte."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,7 +102,7 @@ def test_an_entry_that_a_crash_left_half_written_is_removed_and_said(path: Path,
     fill(path, 1)
     torn = path.read_bytes()[:-cut]
     path.write_bytes(torn)
-    os.replace(head_file(path), head_file(path).with_suffix(".gone"))  # the head is written after the line
+    head_file(path).replace(path.with_suffix(".gone"))  # the head is written after the line
     fill(path, 1)
     entries = read_verified(path)
     assert [entry["what"] for entry in entries[3:]] == ["journal damaged", "write"]

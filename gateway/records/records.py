@@ -1,0 +1,40 @@
+"""One robot's records, open: its folder, its lock and its journal."""
+
+import logging
+from pathlib import Path
+
+from gateway.boot import boot_id
+from gateway.messages import RecordsInfo
+from gateway.records.folder import RecordsFolder
+from gateway.records.journal import Journal
+
+log = logging.getLogger(__name__)
+
+
+class Records:
+    """What is kept beyond the process.
+
+    Where the folder cannot be used, every entry fails and says why: what must be explained is then refused,
+    and what must happen all the same, a stop above all, happens.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.folder = RecordsFolder(path)
+        unusable = None
+        try:
+            self.folder.open()
+        except OSError as error:
+            unusable = error.strerror or str(error)
+            log.error("%s", unusable)
+        self.unusable = unusable
+        self.journal = Journal(self.folder.journal, boot_id(), unusable)
+
+    @property
+    def info(self) -> RecordsInfo:
+        """As `robot.describe` shows it."""
+        return RecordsInfo(str(self.folder.path), self.journal.problem)
+
+    def close(self) -> None:
+        """Write what was appended, and let others have the folder."""
+        self.journal.close()
+        self.folder.close()
