@@ -44,15 +44,15 @@ ErrorListener = Callable[[], None]
 class Disturbance:
     """What a fault does to the frames of a bus; this one lets them all pass."""
 
-    def leaves(self, frame: Frame, sender: object) -> bool:  # noqa: ARG002 - the shape of a disturbance
+    def leaves(self, frame: Frame, sender: object, /) -> bool:  # noqa: ARG002 - the shape of a disturbance
         """Whether a frame that is sent queues for the bus; `CanBus.queue` puts one there past everybody."""
         return True
 
-    def survives(self, frame: Frame, sender: object) -> bool:  # noqa: ARG002 - the shape of a disturbance
+    def survives(self, frame: Frame, sender: object, /) -> bool:  # noqa: ARG002 - the shape of a disturbance
         """Whether a frame gets over the wire; an error frame ends it otherwise, and it is sent again."""
         return True
 
-    def arrives(self, frame: Frame, sender: object, receiver: object) -> bool:  # noqa: ARG002 - its shape
+    def arrives(self, frame: Frame, sender: object, receiver: object, /) -> bool:  # noqa: ARG002 - its shape
         """Whether one receiver takes a frame that came over the wire."""
         return True
 
