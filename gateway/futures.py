@@ -93,6 +93,13 @@ def _settle(result: "Future[R]", following: "R | Future[R]") -> None:
     following.add_done_callback(pass_on)
 
 
+def back(loop: Loop, future: "Future[T]") -> "Future[T]":
+    """The same outcome, but given in the loop's thread, and so is whatever follows from it."""
+    result: Future[T] = Future()
+    future.add_done_callback(lambda done: loop.call(lambda: _settle(result, done)))
+    return result
+
+
 def within(loop: Loop, future: "Future[T]", seconds: float, otherwise: T) -> "Future[T]":
     """The result of `future`, or `otherwise` when that takes longer. For the loop's thread."""
     result: Future[T] = Future()

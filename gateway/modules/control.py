@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, cast
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
 from gateway import messages
 from gateway.futures import then
-from gateway.modules.lease import RENEWED, Leases
+from gateway.modules.lease import RENEWED, TAKEN, Leases
 from gateway.modules.stop import Drive, Stop
 from gateway.modules.tuning import Tuning
 from gateway.records.records import Records
-from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
     from gateway.modules.component import ComponentModule
@@ -39,12 +38,15 @@ class ControlModule:
         self._context = context
         self._component = cast("ComponentModule", context.needs["component"])
         self._leases = Leases(context.loop, self._lease_changed)
+        self._awake: set[str] = set()  # why the bus is kept, clients or not
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
             "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
             "control.release": self._release,
             "parameter.list": lambda _session, params: self._tuning.listed(params.names),
             "parameter.read": lambda _session, params: self._tuning.read(params.names),
             "parameter.write": self._write,
+            "parameter.confirm": self._confirm,
+            "parameter.revert": self._revert,
             "robot.stop": self._stop_robot,
             "journal.tail": lambda _session, params: self._tail(params.n),
         }
@@ -59,7 +61,10 @@ class ControlModule:
         absent = {name: why for name, why in self._component.absent.items() if name in joints}
         self._drives = drives
         self._records = Records(self._context.config.records)
-        self._tuning = Tuning(self._context.config, self._component)
+        config, loop = self._context.config, self._context.loop
+        self._tuning = Tuning(config, self._component, loop, self._records, self._trials_changed)
+        left = self._tuning.load()
+        loop.post(lambda: self._tuning.resume(left))
         self._stop = Stop(self._context.loop, drives, absent)
 
     def stop(self) -> None:
@@ -85,13 +90,28 @@ class ControlModule:
             channels=self._component.channels(),
             parameters=self._tuning.infos(),
             stop=stop,
-            trials=[],
+            trials=self._tuning.trials.infos(),
             records=self._records.info,
         )
 
+    def keep_awake(self, why: str, on: bool) -> None:
+        """Keep the bus, clients or not, as long as there is a reason. In the loop's thread."""
+        (self._awake.add if on else self._awake.discard)(why)
+        self._context.keep(bool(self._awake))
+
+    def revert_trials(self, why: str) -> None:
+        """Take back everything that is on trial. In the loop's thread."""
+        self._tuning.trials.revert_all(why)
+
+    def _trials_changed(self) -> None:
+        self.keep_awake("trials", self._tuning.trials.pending)
+
     def _lease_changed(self, session: "Session", what: str) -> None:
-        if what != RENEWED:
-            self._records.journal.append(session.who, what)
+        if what == RENEWED:
+            return
+        self._records.journal.append(session.who, what)
+        if what != TAKEN:
+            self._tuning.trials.revert_of(session, what)
 
     def _tail(self, count: int) -> "Future[messages.JournalEntries]":
         return then(self._records.journal.tail(count), messages.JournalEntries)
@@ -100,14 +120,29 @@ class ControlModule:
         self._leases.release(session, params.lease)
         return messages.Done()
 
-    def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Answer":
-        if params.trial_s is not None:
-            raise refuse(Kind.BAD_PARAMS, "trials are not available yet; write without trial_s")
+    def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Future[messages.Written]":
         self._leases.require(session)
-        return self._tuning.write(params.changes)
+        written = self._tuning.write(params.changes, session, params.trial_s)
+        return then(written, lambda answer: self._still_held(session, answer))
+
+    def _still_held(self, session: "Session", written: messages.Written) -> messages.Written:
+        """A lease that ended while its trial was being written did not take it back."""
+        if written.trial_s is not None and not self._leases.held_by(session):
+            self._tuning.trials.revert_of(session, "the lease ended while it was written")
+        return written
+
+    def _confirm(
+        self, session: "Session", params: messages.WriteNumberParams
+    ) -> "Future[messages.Confirmed]":
+        self._leases.require(session)
+        return self._tuning.trials.confirm(params.write)
+
+    def _revert(self, session: "Session", params: messages.WriteNumberParams) -> "Future[messages.Reverted]":
+        self._leases.require(session)
+        return self._tuning.trials.revert(params.write)
 
     def _stop_robot(self, session: "Session", params: messages.StopParams) -> "Future[messages.Stopped]":
-        self._context.keep(True)  # a held stop keeps the bus, clients or not
+        self.keep_awake("stop", True)
         self._tuning.interrupt()
         stopped = self._stop.stop(str(params.reason), lambda name: self._component.when_ready([name]))
         journal = self._records.journal  # told after the drives were, and nobody waits for it

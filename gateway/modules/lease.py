@@ -66,9 +66,13 @@ class Leases:
 
     def require(self, session: "Session") -> None:
         """Raise `RpcError` (no_lease) where the connection may not write."""
-        held = self._lease
-        if held is None or held.session is not session or time.monotonic_ns() >= held.expires_ns:
+        if not self.held_by(session):
             raise refuse(Kind.NO_LEASE, "this connection holds no lease; call control.acquire first")
+
+    def held_by(self, session: "Session") -> bool:
+        """Whether the connection may write now."""
+        held = self._lease
+        return held is not None and held.session is session and time.monotonic_ns() < held.expires_ns
 
     def _end(self, session: "Session", why: str) -> None:
         held = self._lease

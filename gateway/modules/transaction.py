@@ -1,11 +1,12 @@
 """One write of several parameters: all or nothing, each verified by reading it back.
 
-Current values are read first; everything is checked before the first download; whatever goes wrong afterwards
-takes back all that may have changed, in reverse order, verified. Runs in the control module's own thread.
+Current values are read first; everything is checked before the first download; what is to be taken back is on
+disk, and in the journal, before it; whatever goes wrong afterwards takes back all that may have changed, in
+reverse order, verified. Runs in the control module's own thread.
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol
@@ -32,6 +33,25 @@ class Change:
     parameter: Parameter
     node: Node
     data: bytes
+
+
+class Ledger(Protocol):
+    """Where a write is kept beyond the process. Each call returns when that is durable."""
+
+    def begin(self, before: Mapping[str, bytes]) -> None:
+        """Before the first download; raises `RpcError` where it cannot be kept, and nothing is written."""
+
+    def done(self) -> None:
+        """Everything is written and verified."""
+
+    def refused(self, error: RpcError) -> None:
+        """Nothing was written, and nothing begun."""
+
+    def taken_back(self, error: RpcError) -> None:
+        """Nothing is written any more."""
+
+    def left(self, error: RpcError) -> None:
+        """Some of it could not be taken back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +92,16 @@ class Transaction:
     """One write. `check` is given each change with its current value and raises `RpcError` to refuse."""
 
     def __init__(
-        self, changes: list[Change], check: Callable[[Change, float], None], stopped: threading.Event
+        self,
+        changes: list[Change],
+        check: Callable[[Change, float], None],
+        stopped: threading.Event,
+        ledger: Ledger,
     ) -> None:
         self._changes = changes
         self._check = check
         self._stopped = stopped
+        self._ledger = ledger
         self._before: dict[str, bytes] = {}
         self._touched: list[Change] = []
 
@@ -88,22 +113,37 @@ class Transaction:
                 (rollback_failed), and `outcome` says what each parameter holds.
 
         """
-        for change in self._changes:
-            self._before[change.parameter.name] = read(change.parameter, change.node)
-        for change in self._changes:
-            self._check(change, change.parameter.decode(self._before[change.parameter.name]))
+        try:
+            self._prepare()
+        except RpcError as error:
+            self._ledger.refused(error)
+            raise
         try:
             for change in self._changes:
                 self._apply(change)
+            self._ledger.done()
         except RpcError as error:
             raise self._roll_back(error) from error
         return Outcome(
-            {
-                one.parameter.name: one.parameter.decode(self._before[one.parameter.name])
-                for one in self._changes
-            },
+            {one.parameter.name: self._value_before(one) for one in self._changes},
             {one.parameter.name: one.parameter.decode(one.data) for one in self._changes},
         )
+
+    def _prepare(self) -> None:
+        """Read, check, and put into a safe order.
+
+        What becomes smaller comes first, so that a torque or a speed is limited before a gain grows; taking
+        back goes the other way round.
+        """
+        for change in self._changes:
+            self._before[change.parameter.name] = read(change.parameter, change.node)
+        for change in self._changes:
+            self._check(change, self._value_before(change))
+        self._changes.sort(key=lambda one: abs(one.parameter.decode(one.data)) > abs(self._value_before(one)))
+        self._ledger.begin(self._before)
+
+    def _value_before(self, change: Change) -> float:
+        return change.parameter.decode(self._before[change.parameter.name])
 
     def _apply(self, change: Change) -> None:
         if self._stopped.is_set():
@@ -124,7 +164,7 @@ class Transaction:
         elif taken_back:
             text += "; everything was taken back"
         data = cause.data
-        return refuse(
+        answer = refuse(
             kind,
             text,
             component=data.component,
@@ -133,6 +173,11 @@ class Transaction:
             limit=data.limit,
             outcome=outcome,
         )
+        if failed:
+            self._ledger.left(answer)
+        else:
+            self._ledger.taken_back(answer)
+        return answer
 
     def _restore(self, change: Change) -> str:
         """Bring one parameter back, and say what became of it."""

@@ -1,29 +1,46 @@
 """Parameters as clients see them: listed, read from the device, and written all or nothing.
 
-Writes run one after another in a thread of their own. A stop does not wait for them: it interrupts them.
+Writes run one after another in a thread of their own, and so does what takes them back. A stop does not wait
+for them: it interrupts them.
 """
 
 import itertools
+import logging
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from drivers.bus.settings import DeviceSettings
 from drivers.bus.values import unsigned
 from drivers.errors import DriverError
 from drivers.joint.cia402 import STATE_WORDS, DriveState, drive_state
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.quick_stop import STATUSWORD
+from drivers.joint.settings import JointSettings
 from drivers.samples import State
 from gateway.config import RobotConfig
-from gateway.futures import failed, gather, then
+from gateway.futures import back, done, failed, gather, then
+from gateway.loop import Loop
 from gateway.messages import ParameterInfo, ParameterValue, ParameterValues, Written
 from gateway.modules.component import ComponentModule
+from gateway.modules.ledger import Keeping, WriteLedger
 from gateway.modules.parameters import Parameter, resolve
+from gateway.modules.taking_back import OutOfReach
 from gateway.modules.transaction import ANSWER_S, Change, Node, Outcome, Transaction, device_error
+from gateway.modules.trials import Trials
+from gateway.records.records import Records
+from gateway.records.undo import Undo, UndoChange, UndoFile
 from gateway.sources import check_globs, matches
 from gateway.wire import Kind, RpcError, refuse
+
+if TYPE_CHECKING:
+    from gateway.session import Session
+
+log = logging.getLogger(__name__)
+
+Changed = Callable[[], None]
 
 # States in which a drive may move; a parameter that is not live needs another one.
 ENERGISED = frozenset(
@@ -34,19 +51,43 @@ ENERGISED = frozenset(
 class Tuning:
     """Every parameter of the robot. It belongs to the loop's thread, but for `_check`."""
 
-    def __init__(self, config: RobotConfig, component: ComponentModule) -> None:
+    def __init__(
+        self, config: RobotConfig, component: ComponentModule, loop: Loop, records: Records, changed: Changed
+    ) -> None:
         self._component = component
+        self._loop = loop
         self._joints = config.joint
+        self._devices: dict[str, JointSettings | DeviceSettings] = {**config.joint, **config.device}
         self._parameters = resolve(config.parameter, component.robot.descriptions, component.absent)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._numbers = itertools.count(time.time_ns() // 1_000_000)  # unique also after a restart
         self._interrupted = threading.Event()
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="write")
+        undo = UndoFile(records.folder.undo)
+        self._keeping = Keeping(undo, records.journal, self._place, records.unusable)
+        self.trials = Trials(loop, self._writer.submit, self._keeping, self._reach, changed)
 
     def close(self) -> None:
         """Take back what is being written, and end the writer's thread."""
         self.interrupt()
+        self.trials.close()
         self._writer.shutdown(wait=True)
+
+    def load(self) -> list[Undo]:
+        """What the last gateway left to be taken back. Before anything is written."""
+        if self._keeping.unusable is not None:
+            return []
+        undos, problem = self._keeping.undo.load()
+        if problem is not None:
+            log.critical("%s", problem)
+            self._keeping.journal.append("gateway", "undo file damaged", result=problem)
+        return undos
+
+    def resume(self, undos: list[Undo]) -> None:
+        """Take that back, the newest first, as soon as its devices are there."""
+        ready = self._component.when_ready({one.component for undo in undos for one in undo.changes})
+        for undo in reversed(undos):
+            self.trials.take_up(undo, "the gateway ended before this write did", ready)
 
     def interrupt(self) -> None:
         """End every write that was asked for until now; what it had changed is taken back."""
@@ -67,8 +108,10 @@ class Tuning:
         uploads = then(ready, lambda _none: gather({one.name: self._upload(one) for one in chosen}))
         return then(uploads, self._values)
 
-    def write(self, values: Mapping[str, float]) -> "Future[Written]":
-        """All of them or none.
+    def write(
+        self, values: Mapping[str, float], session: "Session", trial_s: float | None
+    ) -> "Future[Written]":
+        """All of them or none; on trial for `trial_s` where that is given.
 
         Raises:
             RpcError: at once, or as the future's error: why not, and what became of each.
@@ -77,7 +120,7 @@ class Tuning:
         changes = [self._change(name, value) for name, value in values.items()]
         ready = self._component.when_ready({one.parameter.component for one in changes})
         interrupted = self._interrupted
-        return then(ready, lambda _none: self._begin(changes, interrupted))
+        return then(ready, lambda _none: self._begin(changes, interrupted, session, trial_s))
 
     # Reading
 
@@ -142,16 +185,36 @@ class Tuning:
             raise refuse(Kind.UNKNOWN_NAME, f"there is no parameter {name!r}; parameter.list has them all")
         return Change(parameter, self._node(parameter), parameter.encode(value))
 
-    def _begin(self, changes: list[Change], interrupted: threading.Event) -> "Future[Written]":
-        transaction = Transaction(changes, self._check, interrupted)
+    def _begin(
+        self,
+        changes: list[Change],
+        interrupted: threading.Event,
+        session: "Session",
+        trial_s: float | None,
+    ) -> "Future[Written]":
+        ledger = WriteLedger(self._keeping, next(self._numbers), session.who, changes, trial_s)
+        transaction = Transaction(changes, self._check, interrupted, ledger)
         for change in changes:
             self._known.pop(change.parameter.name, None)
-        return then(self._writer.submit(transaction.run), self._written)
+        ended = back(self._loop, self._writer.submit(transaction.run))
+        ended.add_done_callback(lambda _ended: self._follow(ledger, session, trial_s))
+        return then(ended, lambda outcome: self._written(outcome, ledger))
 
-    def _written(self, done: Outcome) -> Written:
+    def _follow(self, ledger: WriteLedger, session: "Session", trial_s: float | None) -> None:
+        """What stays of a write: its trial, or what could not be rolled back."""
+        if ledger.kept is None:
+            return
+        if ledger.kept.trial and trial_s is not None:
+            self.trials.begin(ledger.kept, trial_s, session, ledger.replaced)
+        else:
+            self.trials.take_up(ledger.kept, "its roll-back failed", done(None))
+
+    def _written(self, outcome: Outcome, ledger: WriteLedger) -> Written:
         now_ns = time.monotonic_ns()
-        self._known.update({name: (now_ns, value) for name, value in done.after.items()})
-        return Written(next(self._numbers), done.before, done.after)
+        self._known.update({name: (now_ns, value) for name, value in outcome.after.items()})
+        if ledger.kept is None:
+            return Written(ledger.number, outcome.before, outcome.after)
+        return Written(ledger.number, ledger.kept.before(), ledger.kept.values(), ledger.trial_s)
 
     def _check(self, change: Change, current: float) -> None:
         """In the writer's thread: the step, and the states of the drives that the parameter may move."""
@@ -186,6 +249,27 @@ class Tuning:
         except (DriverError, TimeoutError) as error:
             return None, str(error)
         return drive_state(statusword), f"its statusword is 0x{statusword:04X}"
+
+    def _place(self, component: str) -> tuple[str, int]:
+        device = self._devices[component]
+        return device.bus, device.node_id
+
+    def _reach(self, change: UndoChange) -> Node:
+        """The device that a change was written to, as long as it is the same one."""
+        device = self._devices.get(change.component)
+        if device is None or (device.bus, device.node_id) != (change.bus, change.node_id):
+            where = f"node {change.node_id} on bus {change.bus!r}"
+            raise OutOfReach(
+                f"the robot's file no longer says that {where} is {change.component}", final=True
+            )
+        component: Any = self._component.robot.components.get(change.component)
+        if component is None:
+            raise OutOfReach(self._component.absent.get(change.component, "it is not there"), final=False)
+        quality = self._component.quality(change.component, time.monotonic_ns())
+        if quality["state"] == State.LOST:
+            raise OutOfReach(str(quality["problem"] or "it is silent"), final=False)
+        node: Node = component.node
+        return node
 
     def _drives_of(self, parameter: Parameter) -> Iterable[str]:
         """A joint's parameter concerns its own drive; another device's may move them all."""

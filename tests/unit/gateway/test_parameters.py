@@ -163,13 +163,6 @@ def test_a_step_of_exactly_the_limit_is_allowed(writer: Client) -> None:
     }
 
 
-def test_trials_are_said_to_be_missing(writer: Client, bench: Bench) -> None:
-    error = writer.refused("parameter.write", changes={"gait.step_length": 0.42}, trial_s=10)
-    assert error.kind == "bad_params"
-    assert "trials are not available yet" in str(error)
-    assert bench.gait.node.written() == []
-
-
 def test_what_is_not_live_may_be_written_while_no_drive_can_move(writer: Client, bench: Bench) -> None:
     bench.left.set_state(DISABLED)
     assert writer.refused("parameter.write", changes={"gait.toe_height": 0.09}).kind == "wrong_state"
@@ -218,7 +211,7 @@ def test_named_states_count_instead(bench: Bench, tmp_path: Path) -> None:
 
 # All or nothing
 
-CHANGES = {"gait.step_length": 0.42, "gait.cycle_time": 1.1, "left_knee.max_torque": 50}
+CHANGES = {"gait.step_length": 0.38, "gait.cycle_time": 1.1, "left_knee.max_torque": 50}
 
 
 @pytest.fixture
@@ -245,12 +238,18 @@ def test_write_is_reverted_when_the_third_object_aborts(standing: Client, bench:
     }
     # In reverse order, and verified.
     assert bench.gait.node.written() == [
-        (STEP, u16(420)),
+        (STEP, u16(380)),
         (CYCLE, u16(1100)),
         (CYCLE, u16(1200)),
         (STEP, u16(400)),
     ]
     assert bench.gait.node.log[-1] == ("upload", STEP, None)
+
+
+def test_what_becomes_smaller_is_written_first(standing: Client, bench: Bench) -> None:
+    """A speed or a torque is limited before anything grows."""
+    standing.call("parameter.write", changes={"gait.step_length": 0.42, "gait.cycle_time": 1.1})
+    assert bench.gait.node.written() == [(CYCLE, u16(1100)), (STEP, u16(420))]
 
 
 def test_an_abort_of_the_only_change_is_told_as_itself(standing: Client, bench: Bench) -> None:
