@@ -1,35 +1,40 @@
-"""Motor, gear and joint as one rotating mass with friction, stops and a load, integrated in fixed steps."""
+"""Rotor, gear and joint as one turning mass with friction, end stops and a load, in fixed steps."""
 
 import math
 from dataclasses import dataclass
 
 STEP_S = 0.001
 
-_STICTION_VELOCITY = 0.01  # rad/s, below which friction grows linearly instead of jumping
-
 
 @dataclass(frozen=True, slots=True)
 class JointConstants:
     """What the joint is made of, all seen at the joint. Modelled, in the range of published exoskeletons."""
 
-    inertia: float = 0.8  # kg·m², rotor through the gear and the limb it carries
+    inertia: float = 0.4  # kg·m², of the limb; the rotor's comes to it through the gear
     viscous_friction: float = 8.0  # N·m·s/rad
-    coulomb_friction: float = 3.0  # N·m, of a drive that is energised
+    coulomb_friction: float = 3.0  # N·m
     holding_friction: float = 12.0  # N·m, of an unpowered gear that nothing moves
+    gear_efficiency: float = 0.9  # the rest of the motor's torque is friction in the gear
     low_stop: float = math.radians(-60.0)
     high_stop: float = math.radians(130.0)
+    stop_stiffness: float = 50_000.0  # N·m/rad
+    stop_damping: float = 200.0  # N·m·s/rad: little comes back from a stop
+    limit_switch: float = math.radians(2.0)  # how far before its stop a limit switch closes
 
 
 class Joint:
-    """The true joint: position (rad), velocity (rad/s), the motor's torque and the wearer's load (N·m)."""
+    """The true joint: position (rad), velocity (rad/s), and the wearer's load (N·m, against the motor).
+
+    `friction_factor` multiplies every friction, as worn or dry bearings do; it may be set at any time.
+    """
 
     def __init__(self, constants: JointConstants, position: float = 0.0) -> None:
         self.constants = constants
         self.position = position
         self.velocity = 0.0
-        self.torque = 0.0
         self.load = 0.0
-        self.friction_factor = 1.0  # worn or dry bearings: every friction times this, at any time
+        self.rotor_inertia = 0.0
+        self.friction_factor = 1.0
         self.slipped = 0.0
 
     @property
@@ -41,25 +46,47 @@ class Joint:
         """The gear jumps teeth: the motor is ahead of the joint by so much more (rad at the joint)."""
         self.slipped += radians
 
-    def step(self, torque: float, max_velocity: float) -> None:
-        """Move on by `STEP_S` under `torque` (N·m at the joint); a load counts against the motor."""
-        constants = self.constants
-        self.torque = torque
-        push = torque - self.load
-        holding = constants.holding_friction * self.friction_factor
-        if torque == 0.0 and self.velocity == 0.0 and abs(push) <= holding:
-            return
-        velocity = self.velocity
-        slip = velocity / (abs(velocity) + _STICTION_VELOCITY)
-        friction = constants.viscous_friction * velocity + constants.coulomb_friction * slip
-        velocity += (push - friction * self.friction_factor) / constants.inertia * STEP_S
-        velocity = min(max(velocity, -max_velocity), max_velocity)
-        if torque == 0.0 and abs(velocity) < _STICTION_VELOCITY and abs(push) <= holding:
-            velocity = 0.0
-        self._move(velocity)
+    @property
+    def at_low_switch(self) -> bool:
+        return self.position <= self.constants.low_stop + self.constants.limit_switch
 
-    def _move(self, velocity: float) -> None:
-        position = self.position + velocity * STEP_S
-        limited = min(max(position, self.constants.low_stop), self.constants.high_stop)
-        self.position = limited
-        self.velocity = velocity if limited == position else 0.0
+    @property
+    def at_high_switch(self) -> bool:
+        return self.position >= self.constants.high_stop - self.constants.limit_switch
+
+    def step(self, torque: float) -> None:
+        """Move on by `STEP_S` under the motor's `torque` (N·m at the joint)."""
+        constants = self.constants
+        self._turn(torque, constants.coulomb_friction + (1.0 - constants.gear_efficiency) * abs(torque))
+
+    def coast(self) -> None:
+        """Move on by `STEP_S` without power: what stands still is held by the gear."""
+        constants = self.constants
+        self._turn(0.0, constants.coulomb_friction if self.velocity else constants.holding_friction)
+
+    def _turn(self, torque: float, friction: float) -> None:
+        """Friction is taken implicitly: it stops a motion, it never turns one round, whatever the step."""
+        constants = self.constants
+        push = torque - self.load
+        if not constants.low_stop <= self.position <= constants.high_stop:
+            push += self._stop_torque()
+        factor = self.friction_factor
+        share = STEP_S / (constants.inertia + self.rotor_inertia)
+        velocity = (self.velocity + push * share) / (1.0 + constants.viscous_friction * factor * share)
+        drag = friction * factor * share
+        if velocity > drag:
+            velocity -= drag
+        elif velocity < -drag:
+            velocity += drag
+        else:
+            velocity = 0.0
+        self.velocity = velocity
+        self.position += velocity * STEP_S
+
+    def _stop_torque(self) -> float:
+        """A stop pushes back and never pulls."""
+        constants = self.constants
+        damping = constants.stop_damping * self.velocity
+        if self.position > constants.high_stop:
+            return min(constants.stop_stiffness * (constants.high_stop - self.position) - damping, 0.0)
+        return max(constants.stop_stiffness * (constants.low_stop - self.position) - damping, 0.0)

@@ -1,4 +1,4 @@
-"""Reference motion inside a drive: what position and velocity the controller asks of the motor (rad, s)."""
+"""Reference motion inside a drive: the position, velocity and torque that it demands (rad, s, N·m)."""
 
 import math
 from dataclasses import dataclass
@@ -7,10 +7,11 @@ from typing import Protocol
 
 @dataclass(slots=True)
 class Reference:
-    """Demanded position (rad) and velocity (rad/s)."""
+    """What is demanded now; `torque` comes on top of what the control makes of the others."""
 
     position: float = 0.0
     velocity: float = 0.0
+    torque: float = 0.0
 
 
 class Motion(Protocol):
@@ -32,8 +33,77 @@ class Hold:
         reference.velocity = 0.0
 
 
-class Track:
-    """Cyclic synchronous position: reach each target in a straight line within one period (CiA 402-2 §14)."""
+class Profile:
+    """Profile position: a trapezoid of velocity to one target (CiA 402-2 §10).
+
+    With `through` it passes the target at speed, because the next set-point is waiting.
+    """
+
+    def __init__(self, target: float, velocity: float, acceleration: float, deceleration: float) -> None:
+        self.target = target
+        self.through = False
+        self.done = False
+        self._velocity = velocity
+        self._acceleration = acceleration
+        self._deceleration = deceleration
+
+    def step(self, reference: Reference, dt: float) -> None:
+        distance = self.target - reference.position
+        speed = self._velocity
+        if not self.through:
+            speed = min(speed, math.sqrt(2.0 * self._deceleration * abs(distance)))
+        wanted = math.copysign(speed, distance)
+        change = wanted - reference.velocity
+        rate = self._acceleration if abs(wanted) > abs(reference.velocity) else 2.0 * self._deceleration
+        reference.velocity += math.copysign(min(abs(change), rate * dt), change)
+        step = reference.velocity * dt
+        if abs(distance) <= abs(step) or (distance == 0.0 and abs(reference.velocity) <= rate * dt):
+            self._arrive(reference, step)
+        else:
+            reference.position += step
+
+    def _arrive(self, reference: Reference, step: float) -> None:
+        self.done = True
+        if self.through:
+            reference.position += step
+        else:
+            reference.position, reference.velocity = self.target, 0.0
+
+
+class VelocityRamp:
+    """Change the velocity to `target` and keep it; at 0 this is how a drive slows down."""
+
+    def __init__(self, target: float, acceleration: float, deceleration: float) -> None:
+        self.target = target
+        self.acceleration = acceleration
+        self.deceleration = deceleration
+        self.done = False
+
+    def step(self, reference: Reference, dt: float) -> None:
+        velocity = reference.velocity
+        change = self.target - velocity
+        most = (self.acceleration if change * velocity > 0.0 or not velocity else self.deceleration) * dt
+        self.done = abs(change) <= most
+        reference.velocity = self.target if self.done else velocity + math.copysign(most, change)
+        reference.position += reference.velocity * dt
+
+
+class TorqueRamp:
+    """Change the torque to `target` by `slope` (N·m/s) and keep it."""
+
+    def __init__(self, target: float, slope: float) -> None:
+        self.target = target
+        self.slope = slope
+        self.done = False
+
+    def step(self, reference: Reference, dt: float) -> None:
+        change, most = self.target - reference.torque, self.slope * dt
+        self.done = abs(change) <= most
+        reference.torque = self.target if self.done else reference.torque + math.copysign(most, change)
+
+
+class _Track:
+    """Cyclic synchronous: reach each target in a straight line within one period (CiA 402-2 §14–16)."""
 
     def __init__(self, target: float, period_s: float) -> None:
         self._target = target
@@ -43,51 +113,34 @@ class Track:
     def done(self) -> bool:
         return self._left_s <= 0.0
 
+    def _share(self, dt: float) -> float:
+        """How much of the way that is left belongs to this step."""
+        share = dt / self._left_s if self._left_s > 1.5 * dt else 1.0
+        self._left_s = self._left_s - dt if share < 1.0 else 0.0
+        return share
+
+
+class TrackPosition(_Track):
+    """Cyclic synchronous position."""
+
     def step(self, reference: Reference, dt: float) -> None:
-        if self._left_s <= dt / 2:
-            self._left_s = 0.0
-            reference.position, reference.velocity = self._target, 0.0
-            return
-        reference.velocity = (self._target - reference.position) / self._left_s
+        way = 0.0 if self.done else (self._target - reference.position) * self._share(dt)
+        reference.position += way
+        reference.velocity = way / dt
+
+
+class TrackVelocity(_Track):
+    """Cyclic synchronous velocity."""
+
+    def step(self, reference: Reference, dt: float) -> None:
+        if not self.done:
+            reference.velocity += (self._target - reference.velocity) * self._share(dt)
         reference.position += reference.velocity * dt
-        self._left_s -= dt
 
 
-class Profile:
-    """Profile position: a trapezoid of velocity to one target (CiA 402-2 §10)."""
-
-    def __init__(self, target: float, velocity: float, acceleration: float, deceleration: float) -> None:
-        self._target = target
-        self._velocity = velocity
-        self._acceleration = acceleration
-        self._deceleration = deceleration
-        self.done = False
+class TrackTorque(_Track):
+    """Cyclic synchronous torque."""
 
     def step(self, reference: Reference, dt: float) -> None:
-        distance = self._target - reference.position
-        reachable = math.sqrt(2.0 * self._deceleration * abs(distance))
-        wanted = math.copysign(min(self._velocity, reachable), distance)
-        change = wanted - reference.velocity
-        rate = self._acceleration if abs(wanted) > abs(reference.velocity) else 2.0 * self._deceleration
-        reference.velocity += math.copysign(min(abs(change), rate * dt), change)
-        step = reference.velocity * dt
-        if abs(distance) <= abs(step) or (distance == 0.0 and abs(reference.velocity) <= rate * dt):
-            reference.position, reference.velocity, self.done = self._target, 0.0, True
-        else:
-            reference.position += step
-
-
-class RampDown:
-    """Slow down to standstill, wherever that is."""
-
-    def __init__(self, deceleration: float) -> None:
-        self._deceleration = deceleration
-        self.done = False
-
-    def step(self, reference: Reference, dt: float) -> None:
-        change = self._deceleration * dt
-        if abs(reference.velocity) <= change:
-            reference.velocity, self.done = 0.0, True
-        else:
-            reference.velocity -= math.copysign(change, reference.velocity)
-            reference.position += reference.velocity * dt
+        if not self.done:
+            reference.torque += (self._target - reference.torque) * self._share(dt)

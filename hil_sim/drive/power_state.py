@@ -72,7 +72,8 @@ TRANSITIONS: dict[tuple[PowerState, Command], PowerState] = {
     (S.FAULT, C.FAULT_RESET): S.SWITCH_ON_DISABLED,  # 15
 }
 
-# States in which the motor has current.
+# States in which the power stage has its voltage, and those in which the motor has current.
+LIVE = frozenset({S.SWITCHED_ON, S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE})
 ENERGISED = frozenset({S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.FAULT_REACTION_ACTIVE})
 
 
