@@ -1,7 +1,5 @@
 """The whole machine without its doors: clock, bus, drives, gait controller, insoles, IMU and the wearer."""
 
-import random
-from collections.abc import Callable
 from enum import StrEnum
 
 import eds
@@ -13,17 +11,14 @@ from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
 from hil_sim.gait.generator import STANDING, Activity
 from hil_sim.gait.wearer import Wearer
-from hil_sim.sensors.imu import Imu
-from hil_sim.sensors.insole import Insole
+from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 
 JOINTS = {"left_hip": 1, "left_knee": 2, "left_ankle": 3, "right_hip": 4, "right_knee": 5, "right_ankle": 6}
 CONTROLLER, CONTROLLER_NODE = "gait", 16
-SENSORS = ("left_insole", "right_insole", "trunk")
+SENSORS = (*FEET, TRUNK)
 
 DRIVE_EDS = "joint_drive.eds"
 CONTROLLER_EDS = "gait_controller.eds"
-
-SENSOR_PERIOD_NS = 10 * MILLISECOND_NS  # 100 Hz
 
 
 class Scenario(StrEnum):
@@ -36,34 +31,26 @@ class Scenario(StrEnum):
 
 _ACTIVITIES = {Scenario.WALK: Activity.WALK, Scenario.STAND: Activity.STAND, Scenario.SIT: Activity.SIT}
 
-Sink = Callable[[bytes], None]
-
 
 class Exoskeleton:
-    """A robot and its wearer in simulated time; the same scenario and seed give the same frames and bytes.
+    """A robot and its wearer in simulated time; the same scenario and seed give the same frames and bytes."""
 
-    What the serial sensors send goes to `sinks` by their names; without a sink it is lost.
-    """
-
-    def __init__(self, scenario: Scenario = Scenario.WALK, seed: int = 0) -> None:
+    def __init__(
+        self, scenario: Scenario = Scenario.WALK, seed: int = 0, sensors: SensorChoice | None = None
+    ) -> None:
         self.clock = Clock()
         self.bus = CanBus(self.clock)
         self.drives = {name: self._drive(name, node_id) for name, node_id in JOINTS.items()}
         self.controller = self._controller(scenario)
         self.wearer = Wearer(self.controller.generator)
-        self.sinks: dict[str, Sink] = {}
-        self._insoles = (
-            Insole(right=False, random_source=random.Random(f"{seed} left")),
-            Insole(right=True, random_source=random.Random(f"{seed} right")),
-        )
-        self._imu = Imu(random.Random(f"{seed} trunk"))
+        self.sensors = SensorSuite(sensors or SensorChoice(), self.clock, self.bus, seed)
 
     def power_on(self) -> None:
         """Switch everything on: the nodes boot, the sensors send."""
         for drive in self.drives.values():
             drive.power_on()
         self.controller.power_on(100 * MILLISECOND_NS)
-        self.clock.every(SENSOR_PERIOD_NS, self._measure)
+        self.clock.every(PERIOD_NS, self._measure)
 
     def _drive(self, name: str, node_id: int) -> JointDrive:
         description = eds.load(eds.locate(DRIVE_EDS, None), node_id)
@@ -90,12 +77,4 @@ class Exoskeleton:
         now_s = self.clock.now_s
         for drive, load in zip(self.drives.values(), self.wearer.joint_loads(now_s), strict=True):
             drive.joint.load = load
-        feet, trunk = self.wearer.feet(now_s), self.wearer.trunk()
-        for name, insole, foot in zip(SENSORS, self._insoles, feet, strict=False):
-            self._emit(name, insole.frame(foot, self.clock.now_ns // 1000))
-        self._emit("trunk", self._imu.frames(trunk, SENSOR_PERIOD_NS / 1e9))
-
-    def _emit(self, name: str, data: bytes) -> None:
-        sink = self.sinks.get(name)
-        if sink is not None:
-            sink(data)
+        self.sensors.measure(*self.wearer.feet(now_s), self.wearer.trunk())

@@ -9,7 +9,7 @@ from typing import Self
 from hil_sim import robot_file
 from hil_sim.bus.hub import Hub
 from hil_sim.bus.virtual import VirtualBridge
-from hil_sim.exoskeleton import SENSORS, Exoskeleton, Scenario
+from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.folder import Folder
 from hil_sim.loop import Loop
 from hil_sim.sensors.serial_port import SerialPort
@@ -78,10 +78,9 @@ class SimulatedRobot:
         self.config_is_ours = self.folder.write_config(robot_file.hub_bus(hub.port))
 
     def _open_sensors(self, closing: ExitStack) -> None:
-        for name in SENSORS:
-            port = SerialPort(self.folder.link(name))
-            closing.callback(port.close)
-            self.exoskeleton.sinks[name] = port.write
+        for name, line in self.exoskeleton.sensors.lines.items():
+            line.port = SerialPort(self.folder.link(name), line.baudrate)
+            closing.callback(line.port.close)
 
     def run(self, seconds: float | None = None) -> None:
         """Run in this thread until `stop`, or for so many simulated seconds."""

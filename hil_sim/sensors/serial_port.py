@@ -1,28 +1,52 @@
-"""A serial device's end of a pseudo-terminal: never waits for whoever reads it."""
+"""A serial device's end of a pseudo-terminal: never waits for whoever reads it, and can be unplugged."""
 
 import array
 import fcntl
 import os
+import re
 import termios
 import tty
 from pathlib import Path
 
 _BACKLOG_BYTES = 2048  # what a reader that is absent or slow may find waiting; older bytes are dropped
+_NAMES = [name for name in dir(termios) if re.fullmatch(r"B[1-9]\d*", name)]
+_CODE_OF = {int(name[1:]): getattr(termios, name) for name in _NAMES}
+_BAUDRATE_OF = {code: baudrate for baudrate, code in _CODE_OF.items()}
+_INPUT_SPEED, _OUTPUT_SPEED = 4, 5  # places in what tcgetattr gives
 
 
 class SerialPort:
     """A pseudo-terminal behind a symbolic link with a stable path.
 
     Both ends stay open here, so that raw mode holds and nobody notices a reader that comes or goes.
+    `baudrate` is a standard one (termios).
     """
 
-    def __init__(self, link: Path) -> None:
+    def __init__(self, link: Path, baudrate: int) -> None:
         self.link = link
         self.bytes_dropped = 0
-        self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        _point(link, os.ttyname(self._slave))
+        self._own_baudrate = baudrate
+        self._master = self._slave = -1
+        self.plug(True)
+
+    @property
+    def baudrate(self) -> int:
+        """What its reader has set; the device's own until then, and where it is no standard rate."""
+        speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
+        return _BAUDRATE_OF.get(speed, self._own_baudrate)
+
+    def plug(self, plugged: bool) -> None:
+        """Make the port there, or hang up and take its link away; idempotent."""
+        if not plugged:
+            self.close()
+        elif self._master < 0:
+            self._master, self._slave = os.openpty()
+            tty.setraw(self._slave)
+            attributes = termios.tcgetattr(self._slave)
+            attributes[_INPUT_SPEED] = attributes[_OUTPUT_SPEED] = _CODE_OF[self._own_baudrate]
+            termios.tcsetattr(self._slave, termios.TCSANOW, attributes)
+            os.set_blocking(self._master, False)
+            _point(self.link, os.ttyname(self._slave))
 
     def write(self, data: bytes) -> None:
         """Send bytes; where nobody fetched the earlier ones, those are gone."""

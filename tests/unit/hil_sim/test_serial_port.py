@@ -1,15 +1,16 @@
-"""The serial sensors' pseudo-terminals: stable links, and nobody who reads can stop the robot."""
+"""The serial sensors' pseudo-terminals: stable links, in and out, and no reader can stop the robot."""
 
 import select
 from pathlib import Path
 
+import pytest
 import serial
 
 from hil_sim.sensors.serial_port import SerialPort
 
 
 def test_bytes_arrive_raw_at_the_link(tmp_path: Path) -> None:
-    port = SerialPort(tmp_path / "sensor")
+    port = SerialPort(tmp_path / "sensor", 230400)
     with serial.Serial(str(tmp_path / "sensor"), 230400, timeout=5) as reader:
         data = bytes(range(256))
         port.write(data)
@@ -20,7 +21,7 @@ def test_bytes_arrive_raw_at_the_link(tmp_path: Path) -> None:
 
 def test_without_a_reader_old_bytes_are_dropped_and_fresh_ones_found(tmp_path: Path) -> None:
     frames = [number.to_bytes(4, "big") for number in range(20_000)]
-    port = SerialPort(tmp_path / "sensor")
+    port = SerialPort(tmp_path / "sensor", 230400)
     try:
         for frame in frames:
             port.write(frame)
@@ -39,10 +40,33 @@ def test_without_a_reader_old_bytes_are_dropped_and_fresh_ones_found(tmp_path: P
 def test_a_stale_link_is_replaced_and_a_foreign_one_left_alone(tmp_path: Path) -> None:
     link = tmp_path / "sensor"
     link.symlink_to("/dev/pts/nowhere")
-    port = SerialPort(link)
+    port = SerialPort(link, 115200)
     assert link.readlink() != Path("/dev/pts/nowhere")
     link.unlink()
     link.symlink_to("/dev/null")
     port.close()
     port.close()
     assert link.readlink() == Path("/dev/null")
+
+
+def test_the_readers_baud_rate_is_known_and_is_the_devices_own_until_one_is_set(tmp_path: Path) -> None:
+    port = SerialPort(tmp_path / "sensor", 230400)
+    assert port.baudrate == 230400
+    with serial.Serial(str(port.link), 9600):
+        assert port.baudrate == 9600
+    port.close()
+
+
+def test_an_unplugged_port_hangs_up_and_comes_back_at_the_same_path(tmp_path: Path) -> None:
+    port = SerialPort(tmp_path / "sensor", 115200)
+    with serial.Serial(str(port.link), 115200, timeout=5) as reader:
+        port.plug(False)
+        port.plug(False)
+        assert not port.link.is_symlink()
+        with pytest.raises(serial.SerialException):
+            reader.read(1)
+    port.plug(True)
+    with serial.Serial(str(port.link), 115200, timeout=5) as reader:
+        port.write(b"again")
+        assert reader.read(5) == b"again"
+    port.close()

@@ -5,43 +5,43 @@ The wearer is the simulator's; frames go through the real parsers and components
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import pytest
 
 from drivers.imu.device import Imu
 from drivers.imu.settings import ImuSettings
-from drivers.imu.witmotion import WitmotionParser
-from drivers.insole.cobs import InsoleCobsParser
 from drivers.insole.device import Insole, pair
 from drivers.insole.settings import InsoleSettings
+from drivers.parsing import Parser
 from drivers.samples import State
 from hil_sim.gait.generator import Activity, Generator
 from hil_sim.gait.walk import Shape
-from hil_sim.gait.wearer import Foot, Trunk, Wearer
-from hil_sim.sensors.imu import Imu as SimulatedImu
-from hil_sim.sensors.insole import Insole as SimulatedInsole
-from hil_sim.sensors.insole import encode
+from hil_sim.gait.wearer import Foot, Wearer
+from hil_sim.sensors.faults import InsoleFaults, LineFaults
+from hil_sim.sensors.insole_cobs import CELLS, INSOLE_COBS
+from hil_sim.sensors.serial_sensor import SerialSensor
+from hil_sim.sensors.sole import Pressures, Sole
+from hil_sim.sensors.trunk_imu import Motion, TrunkImu
+from hil_sim.sensors.witmotion import WITMOTION
+from tests.unit.hil_sim.listener import Listener
 
 SHAPE = Shape(step_length=0.40, cycle_time=1.2, toe_height=0.06, trunk_angle=0.15)
-CALIBRATED, RIGHT = 2, 1
 
-Counts = list[int]
-CellFault = Callable[[Counts, Counts, float], Counts]  # counts, the frame before, time → counts
-
-
-def _nothing(counts: Counts, _before: Counts, _now_s: float) -> Counts:
-    return counts
+CellFault = Callable[[list[float], float], list[float]]  # Pa of each cell, time → Pa
+MotionFault = Callable[[Motion, float], Motion]
 
 
 @dataclass
 class Seeded:
-    """What is wrong with the robot."""
+    """What is wrong with the robot: switches of the simulator, and what is done to what it measures."""
 
-    left: CellFault = _nothing
-    swapped: bool = False
-    trunk: Callable[[Trunk], Trunk] = lambda trunk: trunk
-    imu_bytes: Callable[[bytes, float], bytes] = lambda data, _: data
+    left: InsoleFaults = field(default_factory=InsoleFaults)
+    right: InsoleFaults = field(default_factory=InsoleFaults)
+    trunk: LineFaults = field(default_factory=LineFaults)
+    cells: CellFault = lambda pascal, _: pascal  # of the left foot
+    motion: MotionFault = lambda motion, _: motion
     axes: tuple[str, str, str] | None = None
 
 
@@ -59,9 +59,6 @@ class Robot:
         self.now_s = 100.0
         self.generator = Generator(SHAPE)
         self.wearer = Wearer(self.generator)
-        sources = [random.Random(f"{side}") for side in ("left", "right", "trunk")]
-        self.sent = [SimulatedInsole(False, sources[0]), SimulatedInsole(True, sources[1])]
-        self.sent_imu = SimulatedImu(sources[2])
         settings = InsoleSettings(port="-")
         self.insoles = [Insole("left_insole", settings), Insole("right_insole", settings)]
         pair(self.insoles)
@@ -70,10 +67,24 @@ class Robot:
         self.insoles[0].hip_velocity = lambda _: self.hips[0]
         self.insoles[1].hip_velocity = lambda _: self.hips[1]
         self.imu = Imu("trunk", ImuSettings(port="-", axes=fault.axes))  # type: ignore[arg-type]
-        self.parsers = [InsoleCobsParser(), InsoleCobsParser()]
-        self.imu_parser = WitmotionParser()
-        self._counts = [[0] * 16, [0] * 16]
-        self._sequence = 0
+        feet = enumerate((fault.left, fault.right))
+        self.soles = [Sole(CELLS, bool(side), faults, random.Random(side)) for side, faults in feet]
+        self.sensor = TrunkImu(fault.trunk, random.Random(2))
+        self.senders = [self._connected(insole) for insole in self.insoles]
+        self.imu_sender = SerialSensor(WITMOTION, fault.trunk, random.Random(0))
+        self.imu_sender.line.port = Listener(115200, self._feeder(self.imu, self.imu.line.parser))
+
+    def _connected(self, insole: Insole) -> SerialSensor[Pressures]:
+        sender = SerialSensor(INSOLE_COBS, LineFaults(), random.Random(0))
+        sender.line.port = Listener(230400, self._feeder(insole, insole.line.parser))
+        return sender
+
+    def _feeder(self, component: Insole | Imu, parser: Parser[Any]) -> Callable[[bytes], None]:
+        def feed(data: bytes) -> None:
+            for frame in parser.feed(data):
+                component.received(frame, round(self.now_s * 1e9))
+
+        return feed
 
     def live(self, activity: Activity, seconds: float) -> list[str]:
         """Every problem that was said meanwhile, once each."""
@@ -93,25 +104,15 @@ class Robot:
         self.hips = [(a - b) / self.step_s for a, b in zip(hips, self._hips_before, strict=True)]
         self._hips_before = hips
         now_ns = round(self.now_s * 1e9)
-        self._sequence += 1
-        feet = self.wearer.feet(self.now_s)
-        for side, foot in enumerate(feet[::-1] if self.fault.swapped else feet):
-            for frame in self.parsers[side].feed(self._insole_frame(side, foot)):
-                self.insoles[side].received(frame, now_ns)
-        trunk = self.fault.trunk(self.wearer.trunk())
-        data = self.fault.imu_bytes(self.sent_imu.frames(trunk, self.step_s), self.now_s)
-        for sample in self.imu_parser.feed(data):
-            self.imu.received(sample, now_ns)
+        left, right = self.wearer.feet(self.now_s)
+        self.senders[0].tell(self._left(left, right), now_ns)
+        self.senders[1].tell(self.soles[1].measure(right, left, self.step_s), now_ns)
+        motion = self.sensor.measure(self.wearer.trunk(), self.step_s)
+        self.imu_sender.tell(self.fault.motion(motion, self.now_s), now_ns)
 
-    def _insole_frame(self, side: int, foot: Foot) -> bytes:
-        if self.fault.swapped:
-            foot = replace(foot, cop_y=-foot.cop_y)
-        counts = [self.sent[side]._measure(pressure) for pressure in self.sent[side].pressures(foot)]
-        if side == 0:
-            counts = self.fault.left(counts, self._counts[side], self.now_s)
-        self._counts[side] = counts
-        flags = CALIBRATED | (RIGHT if side else 0)
-        return encode(flags, self._sequence, int(self.now_s * 1e6), [min(c, 65535) for c in counts])
+    def _left(self, own: Foot, other: Foot) -> Pressures:
+        felt = self.soles[0].measure(own, other, self.step_s)
+        return replace(felt, pascal=tuple(self.fault.cells(list(felt.pascal), self.now_s)))
 
 
 @pytest.mark.timeout(300)
@@ -129,90 +130,72 @@ def test_half_an_hour_of_a_normal_wearer_raises_no_alarm() -> None:
     assert robot.insoles[0].check.landings > 500
 
 
-def stuck(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return [*counts[:9], 731, *counts[10:]]
+def cell(number: int, value: Callable[[float], float]) -> CellFault:
+    """One cell says something else, by time."""
+    return lambda pascal, now_s: [*pascal[:number], value(now_s), *pascal[number + 1 :]]
 
 
-def dead(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return [*counts[:9], 0, *counts[10:]]
+def times(factor: float) -> CellFault:
+    return lambda pascal, _: [factor * one for one in pascal]
 
 
-def frozen(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return before if sum(before) > 4000 else counts
+def heavier(factor: float) -> MotionFault:
+    def change(motion: Motion, _now_s: float) -> Motion:
+        x, y, z = motion.acceleration
+        return replace(motion, acceleration=(factor * x, factor * y, factor * z))
+
+    return change
 
 
-def unplugged(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return [0] * 16
+def spinning(motion: Motion, now_s: float) -> Motion:
+    return replace(motion, rate=(30.0, 30.0, 30.0)) if int(now_s * 50) % 40 == 0 else motion
 
 
-def loose(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return [*counts[:3], 0 if int(now_s * 50) % 2 else 3000, *counts[4:]]
+def backwards(motion: Motion, _now_s: float) -> Motion:
+    """Attitude of the opposite sense, as an axis order taken from another driver gives."""
+    (roll, pitch, yaw), (w, x, y, z) = motion.angles, motion.orientation
+    return replace(motion, angles=(-roll, -pitch, -yaw), orientation=(w, -x, -y, -z))
 
 
-def ten_times(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return [count * 10 for count in counts]
+def frozen_in_stance() -> Seeded:
+    """An insole that hangs at the first moment under load."""
+    fault = Seeded()
+
+    def freeze(pascal: list[float], now_s: float) -> list[float]:
+        fault.left.frozen = fault.left.frozen or (now_s > 105.0 and sum(pascal) > 5e5)
+        return pascal
+
+    fault.cells = freeze
+    return fault
 
 
-def a_tenth(counts: Counts, before: Counts, now_s: float) -> Counts:
-    return [round(count / 10) for count in counts]
-
-
-def words(data: bytes, kind: int, change: Callable[[int], int]) -> bytes:
-    """The frames in `data` with the three values of one kind changed."""
-    out = b""
-    for at in range(0, len(data), 11):
-        frame = bytearray(data[at : at + 11])
-        if frame[1] == kind:
-            for place in (2, 4, 6):
-                value = change(int.from_bytes(frame[place : place + 2], "little", signed=True))
-                frame[place : place + 2] = max(-32768, min(32767, value)).to_bytes(2, "little", signed=True)
-            frame[10] = sum(frame[:10]) & 0xFF
-        out += bytes(frame)
-    return out
-
-
-def hang(data: bytes, now_s: float) -> bytes:
-    return words(data, 0x51, lambda _: 700)
-
-
-def heavy(data: bytes, now_s: float) -> bytes:
-    return words(data, 0x51, lambda value: value * 10)
-
-
-def light(data: bytes, now_s: float) -> bytes:
-    return words(data, 0x51, lambda value: value // 10)
-
-
-def spinning(data: bytes, now_s: float) -> bytes:
-    return words(data, 0x52, lambda value: 32767 if int(now_s * 50) % 40 == 0 else value)
-
-
-def backwards(data: bytes, now_s: float) -> bytes:
-    """Angles and quaternion of the opposite sense, as an axis order taken from another driver gives."""
-    return words(words(data, 0x53, lambda value: -value), 0x59, lambda value: value)[:33]
-
-
-CASES: dict[str, tuple[Seeded, str]] = {
-    "left and right insole swapped": (Seeded(swapped=True), "left and right are swapped"),
-    "stuck cell": (Seeded(left=stuck), "cell 9 is stuck"),
-    "dead cell": (Seeded(left=dead), "cell 9 felt nothing"),
-    "insole frozen": (Seeded(left=frozen), "same values again and again"),
-    "insole unplugged and still sending": (Seeded(left=unplugged), "does not feel the steps"),
-    "loose cell": (Seeded(left=loose), "cell 3 jumps"),
-    "insole ten times too high": (Seeded(left=ten_times), "scale is off"),
-    "insole ten times too low": (Seeded(left=a_tenth), "scale is off"),
-    "sign of the tilt": (Seeded(imu_bytes=backwards), "tilt and gravity disagree"),
-    "IMU upside down": (Seeded(axes=("x", "-y", "-z")), "upside down"),
-    "IMU hangs": (Seeded(imu_bytes=hang), "same acceleration"),
-    "acceleration ten times too high": (Seeded(imu_bytes=heavy), "scale is off"),
-    "acceleration ten times too low": (Seeded(imu_bytes=light), "scale is off"),
-    "impossible rates": (Seeded(imu_bytes=spinning), "faster than"),
+CASES: dict[str, tuple[Callable[[], Seeded], str]] = {
+    "left and right insole swapped": (
+        lambda: Seeded(left=InsoleFaults(swapped=True), right=InsoleFaults(swapped=True)),
+        "left and right are swapped",
+    ),
+    "stuck cell": (lambda: Seeded(left=InsoleFaults(stuck_cell=9)), "cell 9 is stuck"),
+    "dead cell": (lambda: Seeded(cells=cell(9, lambda _: 0.0)), "cell 9 felt nothing"),
+    "insole frozen": (frozen_in_stance, "same values again and again"),
+    "insole unplugged and still sending": (lambda: Seeded(cells=times(0.0)), "does not feel the steps"),
+    "loose cell": (
+        lambda: Seeded(cells=cell(3, lambda now_s: 0.0 if int(now_s * 50) % 2 else 3e5)),
+        "cell 3 jumps",
+    ),
+    "insole ten times too high": (lambda: Seeded(cells=times(10.0)), "scale is off"),
+    "insole ten times too low": (lambda: Seeded(cells=times(0.1)), "scale is off"),
+    "sign of the tilt": (lambda: Seeded(motion=backwards), "tilt and gravity disagree"),
+    "IMU upside down": (lambda: Seeded(axes=("x", "-y", "-z")), "upside down"),
+    "IMU hangs": (lambda: Seeded(trunk=LineFaults(frozen=True)), "same acceleration"),
+    "acceleration ten times too high": (lambda: Seeded(motion=heavier(10.0)), "scale is off"),
+    "acceleration ten times too low": (lambda: Seeded(motion=heavier(0.1)), "scale is off"),
+    "impossible rates": (lambda: Seeded(motion=spinning), "faster than"),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_seeded_fault_and_nothing_else_is_named_within_a_minute_of_walking(name: str) -> None:
     fault, expected = CASES[name]
-    said = Robot(fault).live(Activity.WALK, 60)
+    said = Robot(fault()).live(Activity.WALK, 60)
     assert any(expected in problem for problem in said), said
     assert [problem for problem in said if expected not in problem] == []

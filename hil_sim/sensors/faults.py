@@ -1,0 +1,27 @@
+"""What can be wrong with a sensor and its line: plain switches, all off, to be set while the robot runs."""
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class LineFaults:
+    """One sensor, its cable and its settings. On a CAN bus only `unplugged` and `frozen` mean anything."""
+
+    unplugged: bool = False  # nothing arrives and the port is gone; plugged in again, the sensor starts anew
+    frozen: bool = (
+        False  # it measures no more: the same values again and again, in frames that go on counting
+    )
+    wrong_baud: int | None = None  # the rate at which it sends instead of its own
+    garbage_share: float = 0.0  # of its bytes: replaced by noise on the way
+    dropout_share: float = 0.0  # of its frames: never sent, but counted
+    wraps_soon: bool = False  # when it starts next, its counters stand seconds before they wrap
+
+
+@dataclass(slots=True)
+class InsoleFaults(LineFaults):
+    """What else can be wrong with an insole."""
+
+    stuck_cell: int | None = None  # the number of a cell that always says the same
+    saturated: bool = False  # its amplifier ends far too low, and it says so where its format can
+    drift: float = 0.0  # Pa/s by which every cell reads more and more; 0 again takes all of it away
+    swapped: bool = False  # it lies in the other shoe

@@ -1,0 +1,96 @@
+"""What an IMU on the trunk measures, whatever language it speaks."""
+
+import math
+import random
+from dataclasses import dataclass
+
+from hil_sim.gait.wearer import GRAVITY, Trunk
+from hil_sim.sensors.faults import LineFaults
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+_TEMPERATURE_C = 31.5
+_NOISE_ACCELERATION = 0.02  # m/s²
+_NOISE_RATE = 0.002  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One measurement. The sensor's axes are the trunk's: x forward, y left, z up; its world's z is up."""
+
+    angles: Vector  # roll, pitch, yaw (rad): yaw about z, then pitch about y, then roll about x
+    orientation: Quaternion  # w, x, y, z: sensor to world
+    acceleration: Vector  # m/s², specific force
+    rate: Vector  # rad/s
+    temperature: float  # °C
+
+
+class TrunkImu:
+    """The sensor itself."""
+
+    def __init__(self, faults: LineFaults, random_source: random.Random) -> None:
+        self._faults = faults
+        self._random = random_source
+        self._before: Trunk | None = None
+        self._last: Motion | None = None
+
+    def measure(self, trunk: Trunk, dt: float) -> Motion:
+        """The trunk, `dt` seconds after the last measurement."""
+        if self._last is None or not self._faults.frozen:
+            rate = angular_rate(self._before or trunk, trunk, dt)
+            self._last = Motion(
+                angles=_angles(trunk),
+                orientation=quaternion(trunk),
+                acceleration=self._noisy(specific_force(trunk), _NOISE_ACCELERATION),
+                rate=self._noisy(rate, _NOISE_RATE),
+                temperature=_TEMPERATURE_C,
+            )
+        self._before = trunk
+        return self._last
+
+    def _noisy(self, vector: Vector, noise: float) -> Vector:
+        x, y, z = vector
+        gauss = self._random.gauss
+        return x + gauss(0.0, noise), y + gauss(0.0, noise), z + gauss(0.0, noise)
+
+
+def quaternion(trunk: Trunk) -> Quaternion:
+    """Attitude as w, x, y, z (yaw, then pitch, then roll)."""
+    cr, sr = math.cos(trunk.roll / 2), math.sin(trunk.roll / 2)
+    cp, sp = math.cos(trunk.pitch / 2), math.sin(trunk.pitch / 2)
+    cy, sy = math.cos(trunk.yaw / 2), math.sin(trunk.yaw / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def specific_force(trunk: Trunk) -> Vector:
+    """What the accelerometer feels (m/s²): acceleration and the reaction to gravity, in its own axes."""
+    w, x, y, z = quaternion(trunk)
+    ax, ay, az = trunk.acceleration
+    az += GRAVITY
+    return (
+        (1 - 2 * (y * y + z * z)) * ax + 2 * (x * y + w * z) * ay + 2 * (x * z - w * y) * az,
+        2 * (x * y - w * z) * ax + (1 - 2 * (x * x + z * z)) * ay + 2 * (y * z + w * x) * az,
+        2 * (x * z + w * y) * ax + 2 * (y * z - w * x) * ay + (1 - 2 * (x * x + y * y)) * az,
+    )
+
+
+def angular_rate(before: Trunk, now: Trunk, dt: float) -> Vector:
+    """Angular velocity in the sensor's axes (rad/s) from two attitudes."""
+    roll, pitch, yaw = ((b - a) / dt for a, b in zip(_angles(before), _angles(now), strict=True))
+    sin_roll, cos_roll = math.sin(now.roll), math.cos(now.roll)
+    sin_pitch, cos_pitch = math.sin(now.pitch), math.cos(now.pitch)
+    return (
+        roll - yaw * sin_pitch,
+        pitch * cos_roll + yaw * sin_roll * cos_pitch,
+        -pitch * sin_roll + yaw * cos_roll * cos_pitch,
+    )
+
+
+def _angles(trunk: Trunk) -> Vector:
+    return trunk.roll, trunk.pitch, trunk.yaw
