@@ -18,6 +18,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "watch": ("gateway.cli.watch:main", "follow channels live"),
     "get": ("gateway.cli.parameters:get", "read parameters from the devices"),
     "set": ("gateway.cli.parameters:set_", "change parameters, all or none, read back"),
+    "journal": ("gateway.cli.journal:main", "who did what to the robot; is the record whole"),
     "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
     "eds": ("eds.cli:main", "what an EDS or DCF file says, and what is wrong with it"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),

@@ -46,6 +46,7 @@ class FakeRobot:
         self.port = 0
         self._streams = 0
         self._leased = False
+        self._trial: dict[str, float] = {}  # what the trial reverts to
         self._resource_asked = False
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="fake-robot")
@@ -69,6 +70,7 @@ class FakeRobot:
             "parameter.list": self._read,
             "parameter.read": self._read,
             "parameter.write": self._write,
+            "parameter.confirm": self._confirm,
             "robot.stop": lambda params: {"drives": dict.fromkeys(JOINTS, "confirmed"), "held": True},
         }
 
@@ -273,8 +275,15 @@ class FakeRobot:
             "modules": dict.fromkeys(("resource", "component", "control", "status"), "off"),
             "stop": {"held": False, "reason": None, "since_ns": None, "stopped_again": {}, "drives": {}},
             "guard": {"configured": False},
+            "trials": self._trials(),
             "clock": {"monotonic_ns": time.monotonic_ns(), "utc_ns": time.time_ns(), "boot_id": self.boot_id},
         }
+
+    def _trials(self) -> list[Params]:
+        if not self._trial:
+            return []
+        values = {name: self.parameters[name] for name in self._trial}
+        return [{"write": 1, "who": "tester", "values": values, "before": self._trial, "left_s": 9.0}]
 
     @staticmethod
     def _meta(name: str) -> Params:
@@ -351,7 +360,13 @@ class FakeRobot:
 
     def _release(self, params: Params) -> Params:
         self._leased = False
+        self.parameters.update(self._trial)
+        self._trial = {}
         return {}
+
+    def _confirm(self, params: Params) -> Params:
+        self._trial = {}
+        return {"write": params["write"], "values": self.parameters}
 
     def _read(self, params: Params) -> Params:
         globs = params.get("names")
@@ -380,4 +395,5 @@ class FakeRobot:
                 )
         before = {name: self.parameters[name] for name in changes}
         self.parameters.update(changes)
-        return {"write": 1, "before": before, "after": dict(changes)}
+        self._trial = before if params.get("trial_s") else {}
+        return {"write": 1, "before": before, "after": dict(changes), "trial_s": params.get("trial_s")}

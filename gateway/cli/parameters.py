@@ -5,13 +5,20 @@ import math
 
 from gateway.cli.reach import check_names, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table
+from gateway.cli.trial import wait_for_decision
 from gateway.messages import Description, Written
+
+LONGEST_TRIAL_S = 300.0
 
 SET_EPILOG = """All changes happen or none: they are checked first, written, read back from the devices, and
 taken back if one fails. Somebody else may be the one writer; then nothing is changed and it is said.
 
-example:
-  gwrms set gait.step_length=0.42 left_knee.max_torque=0.8"""
+With --trial they are taken back by the robot itself after that time, and at once when this command ends in
+any way, its terminal, computer or network included. Enter keeps them.
+
+examples:
+  gwrms set gait.step_length=0.42 left_knee.max_torque=0.8
+  gwrms set --trial 30 gait.cycle_time=1.1"""
 
 
 def get(argv: list[str]) -> int:
@@ -39,6 +46,12 @@ def set_(argv: list[str]) -> int:
     made.add_argument(
         "changes", metavar="NAME=VALUE", nargs="+", type=_change, help="in the parameter's own unit"
     )
+    made.add_argument(
+        "--trial",
+        metavar="S",
+        type=_trial_s,
+        help="try it for S seconds (at most 300); exit status 0 if kept",
+    )
     arguments = made.parse_args(argv)
     changes = dict(arguments.changes)
     if len(changes) != len(arguments.changes):
@@ -46,12 +59,29 @@ def set_(argv: list[str]) -> int:
     with reach(arguments, "set") as robot:
         description = robot.describe()
         check_names("parameter", changes, parameter_names(description))
-        written = robot.write(changes)
-    if arguments.json:
+        if arguments.trial is None:
+            _say_written(robot.write(changes), description, json=arguments.json)
+            return 0
+        with robot.trial(changes, arguments.trial) as written:
+            _say_written(written, description, json=arguments.json)
+            return wait_for_decision(robot, written, json=arguments.json)
+
+
+def _say_written(written: Written, description: Description, *, json: bool) -> None:
+    if json:
         say_json(written)
     else:
         say(_written_text(written, description))
-    return 0
+
+
+def _trial_s(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0 < seconds <= LONGEST_TRIAL_S:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time for a trial: more than 0, at most 300 seconds")
+    return seconds
 
 
 def _change(text: str) -> tuple[str, float]:

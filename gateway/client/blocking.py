@@ -11,11 +11,14 @@ from gateway.client.client import Client
 from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
 from gateway.messages import (
+    Confirmed,
     Description,
+    JournalEntries,
     ModuleName,
     ParameterValues,
     ResourceSnapshot,
     ResourceSnapshotParams,
+    Reverted,
     Snapshot,
     Stopped,
     Written,
@@ -120,6 +123,33 @@ class Robot:
                 return await self._client.write(changes)
 
         return self._wait(write())
+
+    @contextlib.contextmanager
+    def trial(self, changes: Mapping[str, float], trial_s: float) -> Generator[Written, None, None]:
+        """Try parameters for a block; what was not confirmed in it is taken back at its end.
+
+        with robot.trial({"gait.step_length": 0.42}, trial_s=30) as written:
+            ...
+            robot.confirm(written.write)
+        """
+        trying = self._client.trial(changes, trial_s)
+        written = self._wait(trying.__aenter__())
+        try:
+            yield written
+        finally:
+            self._wait(trying.__aexit__(None, None, None))
+
+    def confirm(self, write: int) -> Confirmed:
+        """Keep what is on trial; raises `RemoteError` where it has ended, or is not what was written."""
+        return self._wait(self._client.confirm(write))
+
+    def revert(self, write: int) -> Reverted:
+        """Take back what is on trial; raises `RemoteError` where it has ended, or could not be taken back."""
+        return self._wait(self._client.revert(write))
+
+    def journal(self, count: int = 20) -> JournalEntries:
+        """The newest entries of the robot's journal, oldest first."""
+        return self._wait(self._client.journal(count))
 
     def stop(self, reason: str) -> Stopped:
         """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed."""

@@ -10,8 +10,10 @@ from gateway.client.link import Link, LinkSettings, OnState
 from gateway.client.subscription import Subscription
 from gateway.messages import (
     AcquireParams,
+    Confirmed,
     Description,
     Done,
+    JournalEntries,
     Lease,
     ModuleName,
     ParameterParams,
@@ -21,16 +23,21 @@ from gateway.messages import (
     ReleaseParams,
     ResourceSnapshot,
     ResourceSnapshotParams,
+    Reverted,
     Snapshot,
     SnapshotParams,
     StopParams,
     Stopped,
     StreamStartParams,
+    TailParams,
+    WriteNumberParams,
     Written,
 )
 
 WRITE_TIMEOUT_S = 30.0  # a transaction over several drives, verified and perhaps rolled back
 STOP_TIMEOUT_S = 5.0
+LEASE_MARGIN_S = 30.0
+LONGEST_LEASE_S = 300.0
 
 
 class Client:
@@ -119,16 +126,42 @@ class Client:
         """Let others write."""
         await self.link.call("control.release", ReleaseParams(), Done)
 
-    async def write(self, changes: Mapping[str, float]) -> Written:
+    async def write(self, changes: Mapping[str, float], trial_s: float | None = None) -> Written:
         """Change parameters, all or none, read back. Needs the lease.
+
+        With `trial_s` (at most 300) the robot takes them back by itself unless they are confirmed: after that
+        time, and at once when the lease or the connection ends.
 
         Raises:
             RemoteError: refused or rolled back; `kind` and `data` say why.
 
         """
         return await self.link.call(
-            "parameter.write", ParameterWriteParams(dict(changes)), Written, WRITE_TIMEOUT_S
+            "parameter.write", ParameterWriteParams(dict(changes), trial_s), Written, WRITE_TIMEOUT_S
         )
+
+    async def confirm(self, write: int) -> Confirmed:
+        """Keep what is on trial; raises `RemoteError` where it has ended, or is not what was written."""
+        return await self.link.call("parameter.confirm", WriteNumberParams(write), Confirmed, WRITE_TIMEOUT_S)
+
+    async def revert(self, write: int) -> Reverted:
+        """Take back what is on trial; raises `RemoteError` where it has ended, or could not be taken back."""
+        return await self.link.call("parameter.revert", WriteNumberParams(write), Reverted, WRITE_TIMEOUT_S)
+
+    @contextlib.asynccontextmanager
+    async def trial(self, changes: Mapping[str, float], trial_s: float) -> AsyncIterator[Written]:
+        """Try parameters for a block; what was not confirmed in it is taken back at its end.
+
+        async with robot.trial({"gait.step_length": 0.42}, trial_s=30) as written:
+            ...
+            await robot.confirm(written.write)
+        """
+        async with self.writing(min(trial_s + LEASE_MARGIN_S, LONGEST_LEASE_S)):
+            yield await self.write(changes, trial_s)  # giving back the lease takes back what is on trial
+
+    async def journal(self, count: int = 20) -> JournalEntries:
+        """The newest entries of the robot's journal, oldest first."""
+        return await self.link.call("journal.tail", TailParams(count), JournalEntries)
 
     @contextlib.asynccontextmanager
     async def writing(self, ttl_s: float = 60.0) -> AsyncIterator[None]:

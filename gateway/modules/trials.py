@@ -247,15 +247,18 @@ class Trials:
         if undo is None:
             return None
         found = take_back(undo, self._reach)
-        self._keep(undo, found)
         if found.problem is None or found.problem != known:
             what = "taken back" if found.problem is None else "NOT TAKEN BACK yet"
             log.warning("write %d of %s %s (%s): %s", write, undo.who, what, why, found.outcome)
-            self._keeping.journal.append("gateway", what, write=write, reason=why, outcome=found.outcome)
+            entry = self._keeping.journal.append(
+                "gateway", what, write=write, reason=why, outcome=found.outcome
+            )
+            outcome(entry)  # a disk that fails was logged, and does not change what was done
+        self._keep(undo, found)
         return found
 
     def _keep(self, undo: Undo, found: TakenBack) -> None:
-        """On disk stays what is still to be taken back; a disk that fails does not change what was done."""
+        """On disk stays what is still to be taken back."""
         try:
             if found.problem is None:
                 self._keeping.undo.change(drop=[undo.write])

@@ -1,0 +1,54 @@
+"""`gwrms set --trial`: the wait between trying a change and keeping it."""
+
+import select
+import sys
+import time
+
+from gateway.cli.text import exact, say, say_json, warn
+from gateway.client import Robot
+from gateway.messages import Written
+
+LOOK_S = 1.0  # how often the robot is asked whether the trial still stands
+
+
+def wait_for_decision(robot: Robot, written: Written, *, json: bool) -> int:
+    """Keep the trial when a line comes on standard input; 0 when it was kept, 1 when it was taken back."""
+    interactive = sys.stdin.isatty() and not json
+    if not json:
+        say(f"on trial for {exact(written.trial_s)} s: Enter keeps it, Ctrl-C takes it back\n")
+    ends = time.monotonic() + (written.trial_s or 0.0)
+    try:
+        kept = _wait(robot, written.write, ends, countdown=interactive)
+    except KeyboardInterrupt:
+        kept = False
+    if kept:
+        robot.confirm(written.write)
+    _tell(written, kept=kept, json=json)
+    return 0 if kept else 1
+
+
+def _wait(robot: Robot, write: int, ends: float, *, countdown: bool) -> bool:
+    """Whether it is to be kept. Without anybody to ask, its time runs out."""
+    asking = [sys.stdin]
+    while (left := ends - time.monotonic()) > 0:
+        if countdown:
+            say(f"\r{left:4.0f} s left ")
+        ready, _, _ = select.select(asking, [], [], min(LOOK_S, left))
+        if ready:
+            if sys.stdin.readline():
+                return True
+            asking = []  # standard input has ended: nobody is there to keep it
+        elif all(trial.write != write for trial in robot.describe().trials):
+            warn("set", "the robot has ended the trial by itself; gwrms journal tail says why")
+            return False
+    return False
+
+
+def _tell(written: Written, *, kept: bool, json: bool) -> None:
+    if json:
+        say_json({"write": written.write, "kept": kept})
+    elif kept:
+        say("kept\n")
+    else:
+        values = ", ".join(f"{name} = {exact(value)}" for name, value in written.before.items())
+        say(f"\ntaken back: {values}\n")
