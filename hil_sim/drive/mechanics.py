@@ -14,7 +14,7 @@ class JointConstants:
     viscous_friction: float = 8.0  # N·m·s/rad
     coulomb_friction: float = 3.0  # N·m
     holding_friction: float = 12.0  # N·m, of an unpowered gear that nothing moves
-    gear_efficiency: float = 0.9  # the rest of the motor's torque is friction in the gear
+    gear_efficiency: float = 0.95  # the rest of the motor's torque is friction in the gear
     low_stop: float = math.radians(-60.0)
     high_stop: float = math.radians(130.0)
     stop_stiffness: float = 50_000.0  # N·m/rad

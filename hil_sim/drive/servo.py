@@ -42,6 +42,7 @@ class Servo:
         self.homed = False
         self._parameters = parameters
         self._integral = 0.0
+        self._seen_velocity = 0.0  # filtered
         self.hold()
 
     @property
@@ -132,11 +133,15 @@ class Servo:
         top_speed = min(settings.top_speed, supply_v / settings.back_emf)
         joint, read, origin = self.joint, self.encoder.read, self.origin
         turning = 0.0 if self.encoder.stuck else 1.0
-        actual, integral = self.torque, self._integral
-        wanted = demand = 0.0
+        blend = STEP_S / (STEP_S + settings.velocity_filter_s)
+        actual, demand, integral, seen = self.torque, self.demand, self._integral, self._seen_velocity
+        wanted = demand
         for _ in range(steps):
+            actual += gain * (demand - actual)  # what the last step has computed
+            joint.step(actual)
             motion.step(reference, STEP_S)
             speed = joint.velocity
+            seen += blend * (turning * speed - seen)
             position = read(joint.motor_position) + origin
             error = reference.position - position
             if abs(error) > reach:
@@ -144,7 +149,7 @@ class Servo:
                 reference.position = position + error
             wanted = (
                 stiffness * error
-                + damping * (lead * reference.velocity + offsets.velocity - turning * speed)
+                + damping * (lead * reference.velocity + offsets.velocity - seen)
                 + integral
                 + reference.torque
                 + offsets.torque
@@ -153,15 +158,13 @@ class Servo:
             demand = min(max(wanted, lowest, bottom), highest, top)
             if growth and demand == wanted:
                 integral = min(max(integral + growth * error, -windup), windup)
-            actual += gain * (demand - actual)
-            joint.step(actual)
-        self.torque, self.demand, self._integral = actual, demand, integral
+        self.torque, self.demand, self._integral, self._seen_velocity = actual, demand, integral, seen
         self.limited = demand != wanted
         self._heat(steps)
 
     def coast(self, steps: int) -> None:
         """Let the joint move on without current."""
-        self.torque = self.demand = 0.0
+        self.torque = self.demand = self._seen_velocity = 0.0
         self.limited = False
         for _ in range(steps):
             self.joint.coast()

@@ -54,6 +54,7 @@ class Settings:
     gear: float
     rated_torque: float  # 6076h
     gains: dict[Control, Gains]  # 2030h, 2031h
+    velocity_filter_s: float  # 2033h
     current_gain: float  # 2032h: share of the error that one step corrects
     highest_torque: float  # the least of 6072h, 6073h, 60E0h and the peak current 2040h:3
     lowest_torque: float  # with 60E1h
@@ -112,6 +113,7 @@ def read(objects: Objects) -> Settings:
         gear=gear,
         rated_torque=rated_torque,
         gains=_gains(number, rated_torque),
+        velocity_filter_s=number(od.VELOCITY_FILTER) / 1e6,
         current_gain=number(od.CURRENT_GAIN) / 1000.0,
         highest_torque=torque(od.MAX_TORQUE, od.MAX_CURRENT, od.POSITIVE_TORQUE_LIMIT),
         lowest_torque=-torque(od.MAX_TORQUE, od.MAX_CURRENT, od.NEGATIVE_TORQUE_LIMIT),
