@@ -56,6 +56,19 @@ def _seconds(text: str) -> float:
     return value
 
 
+def speed(text: str) -> float | None:
+    """Simulated over real time; `None` for `max`, as fast as it goes."""
+    if text == "max":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.01 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"{text} is no speed: give a number from 0.01 to 100, or max")
+    return value
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms sim",
@@ -70,6 +83,13 @@ def _parser() -> argparse.ArgumentParser:
         "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
     )
     parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds (default: run on)")
+    parser.add_argument(
+        "--speed",
+        type=speed,
+        default=1.0,
+        metavar="N",
+        help="times as fast as real time; max for as fast as it goes (default: 1)",
+    )
     parser.add_argument(
         "--seed",
         type=int,
@@ -86,7 +106,13 @@ def main(argv: list[str]) -> int:
         arguments = _parser().parse_args(argv)
     except SystemExit as leave:
         return 2 if leave.code else 0
-    robot = SimulatedRobot(arguments.dir, Scenario(arguments.scenario), arguments.seed, epoch_s=time.time())
+    robot = SimulatedRobot(
+        arguments.dir,
+        Scenario(arguments.scenario),
+        arguments.seed,
+        speed=arguments.speed,
+        epoch_s=time.time(),
+    )
 
     def end(_signal: int, _frame: FrameType | None) -> None:
         robot.stop()

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -47,6 +48,13 @@ def test_it_runs_as_long_as_it_is_told(tmp_path: Path) -> None:
         assert process.wait(20) == 0
 
 
+def test_as_fast_as_it_goes_is_faster_than_real_time(tmp_path: Path) -> None:
+    began_s = time.monotonic()
+    with sim(tmp_path, "--seconds", "15", "--scenario", "stand", "--speed", "max") as (process, _):
+        assert process.wait(50) == 0
+    assert time.monotonic() - began_s < 15
+
+
 def test_after_kill_9_the_same_folder_has_the_same_port_and_paths(tmp_path: Path) -> None:
     with sim(tmp_path) as (process, _):
         port = hub_port(tmp_path)
@@ -79,6 +87,8 @@ def test_a_second_simulator_in_the_folder_is_refused_in_a_sentence(tmp_path: Pat
         ["--dir", "x", "--scenario", "fly"],
         ["--dir", "x", "--seconds", "-1"],
         ["--dir", "x", "--seed", "y"],
+        ["--dir", "x", "--speed", "0"],
+        ["--dir", "x", "--speed", "fast"],
     ],
 )
 def test_wrong_usage_is_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
