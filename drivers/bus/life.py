@@ -1,12 +1,22 @@
 """What a node tells about itself unasked: boot-up, heartbeat (or answers to node guarding), EMCY."""
 
 from collections import deque
+from collections.abc import Callable
+from typing import Protocol
 
 from drivers.bus.emcy import Emcy, parse_emcy
 from drivers.bus.nmt import NmtState, parse_heartbeat
 
 EMCY_HISTORY = 64
 HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured
+
+
+class LifeListener(Protocol):
+    """Who is told at once what a node says; in the bus's thread: returns at once, never raises."""
+
+    def on_emcy(self, emcy: Emcy) -> None: ...
+
+    def on_boot_up(self, stamp_ns: int) -> None: ...
 
 
 class NodeLife:
@@ -23,6 +33,16 @@ class NodeLife:
         self.heartbeat_ns: int | None = None
         self.timeout_s = configured_timeout_s
         self._configured_timeout_s = configured_timeout_s
+        self._listeners: tuple[LifeListener, ...] = ()
+
+    def subscribe(self, listener: LifeListener) -> Callable[[], None]:
+        """Tell `listener` of each EMCY and boot-up; returns how to end it."""
+        self._listeners = (*self._listeners, listener)
+
+        def unsubscribe() -> None:
+            self._listeners = tuple(known for known in self._listeners if known is not listener)
+
+        return unsubscribe
 
     def reset(self) -> None:
         """Forget what is no longer true; what is counted stays."""
@@ -42,6 +62,8 @@ class NodeLife:
         if state is NmtState.BOOT_UP:
             self.boots += 1
             self.reset()
+            for listener in self._listeners:
+                listener.on_boot_up(stamp_ns)
         else:
             self.heartbeats += 1
         self.heard_ns = self.heartbeat_ns = stamp_ns
@@ -57,6 +79,8 @@ class NodeLife:
         self.heard_ns = stamp_ns
         self.emcy_history.append(emcy)
         self.active_emcy = None if emcy.resets else emcy
+        for listener in self._listeners:
+            listener.on_emcy(emcy)
 
     def silent_ms(self, now_ns: int) -> float | None:
         """Since its last heartbeat, or anything else it said itself; `None` before the first."""

@@ -2,6 +2,8 @@
 
 from enum import IntEnum
 
+HEARTBEAT = 0x700  # plus the node id
+
 
 class NmtState(IntEnum):
     """State in a heartbeat; `BOOT_UP` is sent once after power-on or reset."""

@@ -13,7 +13,7 @@ from typing import Protocol, TypeVar
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
-from drivers.bus.nmt import NmtState
+from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
-HEARTBEAT, EMCY, SDO_REQUEST, SDO_RESPONSE = 0x700, 0x080, 0x600, 0x580
+EMCY, SDO_REQUEST, SDO_RESPONSE = 0x080, 0x600, 0x580
 
 
 class NodeUser(Protocol):

@@ -25,8 +25,8 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     channel: str | int
     bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000)] | None = None
     sync_period_s: Positive | None = None  # master only
-    node_id: NodeId | None = None  # our own, for our heartbeat; master only
-    heartbeat_s: Positive | None = None  # how often we send it
+    node_id: NodeId | None = None  # our own, for our heartbeat
+    heartbeat_s: Positive | None = None  # how often we send it; master only
     more: dict[str, Any] = {}
 
     @classmethod
