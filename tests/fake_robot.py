@@ -71,6 +71,7 @@ class FakeRobot:
             "parameter.read": self._read,
             "parameter.write": self._write,
             "parameter.confirm": self._confirm,
+            "parameter.revert": self._revert,
             "robot.stop": lambda params: {"drives": dict.fromkeys(JOINTS, "confirmed"), "held": True},
         }
 
@@ -363,6 +364,12 @@ class FakeRobot:
         self.parameters.update(self._trial)
         self._trial = {}
         return {}
+
+    def _revert(self, params: Params) -> Params:
+        outcome = dict.fromkeys(self._trial, "taken back")
+        self.parameters.update(self._trial)
+        self._trial = {}
+        return {"write": params["write"], "outcome": outcome}
 
     def _confirm(self, params: Params) -> Params:
         self._trial = {}

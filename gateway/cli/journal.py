@@ -2,6 +2,8 @@
 
 import argparse
 import datetime
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,29 +14,30 @@ from gateway.records.chain import Broken
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
 
-EPILOG = """examples:
-  gwrms journal tail -n 50
-  gwrms journal verify robot.toml           on the robot's own computer; also a records folder, or a copy of
-                                            journal.jsonl with its journal.jsonl.head beside it"""
+VERIFY_EPILOG = """Run it on the robot's own computer, or on a copy of journal.jsonl with journal.jsonl.head
+beside it."""
 
 _SHOWN_APART = ("n", "utc_ns", "monotonic_ns", "boot_id", "who", "what", "previous", "hash")
 
 
+USAGE = "usage: gwrms journal tail [-n N] | gwrms journal verify PATH     (--help after either says more)\n"
+
+
 def main(argv: list[str]) -> int:
     """Run `gwrms journal`."""
-    made = parser("journal", "Who did what to the robot, when, and what came of it.", EPILOG)
-    commands = made.add_subparsers(dest="command", required=True, metavar="tail | verify")
-    tail = commands.add_parser("tail", help="the newest entries, asked of the gateway")
-    tail.add_argument("-n", type=int, default=20, metavar="N", help="how many, at most 1000 (default 20)")
-    verify = commands.add_parser("verify", help="check every entry of a journal's file")
-    verify.add_argument("path", type=Path, help="robot.toml, a records folder, or a journal.jsonl")
-    for one in (tail, verify):  # also behind the subcommand, where people write them
-        one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+    command = COMMANDS.get(argv[0]) if argv else None
+    if command is None:
+        asked = argv[:1] in (["-h"], ["--help"])
+        (sys.stdout if asked else sys.stderr).write(USAGE)
+        return 0 if asked else 2
+    return command(argv[1:])
+
+
+def tail(argv: list[str]) -> int:
+    """Run `gwrms journal tail`."""
+    made = parser("journal tail", "The newest entries: who did what, when, and what came of it.")
+    made.add_argument("-n", type=int, default=20, metavar="N", help="how many, at most 1000 (default 20)")
     arguments = made.parse_args(argv)
-    return _tail(arguments) if arguments.command == "tail" else _verify(arguments)
-
-
-def _tail(arguments: argparse.Namespace) -> int:
     with reach(arguments, "journal") as robot:
         entries = robot.journal(arguments.n).entries
     if arguments.json:
@@ -59,7 +62,16 @@ def _plain(value: object) -> str:
     return str(value)
 
 
-def _verify(arguments: argparse.Namespace) -> int:
+def verify(argv: list[str]) -> int:
+    """Run `gwrms journal verify`."""
+    made = argparse.ArgumentParser(
+        prog="gwrms journal verify",
+        description="Check every entry of a journal's file. Exit status 0: intact; 1: not; 2: not there.",
+        epilog=VERIFY_EPILOG,
+    )
+    made.add_argument("path", type=Path, help="robot.toml, a records folder, or a journal.jsonl")
+    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    arguments = made.parse_args(argv)
     path = _journal(arguments.path)
     try:
         entries = read_verified(path)
@@ -82,3 +94,6 @@ def _journal(path: Path) -> Path:
     if path.is_dir():
         return RecordsFolder(path).journal
     return RecordsFolder(config.load(path).records).journal if path.suffix == ".toml" else path
+
+
+COMMANDS: dict[str, Callable[[list[str]], int]] = {"tail": tail, "verify": verify}

@@ -4,9 +4,10 @@ import select
 import sys
 import time
 
-from gateway.cli.text import exact, say, say_json, warn
-from gateway.client import Robot
+from gateway.cli.text import exact, say, say_json
+from gateway.client import RemoteError, Robot
 from gateway.messages import Written
+from gateway.wire import Kind
 
 LOOK_S = 1.0  # how often the robot is asked whether the trial still stands
 
@@ -21,10 +22,29 @@ def wait_for_decision(robot: Robot, written: Written, *, json: bool) -> int:
         kept = _wait(robot, written.write, ends, countdown=interactive)
     except KeyboardInterrupt:
         kept = False
-    if kept:
-        robot.confirm(written.write)
-    _tell(written, kept=kept, json=json)
+    said = _keep(robot, written) if kept else _take_back(robot, written)
+    if json:
+        say_json({"write": written.write, "kept": kept, "result": said})
+    else:
+        say(f"{said}\n")
     return 0 if kept else 1
+
+
+def _keep(robot: Robot, written: Written) -> str:
+    values = robot.confirm(written.write).values
+    return "kept: " + ", ".join(f"{name} = {exact(value)}" for name, value in values.items())
+
+
+def _take_back(robot: Robot, written: Written) -> str:
+    """Ask for it, so that it is confirmed; the robot may have come first."""
+    try:
+        outcome = robot.revert(written.write).outcome
+    except RemoteError as error:
+        if error.kind != Kind.UNKNOWN_NAME:
+            raise
+        return str(error)
+    before = written.before
+    return "; ".join(f"{name} = {exact(before.get(name))}: {what}" for name, what in outcome.items())
 
 
 def _wait(robot: Robot, write: int, ends: float, *, countdown: bool) -> bool:
@@ -32,23 +52,12 @@ def _wait(robot: Robot, write: int, ends: float, *, countdown: bool) -> bool:
     asking = [sys.stdin]
     while (left := ends - time.monotonic()) > 0:
         if countdown:
-            say(f"\r{left:4.0f} s left ")
+            say(f"\r{left:4.0f} s left \r")
         ready, _, _ = select.select(asking, [], [], min(LOOK_S, left))
         if ready:
             if sys.stdin.readline():
                 return True
             asking = []  # standard input has ended: nobody is there to keep it
         elif all(trial.write != write for trial in robot.describe().trials):
-            warn("set", "the robot has ended the trial by itself; gwrms journal tail says why")
-            return False
+            return False  # the robot has ended it
     return False
-
-
-def _tell(written: Written, *, kept: bool, json: bool) -> None:
-    if json:
-        say_json({"write": written.write, "kept": kept})
-    elif kept:
-        say("kept\n")
-    else:
-        values = ", ".join(f"{name} = {exact(value)}" for name, value in written.before.items())
-        say(f"\ntaken back: {values}\n")

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.main import main
 from gateway.records.journal import Journal
-from tests.fake_robot import FakeRobot
+from tests.fake_robot import FakeRobot, Refusal
 
 
 @pytest.fixture
@@ -45,16 +45,26 @@ def test_a_trial_that_nobody_keeps_is_taken_back(
     typed.close()
     assert main(["set", "--trial", "0.3", "gait.step_length=0.42", "--robot", robot.address]) == 1
     assert robot.called("parameter.confirm") == []
-    assert len(robot.called("control.release")) == 1  # which takes it back
-    assert "taken back: gait.step_length = 0.4" in capsys.readouterr().out
+    assert len(robot.called("parameter.revert")) == 1
+    assert "gait.step_length = 0.4: taken back" in capsys.readouterr().out
 
 
 def test_a_trial_that_the_robot_has_ended_is_said(
     robot: FakeRobot, typed: io.TextIOWrapper, capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot.overrides["robot.describe"] = lambda _params: robot.describe() | {"trials": []}
+    robot.overrides["parameter.revert"] = _ended
     assert main(["set", "--trial", "30", "gait.step_length=0.42", "--robot", robot.address]) == 1
-    assert "ended the trial by itself" in capsys.readouterr().err
+    assert "taken back: the guard" in capsys.readouterr().out
+
+
+def _ended(_params: object) -> object:
+    raise Refusal(-32001, "write 1 is not on trial: it was taken back: the guard", kind="unknown_name")
+
+
+def test_a_journal_command_that_is_none_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["journal", "tial"]) == 2
+    assert "gwrms journal tail" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "301", "nan", "soon"])
@@ -67,9 +77,9 @@ def test_an_absurd_time_is_refused(seconds: str, capsys: pytest.CaptureFixture[s
 def test_the_journals_tail_is_a_table_or_lines(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
     entry = {"n": 3, "utc_ns": 1_700_000_000_000_000_000, "who": "gwrms set", "what": "write done"}
     robot.overrides["journal.tail"] = lambda params: {"entries": [entry | {"after": {"a.b": params["n"]}}]}
-    assert main(["journal", "--robot", robot.address, "tail", "-n", "7"]) == 0
+    assert main(["journal", "tail", "-n", "7", "--robot", robot.address]) == 0
     assert "3  2023-11-14 22:13:20.000  gwrms set  write done  after=a.b: 7" in capsys.readouterr().out
-    assert main(["journal", "--robot", robot.address, "tail", "--json"]) == 0
+    assert main(["journal", "tail", "--json", "--robot", robot.address]) == 0
     assert '"after":{"a.b":20}' in capsys.readouterr().out
 
 
