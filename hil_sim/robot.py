@@ -9,9 +9,12 @@ from typing import Self
 from hil_sim import robot_file
 from hil_sim.bus.hub import Hub
 from hil_sim.bus.virtual import VirtualBridge
+from hil_sim.control_socket import ControlSocket
 from hil_sim.exoskeleton import Exoskeleton, Scenario
+from hil_sim.faults.injector import Faults
 from hil_sim.folder import Folder
 from hil_sim.loop import Loop
+from hil_sim.operator import Operator
 from hil_sim.sensors.serial_port import SerialPort
 
 
@@ -22,7 +25,8 @@ class SimulatedRobot:
             bus = can.Bus(interface="virtual", channel="bench")
 
     With `virtual_channel` the bus is reached in the same process, otherwise through the hub on `port`.
-    `speed` is simulated over real time, `None` as fast as it goes.
+    `speed` is simulated over real time, `None` as fast as it goes. `faults` and `operator` belong to the
+    thread that runs it; others use the control socket in the folder.
 
     Raises `hil_sim.errors.SimulatorError` where the folder or the port is taken.
     """
@@ -38,6 +42,8 @@ class SimulatedRobot:
     ) -> None:
         self.exoskeleton = Exoskeleton(scenario, seed)
         self.folder = Folder(folder)
+        self.faults = Faults(self.exoskeleton, self.folder.path, seed)
+        self.operator = Operator(self.exoskeleton, self.faults)
         self.port: int | None = None
         self.config_is_ours = True
         self._virtual_channel = virtual_channel
@@ -53,6 +59,13 @@ class SimulatedRobot:
         """robot.toml, ready for a gateway (with a virtual channel: for one in this process)."""
         return self.folder.config
 
+    @property
+    def loop(self) -> Loop:
+        """What runs it, between `open` and `close`."""
+        if self._loop is None:
+            raise RuntimeError("open() comes first")
+        return self._loop
+
     def open(self) -> None:
         """Open every door and switch the robot on; all or nothing."""
         with ExitStack() as closing:
@@ -62,6 +75,8 @@ class SimulatedRobot:
             closing.callback(loop.close)
             self._open_bus(loop, closing)
             self._open_sensors(closing)
+            closing.callback(ControlSocket(loop, self.folder.path, self.operator.obey).close)
+            closing.callback(self.faults.clear)
             self.exoskeleton.power_on()
             self._closing = closing.pop_all()
             self._loop = loop
@@ -84,11 +99,10 @@ class SimulatedRobot:
 
     def run(self, seconds: float | None = None) -> None:
         """Run in this thread until `stop`, or for so many simulated seconds."""
-        if self._loop is None:
-            raise RuntimeError("open() comes before run()")
+        loop = self.loop
         end_ns = None if seconds is None else self.exoskeleton.clock.now_ns + round(seconds * 1e9)
         if not self._stopping:
-            self._loop.run(end_ns)
+            loop.run(end_ns)
 
     def stop(self) -> None:
         """End `run` soon, or before it began; from any thread or signal handler."""

@@ -1,0 +1,104 @@
+"""Faults of the bus as a whole: losses, error frames, load, the gateway's own cable."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from hil_sim.bus.can_bus import CanBus, Disturbance, Frame
+from hil_sim.clock import MILLISECOND_NS, SECOND_NS
+from hil_sim.faults.fault import Fault, Form, Number, Site, Target
+from hil_sim.faults.frames import disturbed_by
+from hil_sim.node.node import Node
+
+_LOAD_TICK_NS = MILLISECOND_NS
+
+
+class _Loss(Disturbance):
+    def __init__(self, site: Site) -> None:
+        self._share = site.number("percent") / 100.0
+        self._random = site.random
+
+    def arrives(self, _frame: Frame, _sender: object, _receiver: object, /) -> bool:
+        return self._random.random() >= self._share
+
+
+class _Errors(Disturbance):
+    def __init__(self, site: Site) -> None:
+        self._share = site.number("percent") / 100.0
+        self._random = site.random
+
+    def survives(self, _frame: Frame, _sender: object, /) -> bool:
+        return self._random.random() >= self._share
+
+
+class _Cut(Disturbance):
+    """Only the robot's own devices hear each other."""
+
+    def __init__(self, _site: Site) -> None:
+        pass
+
+    def arrives(self, _frame: Frame, sender: object, receiver: object, /) -> bool:
+        return isinstance(sender, Node) and isinstance(receiver, Node)
+
+
+class _Load:
+    """A participant that fills the bus up to a share of its time, whatever the others leave of it."""
+
+    def __init__(self, bus: CanBus, share: float, cob_id: int) -> None:
+        self._bus = bus
+        self._share = share
+        self._frame = Frame(cob_id, bytes(8))
+        self._frame_ns = self._frame.bits() * SECOND_NS / bus.bitrate
+        self._began_ns, self._busy_ns = bus.clock.now_ns, bus.busy_ns
+        self._sent = 0
+        self._own = 0
+
+    def fill(self) -> None:
+        """Send what is missing until the next tick, with what waits anyway counted."""
+        bus = self._bus
+        end_ns = bus.clock.now_ns - self._began_ns + _LOAD_TICK_NS
+        missing_ns = self._share * end_ns - (bus.busy_ns - self._busy_ns) - bus.pending * self._frame_ns
+        for _ in range(math.ceil(missing_ns / self._frame_ns)):
+            bus.send(self._frame, self)
+
+
+@contextmanager
+def _load(site: Site) -> Iterator[None]:
+    bus = site.robot.bus
+    load = _Load(bus, site.number("percent") / 100.0, site.whole("cob_id"))
+    filling = bus.clock.every(_LOAD_TICK_NS, load.fill)
+    yield
+    filling.cancel()
+    bus.withdraw(load)
+
+
+FAULTS = {
+    "frame_loss": Fault(
+        Target.BUS,
+        disturbed_by(_Loss),
+        "Each receiver misses a share of the frames, each another: counters jump, SDO answers stay away.",
+        {"percent": Number(5.0, 0.0, 100.0, "%", "share of the frames that a receiver misses")},
+    ),
+    "error_frames": Fault(
+        Target.BUS,
+        disturbed_by(_Errors),
+        "Error frames; each frame that one has destroyed is sent again and comes late, and none is missing.",
+        {"percent": Number(10.0, 0.0, 90.0, "%", "share of the attempts to send that fail")},
+    ),
+    "bus_load": Fault(
+        Target.BUS,
+        _load,
+        "Frames of one identifier fill the bus; what has a higher identifier comes late, at 100 % never.",
+        {
+            "percent": Number(90.0, 1.0, 100.0, "%", "of the bus's time, the robot's own frames included"),
+            "cob_id": Number(
+                0x7FF, 0x001, 0x7FF, "", "identifier: the lower, the more it holds up", Form.CODE
+            ),
+        },
+    ),
+    "bus_cut": Fault(
+        Target.BUS,
+        disturbed_by(_Cut),
+        "The gateway's cable is out: no frame comes, none is answered, and the robot walks on.",
+    ),
+}

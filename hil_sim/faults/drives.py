@@ -1,0 +1,117 @@
+"""Faults of one joint drive: electronics, encoder, gear, bearing."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from hil_sim.clock import MILLISECOND_NS
+from hil_sim.faults.fault import Fault, Number, Site, Target
+
+_CONTINUOUS_OVER_CURRENT = 0x2310  # error code of CiA 402-2 table 17
+_HEATING_TICK_NS = 100 * MILLISECOND_NS
+
+
+@contextmanager
+def _overcurrent(site: Site) -> Iterator[None]:
+    site.drive.fault(_CONTINUOUS_OVER_CURRENT)
+    yield
+
+
+@contextmanager
+def _overtemperature(site: Site) -> Iterator[None]:
+    drive = site.drive
+    step_c = site.number("rate_c_per_s") * _HEATING_TICK_NS / 1e9
+
+    def heat() -> None:
+        drive.temperature_c = min(drive.temperature_c + step_c, max(site.number("to_c"), drive.temperature_c))
+
+    heating = site.robot.clock.every(_HEATING_TICK_NS, heat)
+    yield
+    heating.cancel()
+
+
+@contextmanager
+def _undervoltage(site: Site) -> Iterator[None]:
+    before, site.drive.supply_v = site.drive.supply_v, site.number("volts")
+    yield
+    site.drive.supply_v = before
+
+
+@contextmanager
+def _encoder_jump(site: Site) -> Iterator[None]:
+    counts = round(math.radians(site.number("degrees")) * site.drive.counts_per_radian)
+    site.drive.encoder.offset_counts += counts
+    yield
+    site.drive.encoder.offset_counts -= counts
+
+
+@contextmanager
+def _encoder_stuck(site: Site) -> Iterator[None]:
+    site.drive.encoder.stuck = True
+    yield
+    site.drive.encoder.stuck = False
+
+
+@contextmanager
+def _gear_slip(site: Site) -> Iterator[None]:
+    site.drive.joint.slip(math.radians(site.number("degrees")))
+    yield
+
+
+@contextmanager
+def _friction(site: Site) -> Iterator[None]:
+    joint, factor = site.drive.joint, site.number("factor")
+    joint.friction_factor *= factor
+    yield
+    joint.friction_factor /= factor
+
+
+_DEGREES = Number(5.0, -60.0, 60.0, "°", "how far, seen at the joint")
+
+FAULTS = {
+    "overcurrent": Fault(
+        Target.DRIVE,
+        _overcurrent,
+        "EMCY 2310h with bit 1 of 1001h, 603Fh = 2310h; the state is fault reaction active, then fault.",
+        momentary=True,
+    ),
+    "overtemperature": Fault(
+        Target.DRIVE,
+        _overtemperature,
+        "The motor's temperature rises; above 100 °C EMCY 4310h with bit 3 of 1001h, and the state fault.",
+        {
+            "to_c": Number(110.0, 30.0, 150.0, "°C", "where the motor ends"),
+            "rate_c_per_s": Number(20.0, 0.1, 1000.0, "°C/s", "how fast it gets hotter"),
+        },
+    ),
+    "undervoltage": Fault(
+        Target.DRIVE,
+        _undervoltage,
+        "Below 36 V an enabled drive sends EMCY 3220h with bit 2 of 1001h and goes to fault.",
+        {"volts": Number(30.0, 0.0, 60.0, "V", "of the DC link")},
+    ),
+    "encoder_jump": Fault(
+        Target.DRIVE,
+        _encoder_jump,
+        "6064h jumps from one PDO to the next, faster than a joint moves; the drive then moves it back.",
+        {"degrees": _DEGREES},
+    ),
+    "encoder_stuck": Fault(
+        Target.DRIVE,
+        _encoder_stuck,
+        "6064h stays the same to the count while 6062h moves on, until EMCY 8611h and fault.",
+    ),
+    "gear_slip": Fault(
+        Target.DRIVE,
+        _gear_slip,
+        "6064h shows nothing: the joint itself is off by the angle, until somebody homes it anew.",
+        {"degrees": _DEGREES},
+        momentary=True,
+    ),
+    "following_error": Fault(
+        Target.DRIVE,
+        _friction,
+        "The joint is all but jammed: 60F4h and torque grow, statusword bit 13, then EMCY 8611h and fault.",
+        {"factor": Number(60.0, 1.0, 1000.0, "", "how many times its friction")},
+    ),
+}

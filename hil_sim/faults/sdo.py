@@ -1,0 +1,107 @@
+"""Faults of one device's SDO server: answers that come twice, late, never, or as an abort."""
+
+from hil_sim.bus.can_bus import Disturbance, Frame
+from hil_sim.clock import MILLISECOND_NS
+from hil_sim.faults.fault import Fault, Form, Number, Site, Target
+from hil_sim.faults.frames import disturbed_by
+from hil_sim.node.nmt import COMMUNICATING
+from hil_sim.node.node import SDO_SERVERS, Node
+
+_COB_ID, _INVALID = 0x7FF, 1 << 31
+_DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6  # client command specifiers that begin a write (CiA 301 §7.2.4.3)
+_BLOCK_SUBCOMMAND = 1
+
+
+def sdo_channels(node: Node) -> dict[int, int]:
+    """The device's SDO servers as its objects 1200h … say: request to response identifier."""
+    found = {}
+    for index in node.dictionary.indices(*SDO_SERVERS):
+        request, response = (node.dictionary[index, number].number() for number in (1, 2))
+        if not (request | response) & _INVALID:
+            found[request & _COB_ID] = response & _COB_ID
+    return found
+
+
+class _Answers(Disturbance):
+    """What happens to the answers of one node's SDO servers; this one swallows them."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self._node = site.node
+        self._responses = frozenset(sdo_channels(site.node).values())
+
+    def leaves(self, frame: Frame, sender: object, /) -> bool:
+        return sender is not self._node or frame.cob_id not in self._responses or self._answer(frame)
+
+    def _answer(self, frame: Frame) -> bool:  # noqa: ARG002 - what the others look at
+        return False
+
+    def _queue(self, frame: Frame) -> None:
+        if self._node.powered:
+            self._site.robot.bus.queue(frame, self._node)
+
+
+class _Twice(_Answers):
+    def _answer(self, frame: Frame) -> bool:
+        self._queue(frame)
+        return True
+
+
+class _Late(_Answers):
+    def _answer(self, frame: Frame) -> bool:
+        delay_ns = round(self._site.number("delay_ms") * MILLISECOND_NS)
+        self._site.robot.clock.after(delay_ns, lambda: self._queue(frame))
+        return False
+
+
+class _Abort(Disturbance):
+    """Refuses writes by their number, as a device does whose application says no."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self._node = site.node
+        self._channels = sdo_channels(site.node)
+        self._writes = 0
+
+    def arrives(self, frame: Frame, _sender: object, receiver: object, /) -> bool:
+        if receiver is not self._node or not self._begins_write(frame):
+            return True
+        self._writes += 1
+        if self._writes != self._site.whole("nth"):
+            return True
+        abort = b"\x80" + frame.data[1:4] + self._site.whole("code").to_bytes(4, "little")
+        self._site.robot.bus.send(Frame(self._channels[frame.cob_id], abort), self._node)
+        return False
+
+    def _begins_write(self, frame: Frame) -> bool:
+        if (
+            frame.cob_id not in self._channels
+            or len(frame.data) != 8
+            or self._node.state not in COMMUNICATING
+        ):
+            return False
+        command = frame.data[0] >> 5
+        return command == _DOWNLOAD or (command == _BLOCK_DOWNLOAD and not frame.data[0] & _BLOCK_SUBCOMMAND)
+
+
+FAULTS = {
+    "sdo_duplicate": Fault(Target.NODE, disturbed_by(_Twice), "Each SDO answer of the node comes twice."),
+    "sdo_late": Fault(
+        Target.NODE,
+        disturbed_by(_Late),
+        "Each SDO answer comes, but late: perhaps when the next request is already under way.",
+        {"delay_ms": Number(800.0, 1.0, 60_000.0, "ms", "how much later")},
+    ),
+    "sdo_silent": Fault(
+        Target.NODE, disturbed_by(_Answers), "No SDO answer, while heartbeat and PDOs of the node come."
+    ),
+    "sdo_abort": Fault(
+        Target.NODE,
+        disturbed_by(_Abort),
+        "The n-th write is answered with an abort and not carried out; those before and after it work.",
+        {
+            "nth": Number(1, 1, 10_000, "", "which write, counted from the fault's beginning", Form.WHOLE),
+            "code": Number(0x0800_0020, 0x0503_0000, 0x0FFF_FFFF, "", "SDO abort code", Form.CODE),
+        },
+    ),
+}
