@@ -233,6 +233,7 @@ class JointDrive(Node):
         elif state is PowerState.FAULT_REACTION_ACTIVE:
             possible = before in ENERGISED and self._error_code not in supervision.CURRENT_GONE
             self._stop(options.ramp(self.objects, od.FAULT_REACTION_OPTION) if possible else Ramp.OFF)
+        self._show_changes()
 
     def _stop(self, ramp: Ramp) -> None:
         if ramp is Ramp.OFF:

@@ -36,8 +36,8 @@ def test_expedited_transfer(booted: Bench, request_: str, response: str) -> None
         ("23 72 60 00 01 00 00 00", "80 72 60 00 12 00 07 06"),  # too long
         ("2B 72 60 00 C5 09 00 00", "80 72 60 00 31 00 09 06"),  # 2501 per mille: too high
         ("23 81 60 00 E7 03 00 00", "80 81 60 00 32 00 09 06"),  # 999 counts/s: too low
-        ("2F 60 60 00 03 00 00 00", "80 60 60 00 30 00 09 06"),  # a mode that the drive has not
-        ("2B 5A 60 00 03 00 00 00", "80 5A 60 00 30 00 09 06"),  # an option that the drive has not
+        ("2F 60 60 00 02 00 00 00", "80 60 60 00 30 00 09 06"),  # a mode that the drive has not
+        ("2B 5A 60 00 04 00 00 00", "80 5A 60 00 30 00 09 06"),  # an option that the drive has not
         ("E0 00 10 00 00 00 00 00", "80 00 10 00 01 00 04 05"),  # no such command
         ("60 00 00 00 00 00 00 00", "80 00 00 00 01 00 04 05"),  # a segment of no transfer
     ],
