@@ -24,7 +24,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
-    "sim": ("hil_sim.cli.sim:main", "the simulated robot, ready for a gateway"),
+    "sim": ("hil_sim.cli.sim:main", "the simulated robot, ready for a gateway; runs scenario files"),
+    "sim-fault": ("hil_sim.cli.fault:main", "break something in a simulated robot that runs"),
 }
 
 OUR_PACKAGES = frozenset({"gateway", "drivers", "eds", "server_gui", "ml", "hil_sim"})

@@ -9,8 +9,12 @@ import time
 from pathlib import Path
 from types import FrameType
 
+from hil_sim.cli import run
+from hil_sim.cli.arguments import speed
 from hil_sim.exoskeleton import Scenario
 from hil_sim.robot import SimulatedRobot
+from hil_sim.scenario.runner import schedule
+from hil_sim.scenario.script import Script, load
 
 _DESCRIPTION = """\
 A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen
@@ -22,6 +26,7 @@ _EPILOG = """\
 what is in DIR
   robot.toml       the robot, described for a gateway, every line explained. Written once; edit it as you
                    like, delete it to have it written anew
+  control          socket for faults while it runs: gwrms sim-fault --dir DIR …
   left_insole, right_insole, trunk
                    links to the sensors' pseudo-terminals (230400, 230400, 115200 baud)
   hub.port         TCP port of the bus: python-can's "socketcand" interface at 127.0.0.1, channel "sim"
@@ -38,6 +43,11 @@ the drives
   Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
   bus. It keeps commanding "enable operation" until a drive leaves that state. Then it stops all drives and
   waits for 1 in its object 2000h.
+
+scenario files
+  gwrms sim run FILE        runs it against a gateway and checks what it expects (--help says more)
+  gwrms sim --script FILE   only lets happen what it says, for a gateway of your own
+  Those in the folder scenarios/ are examples.
 
 output
   One line when the robot can be used: {"ready": true, "config": "DIR/robot.toml"}
@@ -56,19 +66,6 @@ def _seconds(text: str) -> float:
     return value
 
 
-def speed(text: str) -> float | None:
-    """Simulated over real time; `None` for `max`, as fast as it goes."""
-    if text == "max":
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.01 <= value <= 100.0:
-        raise argparse.ArgumentTypeError(f"{text} is no speed: give a number from 0.01 to 100, or max")
-    return value
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms sim",
@@ -79,9 +76,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; made if needed"
     )
-    parser.add_argument(
-        "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
-    )
+    parser.add_argument("--scenario", choices=[str(scenario) for scenario in Scenario], help="default: walk")
+    parser.add_argument("--script", type=Path, metavar="FILE", help="a scenario file: what happens, and when")
     parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds (default: run on)")
     parser.add_argument(
         "--speed",
@@ -93,23 +89,25 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seed",
         type=int,
-        default=0,
         metavar="S",
-        help="of the sensors' noise; same seed, same bytes (default: 0)",
+        help="of noise and losses; same seed, same bytes (default: 0)",
     )
     return parser
 
 
 def main(argv: list[str]) -> int:
     """Run the simulator; returns the exit code."""
+    if argv[:1] == ["run"]:
+        return run.main(argv[1:])
     try:
         arguments = _parser().parse_args(argv)
     except SystemExit as leave:
         return 2 if leave.code else 0
+    script = Script() if arguments.script is None else load(arguments.script)
     robot = SimulatedRobot(
         arguments.dir,
-        Scenario(arguments.scenario),
-        arguments.seed,
+        script.activity if arguments.scenario is None else Scenario(arguments.scenario),
+        script.seed if arguments.seed is None else arguments.seed,
         speed=arguments.speed,
         epoch_s=time.time(),
     )
@@ -120,6 +118,7 @@ def main(argv: list[str]) -> int:
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         robot.open()
+        schedule(script.lines, robot)
         if not robot.config_is_ours:
             sys.stderr.write(f"gwrms sim: kept {robot.config} as it is; delete it to have it written anew\n")
         sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")

@@ -5,15 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from hil_sim.clock import MILLISECOND_NS
+from hil_sim.drive.supervision import OVERCURRENT
 from hil_sim.faults.fault import Fault, Number, Site, Target
 
-_CONTINUOUS_OVER_CURRENT = 0x2310  # error code of CiA 402-2 table 17
 _HEATING_TICK_NS = 100 * MILLISECOND_NS
 
 
 @contextmanager
 def _overcurrent(site: Site) -> Iterator[None]:
-    site.drive.fault(_CONTINUOUS_OVER_CURRENT)
+    site.drive.fault(OVERCURRENT)
     yield
 
 

@@ -1,0 +1,139 @@
+"""`gwrms sim-fault`: break something in a simulated robot that runs, and mend it again."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from hil_sim.control_socket import ask
+from hil_sim.faults.fault import Target
+from hil_sim.faults.registry import FAULTS
+
+_DESCRIPTION = """\
+Makes a fault in the robot of a running `gwrms sim --dir DIR`, or ends it. Without --for it stays until it is
+cleared. --list explains every fault and its parameters.
+"""
+
+_EPILOG = """\
+examples
+  gwrms sim-fault --list
+  gwrms sim-fault --dir /tmp/robot node_lost --on left_knee --for 5
+  gwrms sim-fault --dir /tmp/robot bus_load percent=100 cob_id=0x100
+  gwrms sim-fault --dir /tmp/robot --active
+  gwrms sim-fault --dir /tmp/robot --clear bus_load
+  gwrms sim-fault --dir /tmp/robot --clear all
+  gwrms sim-fault --dir /tmp/robot --activity sit
+  gwrms sim-fault --dir /tmp/robot --controller start     after a stop or a fault has made it wait
+
+by program
+  The socket DIR/control takes a line of JSON and answers with one: {"fault": "node_lost", "on": "left_knee",
+  "for_s": 5}, {"fault": "bus_load", "params": {"percent": 100}}, {"clear": "all"}, {"activity": "sit"},
+  {"controller": "start"}, {"list": true}
+
+exit codes: 0 done; 1 refused, or no simulator runs in DIR; 2 wrong usage
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms sim-fault",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--dir", type=Path, metavar="DIR", help="folder of the simulator")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="the fault")
+    parser.add_argument("params", nargs="*", metavar="KEY=VALUE", help="its parameters")
+    parser.add_argument("--on", metavar="DEVICE", help="the device, where there is more than one")
+    parser.add_argument(
+        "--for", dest="for_s", type=float, metavar="S", help="end it after S simulated seconds"
+    )
+    others = parser.add_mutually_exclusive_group()
+    others.add_argument("--list", action="store_true", help="explain every fault")
+    others.add_argument("--active", action="store_true", help="show what is on")
+    others.add_argument("--clear", metavar="NAME", help="end a fault, or all")
+    others.add_argument("--activity", metavar="WHAT", help="what the wearer does from now on")
+    others.add_argument("--controller", metavar="WHAT", help="start or stop the gait controller")
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """Ask the simulator; returns the exit code."""
+    parser = _parser()
+    try:
+        arguments = parser.parse_intermixed_args(argv)
+        if arguments.list:
+            sys.stdout.write(explained())
+            return 0
+        request = _request(parser, arguments)
+    except SystemExit as leave:
+        return 2 if leave.code else 0
+    sys.stdout.write(_told(ask(arguments.dir, request)))
+    return 0
+
+
+def _request(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> dict[str, Any]:
+    """What is meant, as the socket takes it; leaves with the usage where nothing is."""
+    if arguments.dir is None:
+        parser.error("--dir DIR says which simulator")
+    given: dict[str, Any] = {
+        "fault": arguments.name,
+        "clear": arguments.clear,
+        "activity": arguments.activity,
+        "controller": arguments.controller,
+        "list": arguments.active or None,
+        "on": arguments.on,
+        "for_s": arguments.for_s,
+        "params": _params(parser, arguments.params) or None,
+    }
+    if not any(given[verb] for verb in ("fault", "clear", "activity", "controller", "list")):
+        parser.error("name a fault, or say --list, --active, --clear, --activity or --controller")
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _params(parser: argparse.ArgumentParser, words: list[str]) -> dict[str, str]:
+    params = {}
+    for word in words:
+        key, equals, params[key] = word.partition("=")
+        if not equals:
+            parser.error(f"{word!r} is no parameter: write KEY=VALUE")
+    return params
+
+
+def _told(answer: dict[str, Any]) -> str:
+    """An answer in words."""
+    if "begun" in answer:
+        return f"begun: {_active(answer['begun'])}\n"
+    for key in ("cleared", "active"):
+        if key in answer:
+            lines = [_active(one) for one in answer[key]] or [
+                f"nothing was {key}" if key == "cleared" else "nothing is on"
+            ]
+            return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{key}: {value}\n" for key, value in answer.items())
+
+
+def _active(one: dict[str, Any]) -> str:
+    parameters = FAULTS[one["name"]].parameters
+    values = "".join(f", {key} {parameters[key].show(value)}" for key, value in one["values"].items())
+    until = "until it is cleared" if one["until_s"] is None else f"to {one['until_s']:.1f} s"
+    return f"{one['name']} on {one['on']} from {one['since_s']:.1f} s {until}{values}"
+
+
+def explained() -> str:
+    """Every fault by what it can be on: what it looks like, and its parameters with their defaults."""
+    return "\n".join(text for target in Target for text in (_heading(target), *_explained(target)))
+
+
+def _heading(target: Target) -> str:
+    return f"-- on {' or '.join((', '.join(target.value[:-1]), target.value[-1])).removeprefix(' or ')}\n"
+
+
+def _explained(target: Target) -> Iterator[str]:
+    for name, fault in FAULTS.items():
+        if fault.on is target:
+            lines = [name + " (at once, no duration)" * fault.momentary, f"    {fault.looks}"]
+            for key, parameter in fault.parameters.items():
+                lines.append(f"    {key}={parameter.show(parameter.default)}: {parameter.what}")
+            yield "\n".join(lines) + "\n"

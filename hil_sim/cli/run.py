@@ -1,0 +1,72 @@
+"""`gwrms sim run`: scenario files as tests."""
+
+import argparse
+import sys
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+
+from hil_sim.cli.arguments import speed
+from hil_sim.scenario import report
+from hil_sim.scenario.runner import run
+from hil_sim.scenario.script import load
+from hil_sim.scenario.table import ScenarioError
+
+_DESCRIPTION = """\
+Runs scenario files: each with a simulated robot and a gateway of its own, as a process. What the files say
+happens to the robot, and what they expect of the gateway and of the robot is checked at the end.
+"""
+
+_EPILOG = """\
+exit codes: 0 all that was expected is so; 1 something is not, or it could not be run; 2 wrong usage, or a
+file that is no scenario. docs/bench.md tells how to write one; those in scenarios/ are examples.
+
+example
+  gwrms sim run scenarios/node_lost.toml
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms sim run",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="a scenario")
+    parser.add_argument(
+        "--dir",
+        type=Path,
+        metavar="DIR",
+        help="folder of the robot, and of gateway.log (default: one for now)",
+    )
+    parser.add_argument(
+        "--speed",
+        type=speed,
+        default=1.0,
+        metavar="N",
+        help="of the robot; the gateway's own patience stays in real time (default: 1)",
+    )
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """Run every file; returns the exit code."""
+    try:
+        arguments = _parser().parse_args(argv)
+    except SystemExit as leave:
+        return 2 if leave.code else 0
+    try:
+        scripts = [load(file) for file in arguments.files]
+    except ScenarioError as error:
+        sys.stderr.write(f"gwrms sim run: {error}\n")
+        return 2
+    failed = False
+    for script in scripts:
+        with ExitStack() as stack:
+            folder = arguments.dir or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gwrms-")))
+            outcome = run(script, folder, arguments.speed)
+        sys.stdout.write(report.text(script, outcome))
+        sys.stdout.flush()
+        failed = failed or not outcome.ok
+    return 1 if failed else 0

@@ -1,0 +1,83 @@
+"""An `[[expect]]` of a scenario file becomes expectations."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+from hil_sim.scenario.expectation import Condition, Expectation, Seen, Timing, Track, When
+from hil_sim.scenario.table import Table
+
+_TIMINGS = {when.value: when for when in When}
+# subject → the conditions that may be asked of it
+_SUBJECTS = {
+    "component": ("state", "problem"),
+    "channel": ("min", "max", "is", "missing"),
+    "truth": ("min", "max", "is"),
+    "answer": ("is",),
+}
+
+
+def read(table: Table) -> list[Expectation]:
+    """The expectations of one table; raises `ScenarioError`."""
+    subject = table.one_of(_SUBJECTS)
+    table.only({subject, *_SUBJECTS[subject], *_TIMINGS})
+    glob, timing = table.text(subject), _timing(table)
+    found = [
+        Expectation(Track.PROBLEM if key == "problem" else Track(subject), glob, condition, timing)
+        for key, condition in _conditions(table, _SUBJECTS[subject])
+    ]
+    if not found:
+        raise table.fail(f"say what is expected of {glob} with {', '.join(_SUBJECTS[subject])}")
+    return found
+
+
+def _timing(table: Table) -> Timing:
+    key = table.one_of(_TIMINGS)
+    when = _TIMINGS[key]
+    begin_s, end_s = (table.seconds(key), math.inf) if when is When.AT else table.window(key)
+    return Timing(when, begin_s, end_s)
+
+
+def _conditions(table: Table, keys: tuple[str, ...]) -> Iterator[tuple[str, Condition]]:
+    """What a table asks for; `min` and `max` are one condition."""
+    given = [key for key in keys if key in table and not (key == "max" and "min" in table)]
+    for key in given:
+        yield key, _CONDITIONS[key](table, key)
+
+
+def _is(table: Table, key: str) -> Condition:
+    wanted = table.text(key)
+    return Condition(f"is {wanted!r}", lambda seen: seen == wanted)
+
+
+def _contains(table: Table, key: str) -> Condition:
+    wanted = table.text(key)
+    if not wanted:
+        return Condition("is nothing", lambda seen: seen == "")
+    return Condition(f"says {wanted!r}", lambda seen: isinstance(seen, str) and wanted in seen)
+
+
+def _in_range(table: Table, _key: str) -> Condition:
+    low = table.number("min") if "min" in table else -math.inf
+    high = table.number("max") if "max" in table else math.inf
+    words = [f"at least {low:g}"] * ("min" in table) + [f"at most {high:g}"] * ("max" in table)
+
+    def holds(seen: Seen) -> bool:
+        return isinstance(seen, float) and low <= seen <= high
+
+    return Condition(" and ".join(words), holds)
+
+
+def _missing(table: Table, key: str) -> Condition:
+    if table.flag(key):
+        return Condition("is missing", lambda seen: seen is None)
+    return Condition("has a value", lambda seen: seen is not None)
+
+
+_CONDITIONS: Mapping[str, Callable[[Table, str], Condition]] = {
+    "state": _is,
+    "problem": _contains,
+    "is": _is,
+    "min": _in_range,
+    "max": _in_range,
+    "missing": _missing,
+}
