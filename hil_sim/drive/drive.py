@@ -13,7 +13,8 @@ from hil_sim.drive.modes.homing import METHODS, NO_METHOD
 from hil_sim.drive.modes.mode import BIT_13, TARGET_REACHED, Mode, ModeNumber
 from hil_sim.drive.objects import Objects
 from hil_sim.drive.options import Ramp
-from hil_sim.drive.power_state import ENERGISED, LIVE, Command, PowerState, after, command_of
+from hil_sim.drive.power import Power
+from hil_sim.drive.power_state import LIVE, Command, PowerState, command_of
 from hil_sim.drive.servo import Servo
 from hil_sim.drive.settings import Parameters
 from hil_sim.node.abort import AbortCode, SdoAbort
@@ -23,9 +24,6 @@ from hil_sim.node.node import Node
 
 STEP_NS = round(STEP_S * 1e9)
 _TICK_NS = 5 * STEP_NS  # the joint is where it is now at each SYNC, and at least this often
-
-# A stop that takes so much longer than its ramp is given up: the current goes.
-_STOP_PATIENCE_S = 1.0
 
 # Statusword bits beside the state and the mode's own.
 _VOLTAGE_ENABLED = 1 << 4
@@ -39,6 +37,7 @@ _HOMED = 1 << 15  # the manufacturer's
 _LOW_SWITCH, _HIGH_SWITCH = 1 << 0, 1 << 1
 
 _NO_MODE_CHANGE = 0  # of 6060h
+_FIRST_MODE = ModeNumber.CYCLIC_SYNCHRONOUS_POSITION  # where 6060h says none
 
 
 class JointDrive(Node):
@@ -55,23 +54,24 @@ class JointDrive(Node):
         super().__init__(clock, bus, name, node_id, description)
         self.joint = joint
         self.objects = Objects(self.dictionary)
-        self.power_state = PowerState.NOT_READY_TO_SWITCH_ON
         self.supply_v = supervision.NOMINAL_SUPPLY_V
         self._bind_commands()
         self._parameters = Parameters(self.objects)
         self.servo = Servo(joint, self._parameters)
         self.encoder = self.servo.encoder
+        self.power = Power(self.servo, self.objects, self._power_changed, self._may_recover)
         self._modes = {number: mode(self.servo, self.objects) for number, mode in MODES.items()}
-        self._mode_number = ModeNumber.CYCLIC_SYNCHRONOUS_POSITION
+        self._mode_number = _FIRST_MODE
         self._following = supervision.FollowingErrorWatch()
         self._advanced_ns = 0
         self._controlword = 0
-        self._error_code = 0
-        self._way_out: Command | None = None
-        self._stopping_s = 0.0
         self._shown = 0
         self._bind_values()
         clock.every(_TICK_NS, self.advance)
+
+    @property
+    def power_state(self) -> PowerState:
+        return self.power.state
 
     @property
     def counts_per_radian(self) -> float:
@@ -104,7 +104,7 @@ class JointDrive(Node):
         servo = self.servo
         sources: dict[Key, Callable[[], Value]] = {
             od.STATUSWORD: self.statusword,
-            od.ERROR_CODE: lambda: self._error_code,
+            od.ERROR_CODE: lambda: self.power.error_code,
             od.MODE_DISPLAY: lambda: int(self._mode_number),
             od.POSITION_DEMAND: lambda: self._counts(servo.reference.position),
             od.POSITION_ACTUAL: lambda: self._counts(servo.position),
@@ -134,15 +134,16 @@ class JointDrive(Node):
         return _LOW_SWITCH * self.joint.at_low_switch | _HIGH_SWITCH * self.joint.at_high_switch
 
     def statusword(self) -> int:
-        servo, state = self.servo, self.power_state
+        servo, state = self.servo, self.power.state
         word: int = state.value | _REMOTE
         word |= _VOLTAGE_ENABLED * (self.supply_v >= supervision.LOWEST_SUPPLY_V)
         word |= _WARNING * supervision.warning(servo, self.supply_v)
-        word |= _LIMIT_ACTIVE * (self._mode.clipped or servo.limited)
+        word |= _LIMIT_ACTIVE * servo.limited
         word |= _CURRENT_REDUCED * (servo.thermal.peak_share < 1.0) | _HOMED * servo.homed
         if state is PowerState.OPERATION_ENABLED:
-            return word | self._mode.status() | BIT_13 * (self._following.late_s > 0.0)
-        return word | TARGET_REACHED * (state in ENERGISED and servo.at_rest)
+            late = self._following.late_s > 0.0
+            return word | self._mode.status() | BIT_13 * late | _LIMIT_ACTIVE * self._mode.clipped
+        return word | TARGET_REACHED * (self.power.energised and servo.at_rest)
 
     # -- commands --------------------------------------------------------------------------------------
 
@@ -150,123 +151,70 @@ class JointDrive(Node):
     def _mode(self) -> Mode:
         return self._modes[self._mode_number]
 
-    @property
-    def _enabled(self) -> bool:
-        return self.power_state is PowerState.OPERATION_ENABLED
-
     def _write_mode(self, value: Value) -> None:
         if value == _NO_MODE_CHANGE:
             return
-        offered = self.objects.number(od.SUPPORTED_MODES)
-        if value not in tuple(ModeNumber) or not offered >> int(value) - 1 & 1:
+        if not self._offers(int(value)):
             raise SdoAbort(AbortCode.INVALID_VALUE)
         mode = ModeNumber(int(value))
         if mode is not self._mode_number:
             self._mode_number = mode
             self._following.late_s = 0.0
-            if self._enabled:
+            if self.power.follows:
                 self.servo.stop(Ramp.SLOW_DOWN)
-            self._mode.enter()
+                self._mode.enter()
+
+    def _offers(self, mode: int) -> bool:
+        return mode in tuple(ModeNumber) and bool(self.objects.positive(od.SUPPORTED_MODES) >> mode - 1 & 1)
 
     def _write_controlword(self, value: Value) -> None:
         controlword, previous = int(value), self._controlword
         self._controlword = controlword
         command = command_of(controlword, previous)
         if command is not None:
-            self._do(command)
-        if self._enabled and self._way_out is None:
+            self.power.do(command)
+        if self.power.follows:
             self._mode.command(controlword, controlword & ~previous)
 
     def _target_taker(self, key: Key) -> Callable[[Value], None]:
         return lambda _: self._mode.target_written(key)
 
-    def _do(self, command: Command) -> None:
-        if command is Command.FAULT_RESET and self.power_state is PowerState.FAULT and not self._recover():
-            return
-        if self._stays_stopping(command) or self._goes_out_slowly(command):
-            return
-        self._change(after(self.power_state, command))
-
-    def _recover(self) -> bool:
-        """Transition 15 is possible only where the error is over."""
-        if supervision.trouble(self.servo, self.supply_v, live=True) is not None:
-            return False
-        self._error_code = 0
-        self.emergency_over()
-        return True
-
-    def _stays_stopping(self, command: Command) -> bool:
-        """Where 605Ah stays in QUICK STOP ACTIVE there is transition 16, elsewhere 12 at standstill."""
-        if self.power_state is not PowerState.QUICK_STOP_ACTIVE:
-            return False
-        ending = Command.STANDSTILL if options.stays(self.objects) else Command.ENABLE_OPERATION
-        return command is ending
-
-    def _goes_out_slowly(self, command: Command) -> bool:
-        """605Bh and 605Ch: transitions 5 and 8 happen at standstill; "enable operation" calls them off."""
-        if not self._enabled:
-            return False
-        if command is Command.ENABLE_OPERATION and self._way_out is not None:
-            self._way_out = None
-            self._mode.enter()
-        if command not in options.WAYS_OUT:
-            return False
-        ramp = options.ramp(self.objects, options.WAYS_OUT[command])
-        if ramp is Ramp.OFF:
-            return False
-        if self._way_out is None:
-            self._slow_down(ramp)
-        self._way_out = command
-        return True
-
-    def _change(self, state: PowerState) -> None:
-        before, self.power_state = self.power_state, state
-        if state is before:
-            return
+    def _power_changed(self, before: PowerState) -> None:
         self._following.late_s = 0.0
-        self._way_out = None
-        if state is PowerState.OPERATION_ENABLED:
-            self.servo.hold()
+        if before is PowerState.FAULT:
+            self.emergency_over()
+        if self.power.enabled:
+            if before is not PowerState.OPERATION_ENABLED:
+                self.servo.hold()
             self._mode.enter()
-        elif state is PowerState.QUICK_STOP_ACTIVE:
-            self._stop(options.ramp(self.objects, od.QUICK_STOP_OPTION))
-        elif state is PowerState.FAULT_REACTION_ACTIVE:
-            possible = before in ENERGISED and self._error_code not in supervision.CURRENT_GONE
-            self._stop(options.ramp(self.objects, od.FAULT_REACTION_OPTION) if possible else Ramp.OFF)
         self._show_changes()
 
-    def _stop(self, ramp: Ramp) -> None:
-        if ramp is Ramp.OFF:
-            self._do(Command.STANDSTILL)
-        else:
-            self._slow_down(ramp)
-
-    def _slow_down(self, ramp: Ramp) -> None:
-        self.servo.stop(ramp)
-        self._stopping_s = 0.0
-
     def fault(self, code: int) -> None:
-        """The drive sees an error: it reacts as 605Eh says and ends in FAULT."""
-        self._error_code = code
+        """The drive, if it has power, sees an error: it reacts as 605Eh says and ends in FAULT."""
+        if not self.powered:
+            return
         self.emergency(code)
-        self._do(Command.FAULT_DETECTED)
+        self.power.fault(code)
+
+    def _may_recover(self) -> bool:
+        """Whether every error is over, so that it can be reset."""
+        return supervision.trouble(self.servo, self.supply_v, live=True) is None
 
     # -- life ------------------------------------------------------------------------------------------
 
     def _on_reset(self) -> None:
         self._parameters.reset()
-        self._change(PowerState.NOT_READY_TO_SWITCH_ON)
+        self.power.restart()
         self.servo.forget_home()
         self._controlword = 0
-        self._error_code = 0
-        self._mode_number = ModeNumber(self.objects.number(od.MODE))
-        self._mode.enter()
+        mode = self.objects.number(od.MODE)
+        self._mode_number = ModeNumber(mode) if self._offers(mode) else _FIRST_MODE
         for key in (od.CONTROLWORD, *_TARGETS):
             if self.objects.has(key):
                 self.dictionary[key].value = 0
 
     def _on_booted(self) -> None:
-        self._do(Command.BOOTED)
+        self.power.do(Command.BOOTED)
 
     def _on_state(self, before: NmtState) -> None:
         if before is NmtState.OPERATIONAL and self.state in (NmtState.STOPPED, NmtState.INITIALISING):
@@ -277,16 +225,16 @@ class JointDrive(Node):
 
     def _connection_aborted(self) -> None:
         command = options.ABORT_CONNECTION.get(self.objects.number(od.ABORT_CONNECTION_OPTION))
-        if not self._enabled or command is None:
+        if not self.power.enabled or command is None:
             return
         if command is Command.FAULT_DETECTED:
             self.fault(supervision.COMMUNICATION)
         else:
-            self._do(command)
+            self.power.do(command)
 
     def _on_sync(self) -> None:
         self.advance()
-        if self._enabled and self._way_out is None and self.state is NmtState.OPERATIONAL:
+        if self.power.follows and self.state is NmtState.OPERATIONAL:
             self._mode.synchronise()
 
     # -- motion ----------------------------------------------------------------------------------------
@@ -297,36 +245,24 @@ class JointDrive(Node):
         if steps <= 0:
             return
         self._advanced_ns += steps * STEP_NS
-        if self.power_state in ENERGISED:
-            self.servo.run(steps, self.supply_v)
-            self._lead(steps * STEP_S)
-        else:
+        elapsed_s = steps * STEP_S
+        if not self.power.energised:
             self.servo.coast(steps)
-        self._supervise(steps * STEP_S)
+        else:
+            self.servo.run(steps, self.supply_v)
+            if self.power.follows:
+                self._mode.update(elapsed_s)
+            else:
+                self.power.stopping(elapsed_s)
+        self._supervise(elapsed_s)
         self._show_changes()
 
-    def _lead(self, elapsed_s: float) -> None:
-        """See how far the motion has come."""
-        if self._enabled and self._way_out is None:
-            self._mode.update(elapsed_s)
-            return
-        if self.servo.motion.done:
-            self._stopping_s += elapsed_s
-        if self.servo.at_rest or self._stopping_s > _STOP_PATIENCE_S:
-            self._do_at_rest()
-
-    def _do_at_rest(self) -> None:
-        if self._enabled and self._way_out is not None:
-            self._change(after(self.power_state, self._way_out))
-        else:
-            self._do(Command.STANDSTILL)
-
     def _supervise(self, elapsed_s: float) -> None:
-        error = supervision.trouble(self.servo, self.supply_v, self.power_state in LIVE)
-        watched = self._enabled and self._mode.follows_position
+        error = supervision.trouble(self.servo, self.supply_v, self.power.state in LIVE)
+        watched = self.power.enabled and self._mode.follows_position
         if self._following.update(self.servo, watched, elapsed_s):
             error = error or supervision.FOLLOWING_ERROR
-        if error is not None and self.power_state not in _FAULTY:
+        if error is not None and not self.power.faulty:
             self.fault(error)
 
     def _show_changes(self) -> None:
@@ -337,7 +273,6 @@ class JointDrive(Node):
 
 
 _TARGETS = (od.TARGET_POSITION, od.TARGET_VELOCITY, od.TARGET_TORQUE)
-_FAULTY = (PowerState.FAULT_REACTION_ACTIVE, PowerState.FAULT)
 
 
 def _option_check(allowed: tuple[int, ...]) -> Callable[[Value], None]:

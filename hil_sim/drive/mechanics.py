@@ -26,6 +26,7 @@ class Joint:
     """The true joint: position (rad), velocity (rad/s), and the wearer's load (N·m, against the motor).
 
     `friction_factor` multiplies every friction, as worn or dry bearings do; it may be set at any time.
+    `rotor_inertia` (kg·m², through the gear) is the motor's own.
     """
 
     def __init__(self, constants: JointConstants, position: float = 0.0) -> None:

@@ -48,6 +48,9 @@ class Profile:
         self._deceleration = deceleration
 
     def step(self, reference: Reference, dt: float) -> None:
+        if self.done:
+            reference.position += reference.velocity * dt
+            return
         distance = self.target - reference.position
         speed = self._velocity
         if not self.through:

@@ -40,6 +40,7 @@ class Servo:
         self.limited = False  # the control asks for more than the limits allow
         self.origin = 0.0
         self.homed = False
+        joint.rotor_inertia = parameters.now.rotor_inertia
         self._parameters = parameters
         self._integral = 0.0
         self._seen_velocity = 0.0  # filtered

@@ -11,7 +11,7 @@ from hil_sim.node.dictionary import Entry, Key, Value
 
 _GRAM_SQUARE_CENTIMETRE = 1e-7  # kg·m²
 _TRIP = 1.25  # of the peak current: where the power stage switches itself off
-_ALWAYS_WITHIN = 0xFFFF_FFFF  # 6065h and 6067h: not watched
+_NOT_WATCHED = 0xFFFF_FFFF  # 6065h and 6067h
 
 
 class Control(Enum):
@@ -105,8 +105,8 @@ def read(objects: Objects) -> Settings:
         return min(peak_torque, *(number(key) / 1000.0 * rated_torque for key in keys))
 
     def window(size: Key, time: Key) -> Window:
-        unlimited = number(size) == _ALWAYS_WITHIN
-        return Window(math.inf if unlimited else radians(size), number(time) / 1000.0)
+        watched = number(size) != _NOT_WATCHED
+        return Window(radians(size) if watched else math.inf, number(time) / 1000.0)
 
     return Settings(
         counts_per_radian=counts,

@@ -20,6 +20,7 @@ class Cyclic(Mode):
 
     target: ClassVar[Key]
     control: ClassVar[Control]
+    _targeted = False
 
     def enter(self) -> None:
         super().enter()
