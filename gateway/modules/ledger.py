@@ -40,6 +40,7 @@ class WriteLedger:
         self.number = number
         self.trial_s = trial_s
         self.kept: Undo | None = None
+        self.problem: str | None = None  # why it could not be rolled back
         self.replaced: tuple[Undo, ...] = ()  # trials that this one takes over
         self._keeping = keeping
         self._who = who
@@ -80,6 +81,7 @@ class WriteLedger:
 
     def left(self, error: RpcError) -> None:
         self.kept = None if self._undo is None else msgspec.structs.replace(self._undo, trial=False)
+        self.problem = str(error)
         log.critical("A ROLL-BACK FAILED: %s", error)
         with suppress(OSError):  # it was logged
             if self.kept is not None:

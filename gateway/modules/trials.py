@@ -101,9 +101,10 @@ class Trials:
         trial.set_timer(self._loop.call_later(trial_s, lambda: self._take_back(trial, "its time was over")))
         self._changed()
 
-    def take_up(self, undo: Undo, why: str, ready: "Future[None]") -> None:
+    def take_up(self, undo: Undo, why: str, ready: "Future[None]", problem: str | None = None) -> None:
         """Take back what a failed roll-back or an ended gateway has left, once its devices are `ready`."""
         trial = self._trials[undo.write] = _Trial(undo, None)
+        trial.problem = problem
         ready.add_done_callback(lambda _ready: self._loop.call(lambda: self._take_back(trial, why)))
         self._changed()
 

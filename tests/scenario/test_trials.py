@@ -1,0 +1,212 @@
+"""Changes of parameters on a whole robot whose devices, clients and gateways fail in the middle of them."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.config import load
+from gateway.records.folder import RecordsFolder
+from gateway.records.journal import read_verified
+from hil_sim.node.abort import AbortCode, SdoAbort
+from hil_sim.node.dictionary import Value
+from hil_sim.robot import SimulatedRobot
+from tests.scenario.processes import Bench
+from tests.scenario.processes import until as until_processes
+from tests.unit.gateway.harness import Answered, Client, serving, until
+
+pytestmark = pytest.mark.timeout(300)
+
+KNEE_TORQUE = (0x6072, 0)
+SIX = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")} | {
+    f"{joint}.max_torque": 60.0 for joint in ("right_hip", "right_knee", "right_ankle")
+}
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[SimulatedRobot]:
+    with SimulatedRobot(tmp_path, virtual_channel=f"trials {tmp_path.name}") as robot:
+        yield robot
+
+
+@pytest.fixture
+def writer(robot: SimulatedRobot) -> Iterator[Client]:
+    with serving(load(robot.config)) as address, Client(address) as client:
+        until(lambda: None not in read(client).values(), "every parameter can be read")
+        client.call("control.acquire", ttl_s=300)
+        yield client
+
+
+def read(client: Client) -> dict[str, float | None]:
+    values = client.call("parameter.read")["values"]
+    return {name: one["value"] for name, one in values.items()}
+
+
+def journal(robot: SimulatedRobot) -> list[dict[str, Any]]:
+    return read_verified(RecordsFolder(load(robot.config).records).journal)
+
+
+def refuse_torque(robot: SimulatedRobot, joint: str) -> None:
+    """The drive refuses every new torque limit, but for the one it has."""
+    dictionary = robot.exoskeleton.drives[joint].dictionary
+    now = dictionary[KNEE_TORQUE].number()
+
+    def check(value: Value) -> None:
+        if value != now:
+            raise SdoAbort(AbortCode.INVALID_VALUE)
+
+    dictionary[KNEE_TORQUE].on_write = check
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_an_abort_of_the_nth_of_six_writes_leaves_all_as_they_were(
+    robot: SimulatedRobot, writer: Client, number: int
+) -> None:
+    before = read(writer)
+    joint = list(SIX)[number].partition(".")[0]
+    refuse_torque(robot, joint)
+    error = writer.refused("parameter.write", changes=SIX)
+    assert error.kind == ("rolled_back" if number else "device_abort")
+    assert error.data["component"] == joint
+    expected = ["taken back"] * number + ["unchanged"] + ["not written"] * (5 - number)
+    assert list(error.data["outcome"].values()) == expected
+    assert read(writer) == before
+    assert writer.call("robot.describe")["trials"] == []
+
+
+def test_three_nodes_whose_second_refuses_stay_as_they_were_and_the_journal_says_so(
+    robot: SimulatedRobot, writer: Client
+) -> None:
+    before = read(writer)
+    refuse_torque(robot, "left_knee")
+    changes = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")}
+    assert writer.refused("parameter.write", changes=changes).kind == "rolled_back"
+    assert read(writer) == before
+    begun, taken_back = journal(robot)[-2:]
+    assert (begun["what"], begun["after"]) == ("write", changes)
+    assert begun["before"] == {name: before[name] for name in changes}
+    assert taken_back["what"] == "write taken back"
+    assert taken_back["outcome"] == {
+        "left_hip.max_torque": "taken back",
+        "left_knee.max_torque": "unchanged",
+        "left_ankle.max_torque": "not written",
+    }
+
+
+def test_a_node_lost_in_mid_transaction_is_rolled_back_on_the_others(
+    robot: SimulatedRobot, writer: Client
+) -> None:
+    before = read(writer)
+    ankle = robot.exoskeleton.drives["left_ankle"]
+    ankle.dictionary[KNEE_TORQUE].on_write = lambda _value: ankle.power_off()
+    changes = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")}
+    error = writer.refused("parameter.write", changes=changes)
+    assert error.kind == "rollback_failed"
+    outcome = error.data["outcome"]
+    assert (outcome["left_hip.max_torque"], outcome["left_knee.max_torque"]) == ("taken back", "taken back")
+    assert outcome["left_ankle.max_torque"].startswith("unknown")
+    (pending,) = writer.call("robot.describe")["trials"]
+    assert "left_ankle.max_torque" in pending["problem"]
+    ankle.dictionary[KNEE_TORQUE].on_write = None
+    ankle.power_on()  # with its stored value: what was written is gone
+    until(lambda: writer.call("robot.describe")["trials"] == [], "taken back as soon as it is there")
+    until(lambda: read(writer) == before, "as it was")
+    assert [one["what"] for one in journal(robot)].count("ROLL-BACK FAILED") == 1
+
+
+def test_a_node_lost_in_mid_roll_back_is_taken_back_when_it_returns(
+    robot: SimulatedRobot, writer: Client
+) -> None:
+    """The hip is written, the ankle refuses, and the hip is gone when it is to be taken back."""
+    before = read(writer)
+    hip, ankle = robot.exoskeleton.drives["left_hip"], robot.exoskeleton.drives["left_ankle"]
+
+    def go(_value: Value) -> None:
+        hip.power_off()
+        raise SdoAbort(AbortCode.INVALID_VALUE)
+
+    ankle.dictionary[KNEE_TORQUE].on_write = go
+    error = writer.refused(
+        "parameter.write", changes={"left_hip.max_torque": 60.0, "left_ankle.max_torque": 60.0}
+    )
+    assert error.kind == "rollback_failed"
+    assert "left_hip.max_torque" in str(error)
+    hip.power_on()
+    until(lambda: writer.call("robot.describe")["trials"] == [], "taken back")
+    until(lambda: read(writer) == before, "as it was")
+
+
+def test_two_clients_racing_for_the_lease_never_both_have_it(robot: SimulatedRobot) -> None:
+    with serving(load(robot.config)) as address, ExitStack() as clients:
+        racers = [clients.enter_context(Client(address)) for _ in range(8)]
+        for _ in range(20):
+            asked = [(racer, racer.request("control.acquire", ttl_s=5)) for racer in racers]
+            answers = {racer: _answer(racer, id_) for racer, id_ in asked}
+            assert sorted(answers.values()) == ["lease"] + ["lease_held"] * 7
+            next(racer for racer, answer in answers.items() if answer == "lease").call("control.release")
+
+
+def _answer(client: Client, id_: int) -> str:
+    try:
+        client.answer(id_)
+    except Answered as refused:
+        return str(refused.kind)
+    return "lease"
+
+
+class Terminal:
+    """`gwrms set --trial` in a process of its own, with a person who has not decided yet."""
+
+    def __init__(self, bench: Bench, *changes: str) -> None:
+        command = [sys.executable, "-P", "-m", "gateway.main", "set", "--trial", "250", *changes]
+        self.process = subprocess.Popen(
+            [*command, "--robot", bench.address],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        while "on trial for 250 s" not in (line := self.process.stdout.readline()):
+            assert line, "it ended"
+
+    def kill(self) -> None:
+        """As when its terminal is closed, or worse."""
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.communicate()
+
+
+def value(bench: Bench, name: str) -> float | None:
+    found: float | None = bench.ask("parameter.read", names=[name])["values"][name]["value"]
+    return found
+
+
+def test_a_trial_reverts_when_its_terminal_is_killed(bench: Bench) -> None:
+    before = value(bench, "gait.cycle_time")
+    terminal = Terminal(bench, "gait.cycle_time=1.25")
+    try:
+        assert value(bench, "gait.cycle_time") == 1.25
+    finally:
+        terminal.kill()
+    until_processes(lambda: value(bench, "gait.cycle_time") == before)
+    until_processes(lambda: bench.ask("robot.describe")["trials"] == [])
+    last = bench.ask("journal.tail", n=1)["entries"][0]
+    assert (last["what"], last["reason"]) == ("taken back", "lease lost with the connection")
+
+
+def test_a_gateway_killed_during_a_trial_takes_it_back_when_it_starts_again(bench: Bench) -> None:
+    before = value(bench, "gait.cycle_time")
+    terminal = Terminal(bench, "gait.cycle_time=1.25")
+    bench.kill(bench.gateway)
+    terminal.kill()
+    bench.start_gateway()
+    # Client or not: nobody asks this gateway for anything before the value is back.
+    folder = RecordsFolder(load(bench.config).records)
+    until_processes(lambda: not folder.undo.exists())
+    assert value(bench, "gait.cycle_time") == before
+    assert [one["what"] for one in read_verified(folder.journal)][-1] == "taken back"
