@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 if TYPE_CHECKING:
     import canopen
     from canopen.objectdictionary import ODVariable
+
+
+FIRST_OBJECT = 0x1000  # below are data types
 
 
 class EdsError(Exception):
@@ -52,6 +55,15 @@ class Description:
         # canopen invents entries of arrays that the device does not have.
         members = getattr(found.parent, "subindices", None)
         return found if members is None or subindex in members else None
+
+    def variables(self) -> Iterator[ODVariable]:
+        """Every object and sub-object of the device, by index and sub-index."""
+        for index in self.object_dictionary:
+            if index < FIRST_OBJECT:
+                continue
+            entry = self.object_dictionary[index]
+            members: Mapping[int, ODVariable] | None = getattr(entry, "subindices", None)
+            yield from (cast("ODVariable", entry),) if members is None else members.values()
 
     def require(self, objects: Iterable[tuple[int, str]], purpose: str) -> None:
         """Raise `EdsError` that names every one of `objects` (index, name) that the file lacks."""

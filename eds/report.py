@@ -4,12 +4,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from canopen.objectdictionary import ODVariable
-
 from eds.datatypes import DATA_TYPES
 from eds.description import Description
 
-FIRST_OBJECT = 0x1000  # below are data types
 AXIS_OFFSET = 0x800
 MAX_AXES = 8
 JOINT_OBJECTS = ((0x6041, "statusword"), (0x6064, "position actual value"))
@@ -47,7 +44,7 @@ class PdoRow:
 
 def object_rows(description: Description) -> Iterator[ObjectRow]:
     """Every object of the device, by index and sub-index."""
-    for variable in _variables(description):
+    for variable in description.variables():
         data_type = DATA_TYPES.get(variable.data_type or 0)
         yield ObjectRow(
             variable.index,
@@ -106,18 +103,6 @@ def grouped_findings(description: Description) -> list[tuple[str, str, str, int]
         first.setdefault(key, finding.where)
         often[key] += 1
     return [(severity, first[severity, text], text, often[severity, text]) for severity, text in first]
-
-
-def _variables(description: Description) -> Iterator[ODVariable]:
-    dictionary = description.object_dictionary
-    for index in dictionary:
-        if index < FIRST_OBJECT:
-            continue
-        entry = dictionary[index]
-        if isinstance(entry, ODVariable):
-            yield entry
-        else:
-            yield from (entry[subindex] for subindex in entry)
 
 
 def _number(description: Description, index: int, subindex: int) -> int | None:

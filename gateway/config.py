@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta, Struct
@@ -23,6 +23,7 @@ Table = Mapping[str, Any]
 CONTROLWORD = 0x6040
 AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
 RESERVED_NAMES = ("resource", "status", "robot")
+STORE, RESTORE = 0x1010, 0x1011
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -50,6 +51,20 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[joint.NAME]`: a joint, and what its EDS offers as parameters."""
+
+    parameters: Literal["eds"] | None = None  # every writable number of the EDS, to be read
+    release: tuple[str, ...] = ()  # names or globs of those that may be changed too
+
+
+class DeviceTable(DeviceSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[device.NAME]`: another device, and what its EDS offers as parameters."""
+
+    parameters: Literal["eds"] | None = None
+    release: tuple[str, ...] = ()
+
+
     """`[parameter."component.name"]`: one object of a CANopen device that may be changed, and how far.
 
     value = device's number · scale, in `unit`. `max_step` limits one change. `live` allows changes while a
@@ -79,8 +94,8 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     robot: RobotSettings
     gateway: GatewaySettings = GatewaySettings()
     can: dict[str, CanSettings] = {}
-    joint: dict[str, JointSettings] = {}
-    device: dict[str, DeviceSettings] = {}
+    joint: dict[str, JointTable] = {}
+    device: dict[str, DeviceTable] = {}
     insole: dict[str, InsoleSettings] = {}
     imu: dict[str, ImuSettings] = {}
     parameter: dict[str, ParameterSettings] = {}
@@ -95,8 +110,8 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
 _SINGLE: Mapping[str, type[Struct]] = {"robot": RobotSettings, "gateway": GatewaySettings}
 _NAMED: Mapping[str, type[Struct]] = {
     "can": CanSettings,
-    "joint": JointSettings,
-    "device": DeviceSettings,
+    "joint": JointTable,
+    "device": DeviceTable,
     "insole": InsoleSettings,
     "imu": ImuSettings,
     "parameter": ParameterSettings,
@@ -183,6 +198,9 @@ def _complaints(config: RobotConfig) -> Iterator[str]:
     for name, parameter in config.parameter.items():
         yield from _about_parameter(config, name, parameter)
 
+    for table, devices in (("joint", config.joint), ("device", config.device)):
+        for name, device in devices.items():
+            yield from _about_release(_header(table, name), name, device)
 
 def _about_names(config: RobotConfig) -> Iterator[str]:
     seen: dict[str, str] = {}
@@ -247,6 +265,14 @@ def _about_parameter(config: RobotConfig, name: str, parameter: ParameterSetting
         yield f"{where} object: the subindex goes from 0 to 255"
     if index in range(CONTROLWORD, 0xA000, AXIS_OFFSET):
         yield f"{where} object: {parameter.object} is a controlword: it enables drives and is no parameter"
+def _about_release(where: str, name: str, device: JointTable | DeviceTable) -> Iterator[str]:
+    if device.release and device.parameters is None:
+        yield f'{where} release: there is nothing to release without parameters = "eds"'
+    for entry in device.release:
+        if entry.startswith(f"{name}."):
+            yield f"{where} release: write {entry.removeprefix(f'{name}.')!r}, without the table's own name"
+
+
     numbers = {
         "scale": parameter.scale,
         "min": parameter.min,
@@ -260,6 +286,8 @@ def _about_parameter(config: RobotConfig, name: str, parameter: ParameterSetting
         yield f"{where} scale: 0 would make every value 0"
     if parameter.min is not None and parameter.max is not None and parameter.min > parameter.max:
         yield f"{where} min: {parameter.min} is above max {parameter.max}"
+    if index in (STORE, RESTORE):
+        yield f"{where} object: {parameter.object} is a command; use gwrms store and gwrms restore"
     for state in parameter.states or ():
         if state not in STATE_WORDS.values():
             known = ", ".join(STATE_WORDS.values())

@@ -71,7 +71,10 @@ class ReleaseParams(Params, frozen=True):
 
 
 class ParameterParams(Params, frozen=True):
-    """`parameter.list` and `parameter.read`; no names means all."""
+    """`parameter.list` and `parameter.read`: names, addresses such as `left_knee.0x6072:0`, and globs.
+
+    No names means every parameter but those that are `read_only`.
+    """
 
     names: Globs | None = None
 
@@ -155,12 +158,16 @@ class ChannelInfo(Struct, frozen=True):
 
 
 class ParameterInfo(Struct, frozen=True):
-    """One parameter of `robot.describe`; `states` are the drive states it may be written in, `None` any."""
+    """One parameter of `robot.describe`; `states` are the drive states it may be written in, `None` any.
+
+    The device's number is the value divided by `scale`, as the CiA 301 data type `type`. `read_only` says in
+    a word why it cannot be written; a write is refused in full words.
+    """
 
     name: str
     unit: str
-    min: float | None
-    max: float | None
+    min: Number | None
+    max: Number | None
     max_step: float | None
     live: bool
     states: list[str] | None
@@ -169,6 +176,10 @@ class ParameterInfo(Struct, frozen=True):
     access: str
     store: bool
     problem: str | None = None
+    read_only: str | None = None
+    type: str = ""
+    scale: float = 1.0
+    title: str = ""  # as the EDS calls it
 
 
 class TrialInfo(Struct, frozen=True):
@@ -176,8 +187,8 @@ class TrialInfo(Struct, frozen=True):
 
     write: int
     who: str
-    values: dict[str, float]  # what was written
-    before: dict[str, float]  # what it reverts to
+    values: dict[str, Number]  # what was written
+    before: dict[str, Number]  # what it reverts to
     left_s: float | None  # until it reverts by itself; None: it is being taken back
     problem: str | None = None  # why it could not be taken back yet
 
@@ -344,10 +355,10 @@ class Lease(Struct, frozen=True):
 class ParameterValue(Struct, frozen=True):
     """One parameter's value; `None` with the reason in `problem` where it is not known."""
 
-    value: float | None
+    value: Number | None
     unit: str
-    min: float | None
-    max: float | None
+    min: Number | None
+    max: Number | None
     stamp_ns: int | None
     problem: str | None = None
 
@@ -366,8 +377,8 @@ class Written(Struct, frozen=True):
     """
 
     write: int
-    before: dict[str, float]
-    after: dict[str, float]
+    before: dict[str, Number]
+    after: dict[str, Number]
     trial_s: float | None = None
 
 
@@ -375,7 +386,7 @@ class Confirmed(Struct, frozen=True):
     """Result of `parameter.confirm`: what stays written."""
 
     write: int
-    values: dict[str, float]
+    values: dict[str, Number]
 
 
 class Reverted(Struct, frozen=True):

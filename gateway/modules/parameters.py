@@ -1,31 +1,51 @@
-"""Parameters: which object of which device stands behind a name, its limits, and its value as bytes.
+"""Parameters: which object of which device stands behind a name, its limits, and who may change it.
 
-The limits of the robot's file and of the EDS both count, the stricter wins. Scaling is decimal, so that a
-value is exactly what the device holds: 0.42 m at 0.001 m a count is 420 counts and 0.42 m again.
+The limits of the robot's file and of the EDS both count, the stricter wins. What the EDS alone offers is
+read-only until the robot's file releases it.
 """
 
-import math
-import struct
-from collections.abc import Mapping
+import operator
 from dataclasses import dataclass
-from decimal import ROUND_HALF_EVEN, Decimal
+from enum import Enum
 
-from drivers.bus.values import decode
-from eds import Description
-from eds.datatypes import DATA_TYPES, DataType
+from eds.datatypes import DATA_TYPES
+from gateway.coding import Coding, CodingError, Number, text
 from gateway.config import ParameterSettings
 from gateway.messages import ParameterInfo
 from gateway.wire import Kind, RpcError, refuse
 
-STORE = 0x1010
-_READABLE = ("rw", "rwr", "rww", "ro", "const")
-_WRITABLE = ("rw", "rwr", "rww")
-_REAL_FORMATS = {32: "<f", 64: "<d"}
+READABLE = ("rw", "rwr", "rww", "ro", "const")
+WRITABLE = ("rw", "rwr", "rww")
+
+
+class Lock(Enum):
+    """Why a parameter that an EDS offers is read-only: in a word, and what to do about it."""
+
+    UNRELEASED = "not released"
+    COMMANDED = "commanded"
+    COMMUNICATION = "communication"
+    STORAGE = "storage"
+    CONTROLWORD = "controlword"
+
+
+_REMEDIES = {
+    Lock.UNRELEASED: 'add "{name}" to release in {table} of the robot\'s file',
+    Lock.COMMANDED: "who leads the bus writes it; to change it all the same, add its whole name "
+    '"{name}" to release in {table} of the robot\'s file: a glob does not reach it',
+    Lock.COMMUNICATION: "from 1000h to 1FFFh is how the bus works, which belongs to who leads it; release "
+    "does not reach it, only a [parameter] table of its own",
+    Lock.STORAGE: "storing and restoring are commands of their own: gwrms store, gwrms restore",
+    Lock.CONTROLWORD: "it enables drives, and is never written as a parameter",
+}
+_LIMITS = (("min", operator.lt, "below the minimum"), ("max", operator.gt, "above the maximum"))
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter, resolved against its device's EDS. `problem` says why it cannot be used."""
+    """One parameter, resolved against its device's EDS. `problem` says why it cannot be used.
+
+    `table` is where the robot's file describes its device; `title` is the object's name in the EDS.
+    """
 
     name: str
     component: str
@@ -34,23 +54,36 @@ class Parameter:
     subindex: int
     data_type: int = 0
     access: str = ""
-    min: float | None = None
-    max: float | None = None
+    min: Number | None = None
+    max: Number | None = None
     store: bool = False
     problem: str | None = None
+    lock: Lock | None = None
+    table: str = ""
+    title: str = ""
 
     @property
     def object(self) -> str:
         return f"0x{self.index:04X}:{self.subindex}"
 
     @property
-    def type(self) -> DataType:
-        return DATA_TYPES[self.data_type]
+    def coding(self) -> Coding:
+        return Coding(self.data_type, self.settings.scale)
+
+    @property
+    def read_only(self) -> str | None:
+        """In a word, why it cannot be written; `None` where it can, or cannot be used at all."""
+        if self.problem is not None:
+            return None
+        if self.access not in WRITABLE:
+            return f"{self.access} in the EDS"
+        return None if self.lock is None else self.lock.value
 
     @property
     def info(self) -> ParameterInfo:
         """As `robot.describe` shows it."""
         settings = self.settings
+        known = DATA_TYPES.get(self.data_type)
         return ParameterInfo(
             name=self.name,
             unit=settings.unit,
@@ -64,6 +97,10 @@ class Parameter:
             access=self.access,
             store=self.store,
             problem=self.problem,
+            read_only=self.read_only,
+            type="" if known is None else known.name,
+            scale=settings.scale,
+            title=self.title,
         )
 
     def refusal(self, kind: Kind, text: str, limit: float | None = None) -> RpcError:
@@ -74,113 +111,47 @@ class Parameter:
         """Raise `RpcError` where it cannot be read."""
         if self.problem is not None:
             raise self.refusal(Kind.UNAVAILABLE, self.problem)
-        if self.access not in _READABLE:
+        if self.access not in READABLE:
             raise self.refusal(
                 Kind.NOT_ALLOWED, f"{self.object} cannot be read, the EDS says {self.access!r}"
             )
 
-    def encode(self, value: float) -> bytes:
+    def check_writable(self) -> None:
+        """Raise `RpcError` where it cannot be written, or not be read back."""
+        self.check_readable()
+        if self.access not in WRITABLE:
+            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only, the EDS says {self.access!r}")
+        if self.lock is not None:
+            remedy = _REMEDIES[self.lock].format(name=self.name.partition(".")[2], table=self.table)
+            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only: {remedy}")
+
+    def encode(self, value: Number) -> bytes:
         """The bytes to write, checked against access, type and limits.
 
         Raises:
             RpcError: read_only, not_allowed or out_of_limit.
 
         """
-        self.check_readable()  # what cannot be read back cannot be verified
-        if self.access not in _WRITABLE:
-            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only, the EDS says {self.access!r}")
+        self.check_writable()
         self._check_limits(value, "")
-        data = self._pack(value)
-        self._check_limits(self.decode(data), f", which is what the device would hold of {value:g}")
+        try:
+            data = self.coding.encode(value)
+        except CodingError as error:
+            raise self.refusal(Kind.OUT_OF_LIMIT, str(error)) from error
+        self._check_limits(self.decode(data), f", which is what the device would hold of {text(value)},")
         return data
 
-    def decode(self, data: bytes) -> float:
+    def decode(self, data: bytes) -> Number:
         """The value that the device's bytes mean; raises `RpcError` (mismatch) where they mean none."""
-        number = decode(data, self.data_type)
-        if number is None or not math.isfinite(number):
-            raise self.refusal(
-                Kind.MISMATCH, f"the device holds {data.hex(' ')}, which is no {self.type.name}"
-            )
-        if self.type.kind == "real":
-            return number * self.settings.scale
-        return float(Decimal(number) * Decimal(repr(self.settings.scale)))
+        try:
+            return self.coding.decode(data)
+        except CodingError as error:
+            raise self.refusal(Kind.MISMATCH, f"the device holds what is no value: {error}") from error
 
-    def _check_limits(self, value: float, why: str) -> None:
+    def _check_limits(self, value: Number, why: str) -> None:
         unit = self.settings.unit
-        for limit, beyond, word in ((self.min, -1, "below the minimum"), (self.max, 1, "above the maximum")):
-            if limit is not None and (value - limit) * beyond > 0:
-                text = f"{value:g} {unit}{why} is {word} {limit:g} {unit}"
-                raise self.refusal(Kind.OUT_OF_LIMIT, text, limit)
-
-    def _pack(self, value: float) -> bytes:
-        if self.type.kind == "real":
-            return self._pack_real(value / self.settings.scale)
-        exact = Decimal(repr(value)) / Decimal(repr(self.settings.scale))
-        number = int(exact.to_integral_value(ROUND_HALF_EVEN))
-        size = ((self.type.bits or 8) + 7) // 8
-        try:
-            if self.type.kind == "boolean" and number not in (0, 1):
-                raise OverflowError
-            return number.to_bytes(size, "little", signed=self.type.kind == "signed")
-        except OverflowError as error:
-            text = f"{value:g} is {number} for the device, which does not fit {self.type.name}"
-            raise self.refusal(Kind.OUT_OF_LIMIT, text) from error
-
-    def _pack_real(self, number: float) -> bytes:
-        try:
-            return struct.pack(_REAL_FORMATS[self.type.bits or 0], number)
-        except OverflowError as error:
-            raise self.refusal(Kind.OUT_OF_LIMIT, f"{number:g} does not fit {self.type.name}") from error
-
-
-def resolve(
-    settings: Mapping[str, ParameterSettings],
-    descriptions: Mapping[str, Description],
-    absent: Mapping[str, str],
-) -> dict[str, Parameter]:
-    """Every parameter of the robot's file; what cannot be used says why."""
-    return {name: _resolve(name, one, descriptions, absent) for name, one in settings.items()}
-
-
-def _resolve(
-    name: str, settings: ParameterSettings, descriptions: Mapping[str, Description], absent: Mapping[str, str]
-) -> Parameter:
-    component = name.partition(".")[0]
-    index, subindex = settings.address
-    low, high = settings.min, settings.max
-
-    def unusable(problem: str) -> Parameter:
-        return Parameter(name, component, settings, index, subindex, min=low, max=high, problem=problem)
-
-    if component in absent:
-        return unusable(absent[component])
-    description = descriptions[component]
-    variable = description.variable(index, subindex)
-    if variable is None:
-        return unusable(
-            f'{description.path.name} has no object {settings.object}; correct [parameter."{name}"]'
-        )
-    known = DATA_TYPES.get(variable.data_type or 0)
-    if known is None or known.kind not in ("boolean", "signed", "unsigned", "real"):
-        return unusable(f"{settings.object} is no number in {description.path.name}; parameters are numbers")
-    eds_low, eds_high = _scaled(variable.min, variable.max, settings.scale)
-    return Parameter(
-        name,
-        component,
-        settings,
-        index,
-        subindex,
-        variable.data_type or 0,
-        (variable.access_type or "").lower(),
-        max((limit for limit in (low, eds_low) if limit is not None), default=None),
-        min((limit for limit in (high, eds_high) if limit is not None), default=None),
-        description.has(STORE, 1),
-    )
-
-
-def _scaled(low: float | None, high: float | None, scale: float) -> tuple[float | None, float | None]:
-    """The EDS's limits in the parameter's unit; a negative scale turns them round."""
-    scaled = [
-        None if limit is None else float(Decimal(repr(limit)) * Decimal(repr(scale))) for limit in (low, high)
-    ]
-    return (scaled[1], scaled[0]) if scale < 0 else (scaled[0], scaled[1])
+        for which, is_beyond, word in _LIMITS:
+            limit: Number | None = getattr(self, which)
+            if limit is not None and is_beyond(value, limit):
+                said = f"{text(value)} {unit}{why} is {word} {text(limit)} {unit}"
+                raise self.refusal(Kind.OUT_OF_LIMIT, said, limit)

@@ -24,15 +24,15 @@ from gateway.config import RobotConfig
 from gateway.futures import back, done, failed, gather, then
 from gateway.loop import Loop
 from gateway.messages import ParameterInfo, ParameterValue, ParameterValues, Written
+from gateway.modules.catalogue import resolve
 from gateway.modules.component import ComponentModule
 from gateway.modules.ledger import Keeping, WriteLedger
-from gateway.modules.parameters import Parameter, resolve
+from gateway.modules.parameters import Parameter
 from gateway.modules.taking_back import OutOfReach
 from gateway.modules.transaction import ANSWER_S, Change, Node, Outcome, Transaction, device_error
 from gateway.modules.trials import Trials
 from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoChange, UndoFile
-from gateway.sources import check_globs, matches
 from gateway.wire import Kind, RpcError, refuse
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Tuning:
         self._loop = loop
         self._joints = config.joint
         self._devices: dict[str, JointSettings | DeviceSettings] = {**config.joint, **config.device}
-        self._parameters = resolve(config.parameter, component.robot.descriptions, component.absent)
+        self._parameters = resolve(config, component.robot.descriptions, component.absent)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._numbers = itertools.count(time.time_ns() // 1_000_000)  # unique also after a restart
         self._interrupted = threading.Event()
@@ -99,11 +99,11 @@ class Tuning:
 
     def listed(self, names: list[str] | None) -> ParameterValues:
         """What is known without asking: the last value read, as long as its device is there."""
-        return ParameterValues({one.name: self._last(one) for one in self._chosen(names)})
+        return ParameterValues({one.name: self._last(one) for one in self._parameters.chosen(names)})
 
     def read(self, names: list[str] | None) -> "Future[ParameterValues]":
         """What the devices hold now; where one does not tell, `problem` says why."""
-        chosen = self._chosen(names)
+        chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
         uploads = then(ready, lambda _none: gather({one.name: self._upload(one) for one in chosen}))
         return then(uploads, self._values)
@@ -118,15 +118,13 @@ class Tuning:
 
         """
         changes = [self._change(name, value) for name, value in values.items()]
+        if len({change.parameter.name for change in changes}) != len(changes):
+            raise refuse(Kind.BAD_PARAMS, "a parameter is written twice, by its name and by its address")
         ready = self._component.when_ready({one.parameter.component for one in changes})
         interrupted = self._interrupted
         return then(ready, lambda _none: self._begin(changes, interrupted, session, trial_s))
 
     # Reading
-
-    def _chosen(self, names: list[str] | None) -> list[Parameter]:
-        check_globs("parameter", self._parameters, names)
-        return [one for name, one in self._parameters.items() if matches(name, names)]
 
     def _problem(self, parameter: Parameter) -> str | None:
         """Why the device cannot be asked at all."""

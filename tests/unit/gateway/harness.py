@@ -331,6 +331,11 @@ class Bench:
         self.left.node.objects[0x6072, 0] = (1000).to_bytes(2, "little")
         self.insole.give(300.0, None)
         self.absent: dict[str, tuple[Kind, str]] = {}
+        self.files = {
+            "left_knee": "joint_drive.eds",
+            "right_knee": "joint_drive.eds",
+            "gait": "gait_controller.eds",
+        }
         self.assembled = 0
 
     @property
@@ -340,10 +345,5 @@ class Bench:
 
     def assemble(self, config: RobotConfig) -> Robot:
         self.assembled += 1
-        files = {
-            "left_knee": "joint_drive.eds",
-            "right_knee": "joint_drive.eds",
-            "gait": "gait_controller.eds",
-        }
-        descriptions = {name: eds.load(eds.locate(file, None), 1) for name, file in files.items()}
+        descriptions = {name: eds.load(eds.locate(file, None), 1) for name, file in self.files.items()}
         return Robot({}, dict(self.components), descriptions, dict(self.absent))

@@ -14,7 +14,8 @@ import eds
 from drivers.component import Kind
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import ParameterSettings
-from gateway.modules.parameters import Parameter, resolve
+from gateway.modules.catalogue import described
+from gateway.modules.parameters import Parameter
 from gateway.wire import RpcError
 from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving, until
 
@@ -375,7 +376,7 @@ def test_a_parameter_of_an_absent_device_is_unavailable(client: Client, bench: B
 def parameter(object_: str, **settings: Any) -> Parameter:
     description = eds.load(eds.locate("joint_drive.eds", None), 1)
     given = ParameterSettings(object=object_, **settings)
-    return resolve({"knee.x": given}, {"knee": description}, {})["knee.x"]
+    return described("knee.x", given, {"knee": description}, {})
 
 
 @pytest.mark.parametrize(
@@ -390,7 +391,7 @@ def parameter(object_: str, **settings: Any) -> Parameter:
 def test_values_as_bytes(object_: str, scale: float, value: float, data: str) -> None:
     one = parameter(object_, scale=scale)
     assert one.problem is None
-    assert one._pack(value).hex(" ") == data
+    assert one.coding.encode(value).hex(" ") == data
 
 
 @pytest.mark.parametrize(
@@ -416,7 +417,7 @@ SCALED = [parameter("0x6072:0", scale=scale) for scale in (0.001, 0.01, 0.1, 1.0
 @given(st.integers(0, 1000), st.sampled_from(SCALED))
 def test_what_the_device_holds_is_written_back_unchanged(counts: int, one: Parameter) -> None:
     value = one.decode(u16(counts))
-    assert one._pack(value) == u16(counts)
+    assert one.coding.encode(value) == u16(counts)
 
 
 def test_the_stricter_of_file_and_eds_wins() -> None:
@@ -424,7 +425,8 @@ def test_the_stricter_of_file_and_eds_wins() -> None:
     wide = ParameterSettings(object="0x2001:0", scale=0.001, min=0.0, max=9.0)
     narrow = ParameterSettings(object="0x2001:0", scale=0.001, min=0.3, max=0.5)
     turned = ParameterSettings(object="0x2001:0", scale=-0.001)
-    found = resolve({"gait.a": wide, "gait.b": narrow, "gait.c": turned}, {"gait": description}, {})
+    settings = {"gait.a": wide, "gait.b": narrow, "gait.c": turned}
+    found = {name: described(name, one, {"gait": description}, {}) for name, one in settings.items()}
     assert (found["gait.a"].min, found["gait.a"].max) == (0.2, 0.6)
     assert (found["gait.b"].min, found["gait.b"].max) == (0.3, 0.5)
     assert (found["gait.c"].min, found["gait.c"].max) == (-0.6, -0.2)

@@ -1,0 +1,98 @@
+"""A parameter's number as its device holds it: bytes, type and scale, exactly.
+
+value = device's number · scale. Scaling is decimal, so that 0.42 m at 0.001 m a count is 420 counts and
+0.42 m again. A whole number stays one, so that all 64 bits of an integer survive; what would lose digits is
+refused.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Decimal
+
+from drivers.bus.values import decode, size_of
+from eds.datatypes import DATA_TYPES, DataType
+
+Number = int | float
+
+NUMBERS = ("boolean", "signed", "unsigned", "real")  # the kinds of data types that are numbers
+EXACT_COUNTS = 2**52  # below, a count and its value with a decimal point lead to each other
+_REAL_FORMATS = {32: "<f", 64: "<d"}
+
+
+class CodingError(ValueError):
+    """Bytes that mean no number, or a number that the type cannot hold exactly."""
+
+
+def scaled(number: Number, scale: float) -> Number:
+    """`number` · `scale`; whole numbers stay whole."""
+    if isinstance(number, int) and scale.is_integer():
+        return number * int(scale)
+    return float(Decimal(repr(number)) * Decimal(repr(scale)))
+
+
+def text(value: Number) -> str:
+    """A value with every digit that a person needs to tell it from another one."""
+    return str(value) if isinstance(value, int) else f"{value:.10g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """How one object's value travels: its CiA 301 data type (by code) and its scale."""
+
+    data_type: int
+    scale: float = 1.0
+
+    @property
+    def type(self) -> DataType:
+        return DATA_TYPES[self.data_type]
+
+    def decode(self, data: bytes) -> Number:
+        """The value that the bytes mean.
+
+        Raises:
+            CodingError: they mean no number, or none that can be told exactly at this scale.
+
+        """
+        number = decode(data, self.data_type)
+        if number is None or not math.isfinite(number) or (self.type.kind == "boolean" and number > 1):
+            raise CodingError(f"{data.hex(' ')} is no {self.type.name}")
+        if self.type.kind == "real":
+            return self._finite(number * self.scale)
+        value = scaled(number, self.scale)
+        if isinstance(value, float) and abs(number) >= EXACT_COUNTS:
+            raise CodingError(f"{number} cannot be told exactly at a scale of {self.scale:g}; use scale = 1")
+        return value
+
+    def encode(self, value: Number) -> bytes:
+        """The bytes nearest to the value.
+
+        Raises:
+            CodingError: it does not fit, or has lost digits on its way here.
+
+        """
+        if self.type.kind == "real":
+            return self._real(value / self.scale)
+        counts = int((Decimal(repr(value)) / Decimal(repr(self.scale))).to_integral_value(ROUND_HALF_EVEN))
+        if isinstance(value, float) and abs(counts) >= EXACT_COUNTS:
+            raise CodingError(f"{value!r} may have lost digits; write so large a number as a whole one")
+        if self.type.kind == "boolean" and counts not in (0, 1):
+            raise CodingError(f"{text(value)} is neither 0 nor 1, which a BOOLEAN is")
+        try:
+            size = size_of(self.data_type) or 0
+            return counts.to_bytes(size, "little", signed=self.type.kind == "signed")
+        except OverflowError as error:
+            raise CodingError(
+                f"{text(value)} is {counts} for the device, which does not fit {self.type.name}"
+            ) from error
+
+    def _real(self, number: float) -> bytes:
+        try:
+            return struct.pack(_REAL_FORMATS[self.type.bits or 0], self._finite(number))
+        except OverflowError as error:
+            raise CodingError(f"{number:g} does not fit {self.type.name}") from error
+
+    def _finite(self, number: float) -> float:
+        if not math.isfinite(number):
+            raise CodingError(f"{number:g} is no finite {self.type.name}")
+        return number

@@ -1,0 +1,398 @@
+"""Parameters that an EDS offers: their names, what locks them, what releases them, and every number type."""
+
+import struct
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import eds
+from eds.datatypes import DATA_TYPES
+from eds.naming import identifier
+from gateway.coding import EXACT_COUNTS, Coding, CodingError, Number
+from gateway.config import ConfigError, DeviceTable, JointTable
+from gateway.modules.catalogue import Catalogue, resolve
+from gateway.modules.parameters import Lock
+from tests.unit.gateway.harness import DISABLED, HEAD, ROBOT, Bench, Client, config, serving
+
+KNEE = """
+[joint.knee]
+bus = "main"
+node_id = 2
+eds = "{eds}"
+counts_per_revolution = 4096
+gear_ratio = 100.0
+parameters = "eds"
+release = {release}
+"""
+NUMBERS = {
+    code: one for code, one in DATA_TYPES.items() if one.kind in ("boolean", "signed", "unsigned", "real")
+}
+
+
+def catalogue(
+    folder: Path, release: str = "[]", eds_file: str = "joint_drive.eds", more: str = ""
+) -> Catalogue:
+    robot = config(folder, HEAD + KNEE.format(eds=eds_file, release=release) + more)
+    tables: dict[str, JointTable | DeviceTable] = {**robot.joint, **robot.device}
+    found = {name: eds.load(eds.locate(one.eds, robot.path), one.node_id) for name, one in tables.items()}
+    return resolve(robot, found, {})
+
+
+# Names
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("Profile velocity (counts/s)", "profile_velocity"),
+        ("Current controller P gain", "current_controller_p_gain"),
+        ("software_position_limit_min", "software_position_limit_min"),
+        ("Grenzwert für Strom", "grenzwert_fur_strom"),
+        ("位置", ""),
+        ("(only a remark)", ""),
+    ],
+)
+def test_a_name_is_what_the_eds_says_made_typeable(text: str, name: str) -> None:
+    assert identifier(text) == name
+
+
+def test_every_writable_number_of_the_eds_is_there_once_by_name_and_by_address(tmp_path: Path) -> None:
+    for file in ("joint_drive.eds", "elmo_gold.dcf", "trinamic_tmcm_1270.eds"):
+        known = catalogue(tmp_path, eds_file=file)
+        description = eds.load(eds.locate(file, None), 2)
+        expected = {
+            (one.index, one.subindex)
+            for one in description.variables()
+            if one.access_type in ("rw", "rwr", "rww") and one.data_type in NUMBERS
+        }
+        assert {(one.index, one.subindex) for one in known.values()} == expected
+        assert len(known) == len(expected) > 80
+        for name, one in known.items():
+            assert known[f"knee.0x{one.index:04X}:{one.subindex}"] is one
+            assert name.removeprefix("knee.").replace("_", "").replace(":", "").isalnum()
+
+
+def test_a_sub_object_is_named_behind_its_object(tmp_path: Path) -> None:
+    known = catalogue(tmp_path)
+    assert known["knee.software_position_limit_min_position_limit"].object == "0x607D:1"
+    assert known["knee.interpolation_time_period_value"].object == "0x60C2:1"
+    assert known["knee.max_torque"].title == "Max torque (0.001 of rated torque)"
+
+
+SAME_NAMES = """\
+[DeviceInfo]
+ProductName=Twins
+[2001]
+ParameterName=Gain
+DataType=0x0006
+AccessType=rw
+[2002]
+ParameterName=GAIN
+DataType=0x0006
+AccessType=rw
+[2003]
+ParameterName=位置
+DataType=0x0006
+AccessType=rw
+[2004]
+ParameterName=Stiffness
+DataType=0x0006
+AccessType=rw
+"""
+
+
+def test_names_that_are_not_unique_or_no_names_carry_the_address(tmp_path: Path) -> None:
+    (tmp_path / "twins.eds").write_text(SAME_NAMES, encoding="utf-8")
+    assert list(catalogue(tmp_path, eds_file="twins.eds")) == [
+        "knee.gain_2001:0",
+        "knee.gain_2002:0",
+        "knee.object_2003:0",
+        "knee.stiffness",
+    ]
+
+
+def test_a_table_of_the_robots_file_stands_in_for_what_the_eds_offers(tmp_path: Path) -> None:
+    table = '[parameter."knee.{}"]\nobject = "0x6072:0"\nunit = "N·m"\nscale = 0.04\nmax = 50.0\n'
+    known = catalogue(tmp_path, more=table.format("torque_limit"))
+    one = known["knee.0x6072:0"]
+    assert (one.name, one.settings.unit, one.max, one.lock) == ("knee.torque_limit", "N·m", 50.0, None)
+    assert "knee.max_torque" not in known
+    # a name that the file gives to another object is not taken by the EDS
+    known = catalogue(tmp_path, more=table.format("profile_velocity"))
+    assert known["knee.profile_velocity"].object == "0x6072:0"
+    assert known["knee.0x6081:0"].name == "knee.profile_velocity_6081:0"
+
+
+# Locks
+
+
+@pytest.mark.parametrize(
+    ("object_", "release", "lock"),
+    [
+        ("0x6072:0", "[]", Lock.UNRELEASED),
+        ("0x6072:0", '["max_torque"]', None),
+        ("0x6072:0", '["0x6072:0"]', None),
+        ("0x6072:0", '["max_*"]', None),
+        ("0x6072:0", '["profile_*"]', Lock.UNRELEASED),
+        ("0x6040:0", '["*", "controlword", "0x6040:0"]', Lock.CONTROLWORD),
+        ("0x607A:0", '["*"]', Lock.COMMANDED),
+        ("0x607A:0", '["target_position"]', None),
+        ("0x607A:0", '["0x607A:0"]', None),
+        ("0x6060:0", '["modes_*"]', Lock.COMMANDED),
+        ("0x60C1:1", '["*"]', Lock.COMMANDED),
+        ("0x1017:0", '["*", "producer_heartbeat_time", "0x1017:0"]', Lock.COMMUNICATION),
+        ("0x1801:1", '["*"]', Lock.COMMUNICATION),
+        ("0x1010:1", '["*", "0x1010:1"]', Lock.STORAGE),
+        ("0x1011:1", '["*", "0x1011:1"]', Lock.STORAGE),
+    ],
+)
+def test_what_a_release_reaches(tmp_path: Path, object_: str, release: str, lock: Lock | None) -> None:
+    known = catalogue(tmp_path, release, "elmo_gold.dcf" if object_ == "0x60C1:1" else "joint_drive.eds")
+    assert known[f"knee.{object_}"].lock is lock
+
+
+def test_what_an_rpdo_brings_is_released_by_its_whole_name_only(tmp_path: Path) -> None:
+    gait = '[device.gait]\nbus = "main"\nnode_id = 16\neds = "gait_controller.eds"\nparameters = "eds"\n'
+    known = catalogue(tmp_path, more=gait + 'release = ["*", "position_actual_value_left_knee"]')
+    assert known["gait.0x2121:1"].lock is Lock.COMMANDED
+    assert known["gait.0x2121:2"].lock is None
+    assert known["gait.0x2001:0"].lock is None
+
+
+def test_the_second_axis_offers_its_own_objects_and_none_that_the_first_has(tmp_path: Path) -> None:
+    text = "".join(
+        f"[{index:04X}]\nParameterName=Object {index:04X}\nDataType=0x0006\nAccessType=rw\n"
+        for index in (0x2000, 0x6040, 0x6072, 0x6840, 0x6872, 0x7072)
+    )
+    (tmp_path / "axes.eds").write_text(text)
+    ankle = KNEE.format(eds="axes.eds", release='["*"]').replace("joint.knee", "joint.ankle") + "axis = 1\n"
+    known = catalogue(tmp_path, '["*"]', "axes.eds", ankle)
+    assert list(known) == [
+        "knee.object_2000",
+        "knee.object_6040",
+        "knee.object_6072",
+        "ankle.object_6840",
+        "ankle.object_6872",
+    ]
+    assert known["ankle.object_6840"].lock is Lock.CONTROLWORD
+    assert known["ankle.object_6872"].lock is None
+
+
+def test_a_release_that_means_nothing_is_seen_where_parameters_are(tmp_path: Path) -> None:
+    known = catalogue(tmp_path, '["max_torq", "gian_*", "0x6072:1", "max_torque"]')
+    problems = {one.name: one.problem for one in known.values() if one.problem}
+    assert set(problems) == {"knee.max_torq", "knee.gian_*", "knee.0x6072:1"}
+    assert "[joint.knee] release: joint_drive.eds" in str(problems["knee.max_torq"])
+    assert "did you mean 'max_torque'?" in str(problems["knee.max_torq"])
+
+
+@pytest.mark.parametrize(
+    ("release", "parameters", "words"),
+    [
+        ('["max_torque"]', "", 'nothing to release without parameters = "eds"'),
+        ('["knee.max_torque"]', 'parameters = "eds"', "write 'max_torque', without the table's own name"),
+        ('"max_torque"', 'parameters = "eds"', "[joint.knee] release: expected `array`, got `str`"),
+        ("[]", 'parameters = "all"', "[joint.knee] parameters: invalid enum value 'all'"),
+    ],
+)
+def test_a_release_that_cannot_work_is_refused(
+    tmp_path: Path, release: str, parameters: str, words: str
+) -> None:
+    table = KNEE.format(eds="joint_drive.eds", release=release).replace('parameters = "eds"', parameters)
+    with pytest.raises(ConfigError) as caught:
+        config(tmp_path, HEAD + table)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("object_", ["0x1010:1", "0x1011:4"])
+def test_store_and_restore_are_no_parameters(tmp_path: Path, object_: str) -> None:
+    table = KNEE.format(eds="joint_drive.eds", release="[]")
+    with pytest.raises(ConfigError, match="use gwrms store and gwrms restore"):
+        config(tmp_path, HEAD + table + f'[parameter."knee.x"]\nobject = "{object_}"\n')
+
+
+# Through the wire
+
+
+@pytest.fixture
+def offering(bench: Bench, tmp_path: Path) -> str:
+    """The harness's robot, whose left knee offers its EDS and releases two of it."""
+    bench.left.node.objects |= {
+        (0x6081, 0): (65190).to_bytes(4, "little"),
+        (0x6085, 0): (1_300_000).to_bytes(4, "little"),
+        (0x1017, 0): (100).to_bytes(2, "little"),
+    }
+    bench.left.set_state(DISABLED)
+    released = 'parameters = "eds"\nrelease = ["profile_*", "following_*"]'
+    return ROBOT.replace("[joint.right_knee]", released + "\n[joint.right_knee]", 1)
+
+
+def test_read_only_until_released_and_the_refusal_says_how(
+    offering: str, bench: Bench, tmp_path: Path
+) -> None:
+    with serving(config(tmp_path, offering)) as address, Client(address) as client:
+        client.call("control.acquire", ttl_s=60)
+        written = client.call("parameter.write", changes={"left_knee.profile_velocity": 70000})
+        assert written["after"] == {"left_knee.profile_velocity": 70000}
+        error = client.refused("parameter.write", changes={"left_knee.quick_stop_deceleration": 20000})
+        assert (error.kind, error.data["object"]) == ("read_only", "0x6085:0")
+        assert 'add "quick_stop_deceleration" to release in [joint.left_knee]' in str(error)
+        error = client.refused("parameter.write", changes={"left_knee.0x6040:0": 15})
+        assert (error.kind, "enables drives" in str(error)) == ("read_only", True)
+        error = client.refused("parameter.write", changes={"left_knee.producer_heartbeat_time": 0})
+        assert (error.kind, "how the bus works" in str(error)) == ("read_only", True)
+        assert bench.left.node.written() == [(0x6081, (70000).to_bytes(4, "little"))]
+
+
+def test_the_limits_of_the_eds_hold_and_a_moving_drive_keeps_what_is_not_live(
+    offering: str, bench: Bench, tmp_path: Path
+) -> None:
+    with serving(config(tmp_path, offering)) as address, Client(address) as client:
+        client.call("control.acquire", ttl_s=60)
+        error = client.refused("parameter.write", changes={"left_knee.profile_velocity": 520001})
+        assert (error.kind, error.data["limit"]) == ("out_of_limit", 520000)
+        bench.left.set_state(0x1237)  # OPERATION ENABLED
+        error = client.refused("parameter.write", changes={"left_knee.profile_velocity": 70000})
+        assert error.kind == "wrong_state"
+        assert bench.left.node.written() == []
+
+
+def test_an_address_means_the_parameter_and_answers_go_by_name(
+    offering: str, bench: Bench, tmp_path: Path
+) -> None:
+    with serving(config(tmp_path, offering)) as address, Client(address) as client:
+        client.call("control.acquire", ttl_s=60)
+        read = client.call("parameter.read", names=["left_knee.0x6081:0", "gait.0x2001:0"])
+        assert set(read["values"]) == {"left_knee.profile_velocity", "gait.step_length"}
+        written = client.call("parameter.write", changes={"left_knee.0x6081:0": 2000})
+        assert written["after"] == {"left_knee.profile_velocity": 2000}
+        twice = {"left_knee.0x6081:0": 2000, "left_knee.profile_velocity": 3000}
+        assert client.refused("parameter.write", changes=twice).kind == "bad_params"
+        assert client.refused("parameter.read", names=["left_knee.0x6081:1"]).kind == "unknown_name"
+
+
+def test_without_names_only_what_can_be_changed_is_read(offering: str, bench: Bench, tmp_path: Path) -> None:
+    with serving(config(tmp_path, offering)) as address, Client(address) as client:
+        released = {f"left_knee.{name}" for name in ("profile_velocity", "profile_acceleration")}
+        released |= {f"left_knee.{name}" for name in ("profile_deceleration", "following_error_window")}
+        released |= {"left_knee.following_error_time_out", "left_knee.max_torque"}
+        gait = {"gait.step_length", "gait.cycle_time", "gait.toe_height"}
+        assert set(client.call("parameter.list")["values"]) == released | gait
+        assert set(client.call("parameter.read")["values"]) == released | gait
+        uploads = [index for what, index, _ in bench.left.node.log if what == "upload"]
+        assert sorted(uploads) == sorted([0x6081, 0x6083, 0x6084, 0x6065, 0x6066, 0x6072])
+        everything = client.call("parameter.list", names=["*"])["values"]
+        assert len(everything) > 80
+        infos = {one["name"]: one for one in client.call("robot.describe")["parameters"]}
+        assert set(infos) == set(everything)
+        assert (infos["left_knee.controlword"]["read_only"], infos["left_knee.controlword"]["access"]) == (
+            "controlword",
+            "rww",
+        )
+        assert infos["left_knee.profile_velocity"]["read_only"] is None
+        assert infos["left_knee.profile_velocity"]["type"] == "UNSIGNED32"
+
+
+# Numbers, exactly
+
+
+@pytest.mark.parametrize("code", NUMBERS)
+def test_the_ends_of_every_integer_type_go_there_and_back(code: int) -> None:
+    known, coding = NUMBERS[code], Coding(code)
+    if known.kind == "real":
+        return
+    bits = known.bits or 0
+    low = -(1 << bits - 1) if known.kind == "signed" else 0
+    high = (1 << (bits - 1 if known.kind == "signed" else bits)) - 1
+    for number in (low, low + 1, high - 1, high):
+        data = coding.encode(number)
+        assert len(data) == (bits + 7) // 8
+        decoded = coding.decode(data)
+        assert (decoded, type(decoded)) == (number, int)
+    for number in (low - 1, high + 1):
+        with pytest.raises(CodingError, match=r"does not fit|neither 0 nor 1"):
+            coding.encode(number)
+
+
+@given(st.sampled_from([code for code, one in NUMBERS.items() if one.kind != "real"]), st.data())
+def test_an_integers_bytes_survive_reading_and_writing_back_at_any_scale(
+    code: int, data: st.DataObject
+) -> None:
+    bits = NUMBERS[code].bits or 0
+    held = data.draw(st.integers(0, (1 << bits) - 1)).to_bytes((bits + 7) // 8, "little")
+    coding = Coding(code, data.draw(st.sampled_from([1.0, 0.001, 0.04, -0.5, 10.0, 1.5339807878856412e-05])))
+    number = int.from_bytes(held, "little", signed=NUMBERS[code].kind == "signed")
+    try:
+        value = coding.decode(held)
+    except CodingError:
+        assert abs(number) >= EXACT_COUNTS
+        assert not coding.scale.is_integer()
+    else:
+        assert coding.encode(value) == held
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_a_real32_is_told_as_the_device_stores_it(number: float) -> None:
+    coding = Coding(0x08)
+    data = coding.encode(number)
+    assert data == struct.pack("<f", number)
+    assert coding.encode(coding.decode(data)) == data
+    assert struct.pack("<d", coding.decode(data)) == struct.pack("<d", number)
+
+
+def test_a_real_that_a_device_rounds_is_answered_rounded() -> None:
+    assert Coding(0x08).decode(Coding(0x08).encode(0.1)) == struct.unpack("<f", struct.pack("<f", 0.1))[0]
+    assert Coding(0x11).decode(Coding(0x11).encode(0.1)) == 0.1
+
+
+@pytest.mark.parametrize(
+    ("coding", "value"),
+    [
+        (Coding(0x1B), 2.0**53),  # a float of that size may have been another number
+        (Coding(0x1B, 0.001), 1e16),
+        (Coding(0x08), 1e39),
+        (Coding(0x11, 1e-300), 1e300),
+        (Coding(0x01), 2),
+    ],
+)
+def test_what_would_not_arrive_exactly_is_refused(coding: Coding, value: Number) -> None:
+    with pytest.raises(CodingError):
+        coding.encode(value)
+
+
+@pytest.mark.parametrize(
+    ("coding", "data"),
+    [
+        (Coding(0x08), struct.pack("<f", float("nan"))),
+        (Coding(0x11), struct.pack("<d", float("inf"))),
+        (Coding(0x08), b"\x00\x00"),
+        (Coding(0x01), b"\x02"),
+        (Coding(0x07), b""),
+        (Coding(0x1B, 0.1), b"\xff" * 8),
+    ],
+)
+def test_what_is_no_number_is_no_value(coding: Coding, data: bytes) -> None:
+    with pytest.raises(CodingError):
+        coding.decode(data)
+
+
+def test_sixty_four_bits_go_over_the_wire_unharmed(bench: Bench, tmp_path: Path) -> None:
+    object_ = "[2000]\nParameterName=Serial\nDataType=0x001B\nAccessType=rw\n"
+    (tmp_path / "wide.eds").write_text(object_)
+    bench.gait.node.objects[0x2000, 0] = (2**63 + 1).to_bytes(8, "little")
+    text = ROBOT.replace(
+        'eds = "gait_controller.eds"', 'eds = "wide.eds"\nparameters = "eds"\nrelease = ["*"]'
+    )
+    robot = config(tmp_path, text)
+    bench.files["gait"] = str(tmp_path / "wide.eds")
+    bench.left.set_state(DISABLED)
+    bench.right.set_state(DISABLED)
+    with serving(robot) as address, Client(address) as client:
+        client.call("control.acquire", ttl_s=60)
+        read = client.call("parameter.read", names=["gait.serial"])["values"]
+        assert read["gait.serial"]["value"] == 2**63 + 1
+        after = client.call("parameter.write", changes={"gait.serial": 2**64 - 1})["after"]
+        assert after == {"gait.serial": 2**64 - 1}
+        assert client.refused("parameter.write", changes={"gait.serial": 2.0**60}).kind == "out_of_limit"
