@@ -22,8 +22,8 @@ Table = Mapping[str, Any]
 
 CONTROLWORD = 0x6040
 AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
-RESERVED_NAMES = ("resource", "status", "robot")
 STORE, RESTORE = 0x1010, 0x1011
+RESERVED_NAMES = ("resource", "status", "robot")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -50,7 +50,6 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     records: str | None = None
 
 
-class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`[joint.NAME]`: a joint, and what its EDS offers as parameters."""
 
@@ -65,6 +64,7 @@ class DeviceTable(DeviceSettings, frozen=True, forbid_unknown_fields=True, kw_on
     release: tuple[str, ...] = ()
 
 
+class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`[parameter."component.name"]`: one object of a CANopen device that may be changed, and how far.
 
     value = device's number · scale, in `unit`. `max_step` limits one change. `live` allows changes while a
@@ -195,12 +195,12 @@ def _complaints(config: RobotConfig) -> Iterator[str]:
     yield from _about_names(config)
     yield from _about_nodes(config)
     yield from _about_ports(config)
-    for name, parameter in config.parameter.items():
-        yield from _about_parameter(config, name, parameter)
-
     for table, devices in (("joint", config.joint), ("device", config.device)):
         for name, device in devices.items():
             yield from _about_release(_header(table, name), name, device)
+    for name, parameter in config.parameter.items():
+        yield from _about_parameter(config, name, parameter)
+
 
 def _about_names(config: RobotConfig) -> Iterator[str]:
     seen: dict[str, str] = {}
@@ -252,6 +252,14 @@ def _about_ports(config: RobotConfig) -> Iterator[str]:
         taken[imu.port] = where
 
 
+def _about_release(where: str, name: str, device: JointTable | DeviceTable) -> Iterator[str]:
+    if device.release and device.parameters is None:
+        yield f'{where} release: there is nothing to release without parameters = "eds"'
+    for entry in device.release:
+        if entry.startswith(f"{name}."):
+            yield f"{where} release: write {entry.removeprefix(f'{name}.')!r}, without the table's own name"
+
+
 def _about_parameter(config: RobotConfig, name: str, parameter: ParameterSettings) -> Iterator[str]:
     where = _header("parameter", name)
     component, dot, quantity = name.partition(".")
@@ -265,14 +273,8 @@ def _about_parameter(config: RobotConfig, name: str, parameter: ParameterSetting
         yield f"{where} object: the subindex goes from 0 to 255"
     if index in range(CONTROLWORD, 0xA000, AXIS_OFFSET):
         yield f"{where} object: {parameter.object} is a controlword: it enables drives and is no parameter"
-def _about_release(where: str, name: str, device: JointTable | DeviceTable) -> Iterator[str]:
-    if device.release and device.parameters is None:
-        yield f'{where} release: there is nothing to release without parameters = "eds"'
-    for entry in device.release:
-        if entry.startswith(f"{name}."):
-            yield f"{where} release: write {entry.removeprefix(f'{name}.')!r}, without the table's own name"
-
-
+    if index in (STORE, RESTORE):
+        yield f"{where} object: {parameter.object} is a command; use gwrms store and gwrms restore"
     numbers = {
         "scale": parameter.scale,
         "min": parameter.min,
@@ -286,8 +288,6 @@ def _about_release(where: str, name: str, device: JointTable | DeviceTable) -> I
         yield f"{where} scale: 0 would make every value 0"
     if parameter.min is not None and parameter.max is not None and parameter.min > parameter.max:
         yield f"{where} min: {parameter.min} is above max {parameter.max}"
-    if index in (STORE, RESTORE):
-        yield f"{where} object: {parameter.object} is a command; use gwrms store and gwrms restore"
     for state in parameter.states or ():
         if state not in STATE_WORDS.values():
             known = ", ".join(STATE_WORDS.values())
