@@ -12,18 +12,21 @@ import msgspec
 from msgspec import Meta, Struct
 
 from drivers.bus.settings import CanSettings, DeviceSettings, Role
-from drivers.imu.settings import ImuSettings
+from drivers.imu.settings import CanImuSettings, ImuSettings, InclinometerSettings, MountedSettings, kind_of
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
+from gateway.guard.checks import complaints as about_guard
+from gateway.guard.settings import WATCHES, GuardSettings, Rule
 from gateway.records.folder import default_folder
 
 Table = Mapping[str, Any]
+OnBus = JointSettings | DeviceSettings | CanImuSettings | InclinometerSettings
 
 CONTROLWORD = 0x6040
 AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
 STORE, RESTORE = 0x1010, 0x1011
-RESERVED_NAMES = ("resource", "status", "robot")
+RESERVED_NAMES = ("resource", "status", "robot", "guard")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
@@ -97,8 +100,9 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     joint: dict[str, JointTable] = {}
     device: dict[str, DeviceTable] = {}
     insole: dict[str, InsoleSettings] = {}
-    imu: dict[str, ImuSettings] = {}
+    imu: dict[str, MountedSettings] = {}
     parameter: dict[str, ParameterSettings] = {}
+    guard: GuardSettings | None = None
 
     @property
     def records(self) -> Path:
@@ -113,7 +117,7 @@ _NAMED: Mapping[str, type[Struct]] = {
     "joint": JointTable,
     "device": DeviceTable,
     "insole": InsoleSettings,
-    "imu": ImuSettings,
+    "imu": MountedSettings,  # one of several, by what the table says
     "parameter": ParameterSettings,
 }
 COMPONENT_TABLES = ("joint", "device", "insole", "imu")
@@ -142,7 +146,7 @@ def load(path: Path) -> RobotConfig:
 
 
 def _convert(path: Path, document: Table) -> RobotConfig:
-    _check_keys("the file", document, allowed=[*_SINGLE, *_NAMED], required=["robot"])
+    _check_keys("the file", document, allowed=[*_SINGLE, *_NAMED, "guard"], required=["robot"])
     parts: dict[str, Any] = {"path": path}
     for table, kind in _SINGLE.items():
         if table in document:
@@ -152,7 +156,28 @@ def _convert(path: Path, document: Table) -> RobotConfig:
         if not isinstance(entries, dict):
             raise ConfigError(f"[{table}] holds tables: write [{table}.NAME]")
         parts[table] = {name: _struct(_header(table, name), entry, kind) for name, entry in entries.items()}
+    if "guard" in document:
+        parts["guard"] = _guard(document["guard"])
     return RobotConfig(**parts)
+
+
+def _guard(table: Any) -> Struct:
+    """`[guard]` with its rules, each by what it watches."""
+    rules = table.get("rule", {}) if isinstance(table, dict) else {}
+    settings = _struct("[guard]", {**table, "rule": {}} if isinstance(table, dict) else table, GuardSettings)
+    if not isinstance(rules, dict):
+        raise ConfigError("[guard] rule holds tables: write [guard.rule.NAME]")
+    return msgspec.structs.replace(settings, rule={name: _rule(name, rule) for name, rule in rules.items()})
+
+
+def _rule(name: str, table: Any) -> Struct:
+    where = _header("guard.rule", name)
+    if not _NAME.fullmatch(name):
+        raise ConfigError(f"{where}: a name is a letter, then letters, digits, _ and -")
+    watch = table.get("watch") if isinstance(table, dict) else None
+    if watch is not None and watch not in WATCHES:
+        raise ConfigError(f"{where} watch: there is no {watch!r}; allowed are {', '.join(WATCHES)}")
+    return _struct(where, table, Rule if watch is None else WATCHES[watch].rule)
 
 
 def _header(table: str, name: str) -> str:
@@ -165,6 +190,8 @@ def _struct(where: str, table: Any, kind: type[Struct]) -> Struct:
     if kind is ParameterSettings and table and all(isinstance(entry, dict) for entry in table.values()):
         component, name = where.removesuffix("]").rpartition(".")[2], next(iter(table))
         raise ConfigError(f'{where}: a parameter\'s name is one key: write [parameter."{component}.{name}"]')
+    if kind is MountedSettings:
+        kind = kind_of(table)
     fields = msgspec.structs.fields(kind)
     required = [field.encode_name for field in fields if field.required]
     # Whatever else stands in [can.NAME] is for python-can.
@@ -200,6 +227,8 @@ def _complaints(config: RobotConfig) -> Iterator[str]:
             yield from _about_release(_header(table, name), name, device)
     for name, parameter in config.parameter.items():
         yield from _about_parameter(config, name, parameter)
+    if config.guard is not None:
+        yield from about_guard(config, config.guard)
 
 
 def _about_names(config: RobotConfig) -> Iterator[str]:
@@ -221,19 +250,27 @@ def _about_nodes(config: RobotConfig) -> Iterator[str]:
     own = {
         (name, bus.node_id): f"[can.{name}]" for name, bus in config.can.items() if bus.node_id is not None
     }
-    for table, devices in (("joint", config.joint), ("device", config.device)):
-        for name, settings in devices.items():
-            where = f"[{table}.{name}]"
-            if settings.bus not in config.can:
-                known = ", ".join(config.can) or "none"
-                yield f"{where} bus: there is no bus {settings.bus!r}; [can.NAME] tables here: {known}"
-            node = (settings.bus, settings.node_id)
-            axis = settings.axis if isinstance(settings, JointSettings) else None
-            other = seen.get((*node, axis)) or own.get(node) or (whole.get(node) if axis is None else None)
-            if other:
-                yield f"{where} node_id: {settings.node_id} on bus {settings.bus!r} belongs to {other}"
-            seen[(*node, axis)] = where
-            whole[node] = where
+    for where, settings in _on_buses(config):
+        if settings.bus not in config.can:
+            known = ", ".join(config.can) or "none"
+            yield f"{where} bus: there is no bus {settings.bus!r}; [can.NAME] tables here: {known}"
+        if isinstance(settings, CanImuSettings):
+            continue
+        node = (settings.bus, settings.node_id)
+        axis = settings.axis if isinstance(settings, JointSettings) else None
+        other = seen.get((*node, axis)) or own.get(node) or (whole.get(node) if axis is None else None)
+        if other:
+            yield f"{where} node_id: {settings.node_id} on bus {settings.bus!r} belongs to {other}"
+        seen[(*node, axis)] = where
+        whole[node] = where
+
+
+def _on_buses(config: RobotConfig) -> Iterator[tuple[str, OnBus]]:
+    """Every table of something on a CAN bus, by its header."""
+    for table in COMPONENT_TABLES:
+        for name, settings in getattr(config, table).items():
+            if isinstance(settings, OnBus):
+                yield f"[{table}.{name}]", settings
 
 
 def _about_ports(config: RobotConfig) -> Iterator[str]:
@@ -246,6 +283,8 @@ def _about_ports(config: RobotConfig) -> Iterator[str]:
             yield f"{where} port: {insole.port!r} is shared with {other}: same baudrate and format, please"
         taken[insole.port] = where
     for name, imu in config.imu.items():
+        if not isinstance(imu, ImuSettings):
+            continue
         where = f"[imu.{name}]"
         if imu.port in taken:
             yield f"{where} port: {imu.port!r} is in use by {taken[imu.port]}; each sensor has its own port"

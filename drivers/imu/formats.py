@@ -1,4 +1,4 @@
-"""The IMU formats by name: their parser, and how their device lays its axes, angles and world."""
+"""The IMU formats on serial ports by name: their parser, and how their device lays its axes and angles."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,22 +16,29 @@ from drivers.parsing import Parser
 
 
 @dataclass(frozen=True, slots=True)
-class ImuFormat:
-    """One device's language and conventions.
+class Conventions:
+    """How a device lays its axes and angles.
 
     `axes` are the sensor's axes along the trunk's x (forward), y (left) and z (up) when it is mounted as its
     maker means it; `angles` makes the orientation (sensor to the device's world) of its roll, pitch and yaw.
     """
 
-    make_parser: Callable[[], Parser[ImuFrame]]
-    clock: ClockSpec | None = None  # of the frames' ticks
     axes: tuple[Axis, Axis, Axis] = ("x", "y", "z")
     angles: Callable[[float, float, float], Quaternion] = rotation.from_yaw_pitch_roll
 
 
+@dataclass(frozen=True, slots=True)
+class ImuFormat:
+    """One device's language."""
+
+    make_parser: Callable[[], Parser[ImuFrame]]
+    clock: ClockSpec | None = None  # of the frames' ticks
+    conventions: Conventions = Conventions()
+
+
 FORMATS: dict[str, ImuFormat] = {
     "witmotion": ImuFormat(WitmotionParser),
-    "bno08x-rvc": ImuFormat(Bno08xRvcParser, bno08x_rvc.CLOCK, angles=bno08x_rvc.from_angles),
+    "bno08x-rvc": ImuFormat(Bno08xRvcParser, bno08x_rvc.CLOCK, Conventions(angles=bno08x_rvc.from_angles)),
     "xsens": ImuFormat(XsensParser, xsens.CLOCK),
-    "vectornav": ImuFormat(VectornavParser, vectornav.CLOCK, axes=("x", "-y", "-z")),
+    "vectornav": ImuFormat(VectornavParser, vectornav.CLOCK, Conventions(axes=("x", "-y", "-z"))),
 }

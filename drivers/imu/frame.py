@@ -18,6 +18,7 @@ class ImuFrame(msgspec.Struct, frozen=True):
     angular_velocity: Vector | None = None  # rad/s
     roll_pitch_yaw: Vector | None = None  # rad
     orientation: Quaternion | None = None  # sensor to world
+    up: Vector | None = None  # the direction of up, of a device that knows no more of its attitude
     z_down: bool = False  # the world of angles and orientation is north-east-down
     magnetic_field: Vector | None = None  # T
     temperature: float | None = None  # °C
@@ -31,6 +32,7 @@ _PARTS = {
     "acceleration": "xyz",
     "angular_velocity": "xyz",
     "orientation": "wxyz",
+    "up": "xyz",
     "magnetic_field": "xyz",
 }
 

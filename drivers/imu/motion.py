@@ -7,10 +7,10 @@ from typing import NamedTuple
 from drivers.errors import SettingsError
 from drivers.imu import rotation
 from drivers.imu.attitude import ComplementaryFilter
-from drivers.imu.formats import ImuFormat
+from drivers.imu.formats import Conventions
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion, Vector
-from drivers.imu.settings import ImuSettings
+from drivers.imu.settings import Attitude, MountedSettings
 from drivers.samples import Channel
 
 UNITS: dict[str, str] = {
@@ -77,17 +77,22 @@ class TrunkMotion:
     """
 
     def __init__(
-        self, name: str, settings: ImuSettings, imu_format: ImuFormat, zero: Quaternion = rotation.IDENTITY
+        self,
+        name: str,
+        settings: MountedSettings,
+        conventions: Conventions,
+        attitude: Attitude = "auto",
+        zero: Quaternion = rotation.IDENTITY,
     ) -> None:
-        self._angles = imu_format.angles
-        self._attitude = settings.attitude
+        self._angles = conventions.angles
+        self._attitude = attitude
         try:
-            axes = rotation.from_axes(settings.axes or imu_format.axes)
+            axes = rotation.from_axes(settings.axes or conventions.axes)
         except ValueError as error:
             raise SettingsError(f"[imu.{name}]: {error}") from error
         self._mounted_from_sensor = rotation.multiply(rotation.from_yaw_pitch_roll(*settings.mounting), axes)
         self._filter = ComplementaryFilter()
-        self.recent: deque[Quaternion] = deque(maxlen=ZERO_FRAMES)  # world from sensor, for a zero
+        self.recent: deque[Vector] = deque(maxlen=ZERO_FRAMES)  # up in the sensor's axes, for a zero
         self.set_zero(zero)
         self.restart()
 
@@ -116,19 +121,22 @@ class TrunkMotion:
             angular_velocity = rotation.transform(self._turn, frame.angular_velocity)
             indices, values = indices + ANGULAR_VELOCITY, values + angular_velocity
         sensor = self._world_from_sensor(frame, stamp_ns)
+        sensors_up = frame.up if sensor is None else rotation.up(sensor)
+        if sensors_up is not None:
+            up = rotation.transform(self._turn, sensors_up)
+            indices, values = indices + TILT, values + tilt(up)
+            self.recent.append(sensors_up)
         if sensor is not None:
             orientation = rotation.multiply(sensor, self._sensor_from_trunk)
-            up = rotation.up(orientation)
-            indices, values = indices + TILT + ORIENTATION, values + tilt(up) + orientation
-            self.recent.append(sensor)
+            indices, values = indices + ORIENTATION, values + orientation
         if frame.temperature is not None:
             indices, values = indices + TEMPERATURE, (*values, frame.temperature)
         return Felt(indices, values, acceleration, angular_velocity, up)
 
     def ups_as_mounted(self) -> list[Vector]:
         """The world's up in the axes of the trunk without a zero, of the last second or so."""
-        back = rotation.conjugate(self._mounted_from_sensor)
-        return [rotation.up(rotation.multiply(sensor, back)) for sensor in self.recent]
+        mounted = rotation.matrix(self._mounted_from_sensor)
+        return [rotation.transform(mounted, up) for up in self.recent]
 
     def _world_from_sensor(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
         """Sensor to a world whose z points up: the device's own attitude, or the filter's."""

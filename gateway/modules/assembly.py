@@ -10,7 +10,10 @@ from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.component import Component, Kind
 from drivers.errors import DriverError
+from drivers.imu.can_device import CanImu
 from drivers.imu.device import Imu
+from drivers.imu.inclinometer import Inclinometer
+from drivers.imu.settings import CanImuSettings, ImuSettings, InclinometerSettings, MountedSettings
 from drivers.insole.device import Insole, line_for, pair
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.drive import JointDrive
@@ -46,7 +49,7 @@ def assemble(config: RobotConfig) -> Robot:
         if (hip := robot.components.get(f"{foot.foot}_hip")) is not None:
             foot.follow_hip(hip.latest)
     for name, imu in config.imu.items():
-        _add(robot, Kind.IMU, name, lambda name=name, imu=imu: Imu(name, imu, config.path.parent))  # type: ignore[misc]
+        _add(robot, Kind.IMU, name, _imu(robot, config.path, name, imu))
     return robot
 
 
@@ -76,6 +79,21 @@ def _insole(
         if settings.port not in lines:
             lines[settings.port] = line_for(settings, path.parent)
         return Insole(name, settings, lines[settings.port], path.parent)
+
+    return build
+
+
+def _imu(robot: Robot, path: Path, name: str, settings: MountedSettings) -> Callable[[], Component]:
+    def build() -> Component:
+        if isinstance(settings, ImuSettings):
+            return Imu(name, settings, path.parent)
+        if isinstance(settings, CanImuSettings):
+            return CanImu(name, settings, robot.buses[settings.bus], path.parent)
+        if not isinstance(settings, InclinometerSettings):
+            raise TypeError(f"no driver for {type(settings).__name__}")
+        description = eds.load(eds.locate(settings.eds, path), settings.node_id)
+        robot.descriptions[name] = description
+        return Inclinometer(name, settings, robot.buses[settings.bus], description, path.parent)
 
     return build
 

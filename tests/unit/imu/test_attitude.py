@@ -14,7 +14,7 @@ from drivers.imu.attitude import STANDARD_GRAVITY, ComplementaryFilter
 from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import TILT, TrunkMotion, tilt
-from drivers.imu.settings import ImuSettings
+from drivers.imu.settings import Attitude, ImuSettings
 
 RATE_HZ = 200
 STEP_NS = 1_000_000_000 // RATE_HZ
@@ -119,8 +119,8 @@ def test_long_gap_begins_anew_from_gravity() -> None:
     assert ours.update(10**9, (0.0, 0.0, 0.0), felt) == pytest.approx(lean)
 
 
-def motion(attitude: str) -> TrunkMotion:
-    return TrunkMotion("trunk", ImuSettings(port="-", attitude=attitude), FORMATS["witmotion"])  # type: ignore[arg-type]
+def motion(attitude: Attitude) -> TrunkMotion:
+    return TrunkMotion("trunk", ImuSettings(port="-"), FORMATS["witmotion"].conventions, attitude)
 
 
 def feed_raw(trunk: TrunkMotion, seconds: float) -> list[float | None]:

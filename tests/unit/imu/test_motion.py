@@ -15,7 +15,7 @@ STANDARD_GRAVITY = 9.80665
 
 
 def values(frame: ImuFrame, **settings: object) -> dict[str, float | None]:
-    motion = TrunkMotion("trunk", ImuSettings(port="-", **settings), FORMATS["witmotion"])  # type: ignore[arg-type]
+    motion = TrunkMotion("trunk", ImuSettings(port="-", **settings), FORMATS["witmotion"].conventions)  # type: ignore[arg-type]
     felt = motion.felt(frame, 0)
     return dict(zip((list(UNITS)[index] for index in felt.indices), felt.values, strict=True))
 

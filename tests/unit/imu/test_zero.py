@@ -18,7 +18,7 @@ def up(forward: float, left: float) -> rotation.Vector:
 
 
 def test_zero_posture_reads_zero_and_others_read_what_they_differ_by() -> None:
-    trunk = TrunkMotion("trunk", ImuSettings(port="-"), FORMATS["witmotion"])
+    trunk = TrunkMotion("trunk", ImuSettings(port="-"), FORMATS["witmotion"].conventions)
     standing = rotation.from_yaw_pitch_roll(-0.03, 0.08, 1.0)
     for number in range(50):
         trunk.felt(ImuFrame("q", orientation=standing), number)

@@ -1,0 +1,84 @@
+"""What every trunk IMU is to the gateway, whatever it is wired to: frames in, channels and quality out."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from drivers.component import Kind
+from drivers.freshness import Freshness
+from drivers.imu import zero
+from drivers.imu.formats import Conventions
+from drivers.imu.frame import ImuFrame
+from drivers.imu.motion import TrunkMotion, channels
+from drivers.imu.plausibility import ImuCheck
+from drivers.imu.rotation import IDENTITY, Quaternion
+from drivers.imu.settings import Attitude, MountedSettings
+from drivers.latest import Latest
+from drivers.samples import Quality, State
+
+
+class TrunkImu:
+    """Base of the IMUs.
+
+    Channels, in trunk axes (REP-103: x forward, y left, z up): `tilt_forward` (rad, positive leaning
+    forward), `tilt_side` (rad, positive leaning left), `acceleration_x|y|z` (m/s², specific force: +g upwards
+    at rest), `angular_velocity_x|y|z` (rad/s), `orientation_w|x|y|z` (trunk to a world whose z points up),
+    `temperature` (°C). What the device does not send stays null.
+
+    `beside` is the folder that a file named in the settings is looked for in.
+
+    Raises:
+        SettingsError: the configured axes are no right-handed frame, or the zero's file is wrong.
+
+    """
+
+    kind = Kind.IMU
+
+    def __init__(
+        self,
+        name: str,
+        settings: MountedSettings,
+        conventions: Conventions,
+        attitude: Attitude,
+        beside: Path | None,
+    ) -> None:
+        self.name = name
+        self.channels = channels(name)
+        self.latest = Latest(name, self.channels, settings.stale_after_s)
+        self.check = ImuCheck(name)
+        stored = IDENTITY if settings.zero is None else zero.load((beside or Path()) / settings.zero)
+        self._motion = TrunkMotion(name, settings, conventions, attitude, stored)
+        self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
+
+    def zero_now(self) -> Quaternion:
+        """Count tilt from the present posture (not stored; `zero.text` makes the file).
+
+        Raises:
+            NotUpright: there is no attitude, the trunk moves, or it is far from upright.
+
+        """
+        measured = zero.measure(self._motion.ups_as_mounted())
+        self._motion.set_zero(measured)
+        return measured
+
+    def _take(self, frame: ImuFrame, stamp_ns: int) -> None:
+        """A frame that was taken at `stamp_ns`."""
+        felt = self._motion.felt(frame, stamp_ns)
+        if felt.indices:
+            self.check.update(stamp_ns, felt.acceleration, felt.angular_velocity, felt.up)
+            self._freshness.seen(stamp_ns)
+            self.latest.update(stamp_ns, felt.indices, felt.values)
+
+    def _forget(self) -> None:
+        """Nothing that the device said before is true any more."""
+        self.latest.clear()
+        self._freshness.disconnected()
+        self._motion.restart()
+        self.check.restart()
+
+    def _quality(self, now_ns: int, silence: str | None, counters: Mapping[str, int]) -> Quality:
+        """`silence` is why nothing comes, in words; it matters only where nothing comes."""
+        state, age_ms = self._freshness.state(now_ns)
+        problem = self.check.problem if state is State.OK else silence
+        if state is State.OK and problem is not None:
+            state = State.FAULT
+        return Quality(state, age_ms, problem, {**counters, "stale": self._freshness.stale})
