@@ -13,7 +13,9 @@ from eds.description import Description
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, Clock, Repeating
 from hil_sim.drive.power_state import PowerState
-from hil_sim.gait.generator import Activity, Generator, smooth
+from hil_sim.gait.activity import Activity
+from hil_sim.gait.generator import Generator
+from hil_sim.gait.profiles import smooth
 from hil_sim.gait.walk import Shape
 from hil_sim.node.dictionary import Value
 from hil_sim.node.nmt import NMT_COB_ID, NmtService, NmtState
@@ -258,9 +260,8 @@ class GaitController(Node):
         self._move()
 
     def _settle(self) -> None:
-        """Nobody walks on with drives that have stopped: the wearer comes to stand, or stays seated."""
-        seated = self.generator.sitting == 1.0
-        self.generator.step(self._period_s(), Activity.SIT if seated else Activity.STAND, self._shape())
+        """Nobody walks on with drives that have stopped: the wearer comes to stand, or stays on the seat."""
+        self.generator.step(self._period_s(), self.generator.at_rest, self._shape())
 
     def _period_s(self) -> float:
         return self.dictionary[CYCLE_PERIOD].number() / 1e6

@@ -9,7 +9,8 @@ from hil_sim.clock import MILLISECOND_NS, Clock
 from hil_sim.controller import GaitController
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
-from hil_sim.gait.generator import STANDING, Activity
+from hil_sim.gait.activity import Activity
+from hil_sim.gait.posture import STANDING
 from hil_sim.gait.wearer import Wearer
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 

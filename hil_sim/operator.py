@@ -8,7 +8,7 @@ from hil_sim import controller
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.injector import Faults, check_fault, find
-from hil_sim.gait.generator import Activity
+from hil_sim.gait.activity import Activity
 
 Request = Mapping[str, Any]
 Answer = dict[str, Any]

@@ -14,17 +14,16 @@ class Curve:
     """A periodic function of the phase (0 … 1), cubic between equally spaced values (rad)."""
 
     def __init__(self, values: Sequence[float]) -> None:
-        self._values = tuple(values)
+        self._count = len(values)
+        self._padded = (values[-1], *values, *values[:3])
         self.mean = sum(values) / len(values)
         self.range = max(values) - min(values)
 
     def __call__(self, phase: float) -> float:
-        values = self._values
-        count = len(values)
-        place = phase * count
-        index = math.floor(place)
+        place = phase % 1.0 * self._count
+        index = int(place)
         t = place - index
-        a, b, c, d = (values[(index + shift) % count] for shift in (-1, 0, 1, 2))
+        a, b, c, d = self._padded[index : index + 4]
         # Catmull-Rom: through every value, with a continuous slope.
         return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
 
@@ -43,6 +42,9 @@ class LegCurves(NamedTuple):
     hip: Curve
     knee: Curve
     ankle: Curve
+
+    def at(self, phase: float) -> Leg:
+        return Leg(self.hip(phase), self.knee(phase), self.ankle(phase))
 
 
 def _closed(rows: Sequence[float]) -> Curve:

@@ -1,98 +1,245 @@
-"""The motion that the gait controller asks for: standing, walking, sitting, and smooth ways between them."""
+"""The motion of the wearer from moment to moment: what is being done, and smooth ways to what is wanted."""
 
-import math
-from enum import IntEnum
+import random
 
+from hil_sim.gait import posture
+from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.curves import Leg
-from hil_sim.gait.walk import Shape, leg
-
-
-class Activity(IntEnum):
-    """What the wearer is to do (object 2005h of the gait controller)."""
-
-    STAND = 0
-    WALK = 1
-    SIT = 2
-
-
-STANDING = Leg(math.radians(4.0), math.radians(8.0), math.radians(4.0))
-SITTING = Leg(math.radians(85.0), math.radians(90.0), math.radians(5.0))
+from hil_sim.gait.gaits import GAITS, LEFT, RIGHT, Gait
+from hil_sim.gait.mishaps import LYING_PITCH, TRIP_PHASE, Fall, FallState, Stumble, side_of_fall
+from hil_sim.gait.posture import LYING, SITTING, STANDING
+from hil_sim.gait.profiles import Ramp, mix
+from hil_sim.gait.rhythm import Lag, Rhythm
+from hil_sim.gait.subject import NOMINAL, WearerSettings
+from hil_sim.gait.walk import Shape, lifted, stance_share, swing
 
 _WALK_RAMP_S = 1.5
 _SIT_RAMP_S = 2.5
-_SHAPE_TIME_S = 0.4  # a changed parameter is taken over in about three of these
-_RISE_LEAN = 0.35  # rad, how far the trunk comes forward half-way between sitting and standing
-_FIRST_PHASE = 0.85  # the left leg begins with the end of a swing
+_CHANGE_S = 1.2  # from one gait to another
+_LAG_S = 0.2  # a changed parameter is taken over in about three of these
 
-
-def smooth(share: float) -> float:
-    """0 … 1 to 0 … 1 with no jump in speed or acceleration (minimum jerk)."""
-    return share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
+_FALLEN = {FallState.FALLING: Label.FALL, FallState.LYING: Label.LYING, FallState.RISING: Label.GET_UP}
 
 
 class Generator:
-    """The present phase, activity and shape; `step` moves them on, the rest says what they mean."""
+    """The present motion of one wearer; `step` moves it on, the rest says what it is.
 
-    def __init__(self, shape: Shape) -> None:
+    Without a `source` of random numbers every stride is like the other. Any activity can follow any other;
+    where one has to stand or get up in between, that is done first.
+    """
+
+    def __init__(
+        self, shape: Shape, wearer: WearerSettings = NOMINAL, source: random.Random | None = None
+    ) -> None:
+        self.wearer = wearer
+        self.heading = 0.0  # yaw of the way (rad, to the left); goes on over full turns
+        self._source = source
         self.reset(shape)
 
     def reset(self, shape: Shape) -> None:
         """Stand, with this shape for the steps to come."""
-        self.phase = _FIRST_PHASE
-        self.shape = shape
-        self._walk_share = 0.0
-        self._sit_share = 0.0
+        self.stumble, self.fall = Stumble(), Fall()
+        self._rhythm = Rhythm(self.wearer.variability, self._source)
+        self._lag = Lag(_LAG_S, self._targets(shape))
+        self._walk, self._sit, self._change = Ramp(_WALK_RAMP_S), Ramp(_SIT_RAMP_S), Ramp(_CHANGE_S)
+        self._from = self._to = Activity.WALK
+        self._activity = Activity.STAND
+        self._mishap: Activity | None = None
+
+    # -- moving on ---------------------------------------------------------------------------------------
+
+    def step(self, dt: float, activity: Activity, wanted: Shape) -> None:
+        """Move on by `dt` seconds towards `activity` and `wanted`."""
+        self._notice(activity)
+        base = self._base(activity)
+        self._lag.step(dt, self._targets(wanted))
+        self.heading += dt * self.yaw_rate
+        self.stumble.step(dt)
+        self.fall.step(dt, get_up=activity is not Activity.FALL)
+        self._step_gait(dt, base)
+        self._walk.step(dt, base in GAITS and self._sit.share == 0.0)
+        self._sit.step(dt, base is Activity.SIT and self._walk.share == 0.0)
+        self._step_phase(dt)
+
+    def _notice(self, activity: Activity) -> None:
+        """A stumble or fall that is newly wanted happens at the next occasion, once."""
+        if activity is not self._activity:
+            self._activity = activity
+            self._mishap = activity if activity in (Activity.STUMBLE, Activity.FALL) else None
+        if self._mishap is Activity.FALL and self._sit.share == 0.0 and self.fall.state is FallState.UPRIGHT:
+            self._mishap = None
+            self.fall.start(side_of_fall(0.5 if self._source is None else self._source.random()))
+
+    def _base(self, activity: Activity) -> Activity:
+        """What the body does apart from stumble and fall."""
+        if self.fall.state is not FallState.UPRIGHT or activity is Activity.FALL:
+            return Activity.STAND
+        return Activity.WALK if activity is Activity.STUMBLE else activity
+
+    def _step_gait(self, dt: float, base: Activity) -> None:
+        if self._change.share == 1.0:
+            self._from, self._change = self._to, Ramp(_CHANGE_S)
+        if base in GAITS and not self._change.moving:
+            self._to = base
+            if self._walk.share == 0.0:
+                self._from = base
+        self._change.step(dt, self._from is not self._to)
+
+    def _step_phase(self, dt: float) -> None:
+        if self._walk.share == 0.0:
+            self._rhythm.rest()
+            return
+        before = [self.leg_phase(side) for side in (LEFT, RIGHT)]
+        self._rhythm.step(dt, self.shape.cycle_time)
+        if self._mishap is Activity.STUMBLE and self._steady(Activity.WALK):
+            for side in (LEFT, RIGHT):
+                if before[side] < TRIP_PHASE <= self.leg_phase(side):
+                    self._mishap = None
+                    self.stumble.start(side, self.shape.cycle_time)
+
+    def _steady(self, gait: Activity) -> bool:
+        return self._walk.share == 1.0 and self._from is self._to is gait
+
+    def _targets(self, wanted: Shape) -> tuple[float, ...]:
+        deviations = self._rhythm.deviations
+        step = wanted.step_length
+        return (
+            step * deviations.left_step,
+            step * deviations.right_step,
+            wanted.cycle_time * deviations.cycle,
+            wanted.toe_height * deviations.toe,
+            wanted.trunk_angle,
+        )
+
+    # -- what is being done ------------------------------------------------------------------------------
+
+    @property
+    def phase(self) -> float:
+        """Of the left stride, 0 … 1, heel strike is 0."""
+        return self._rhythm.phase
+
+    @property
+    def shape(self) -> Shape:
+        """The gait's shape as it is now, on the way to what is wanted."""
+        left, right, cycle_time, toe_height, trunk_angle = self._lag.values
+        return Shape((left + right) / 2.0, cycle_time, toe_height, trunk_angle)
 
     @property
     def walking(self) -> float:
-        """0 standing … 1 walking."""
-        return smooth(self._walk_share)
+        """0 standing … 1 moving in a gait."""
+        return self._walk.smooth
+
+    @property
+    def seating(self) -> float:
+        """Share of the way from standing (0) to the seat (1)."""
+        return self._sit.share
 
     @property
     def sitting(self) -> float:
-        """0 upright … 1 sitting."""
-        return smooth(self._sit_share)
+        """0 upright … 1 legs bent as one sits."""
+        return posture.bent(self._sit.share)
+
+    @property
+    def in_transition(self) -> bool:
+        """Whether the motion is between two activities."""
+        return self._walk.moving or self._sit.moving or self._change.moving
+
+    @property
+    def label(self) -> Label:
+        """What is being done; on the way between two gaits or from standing to one, the greater part."""
+        if self.fall.state is not FallState.UPRIGHT:
+            return _FALLEN[self.fall.state]
+        if self.stumble.active:
+            return Label.STUMBLE
+        if self._sit.moving:
+            return Label.STAND_TO_SIT if self._sit.rate > 0.0 else Label.SIT_TO_STAND
+        if self._sit.share == 1.0:
+            return Label.SIT
+        if self._walk.share < 0.5:
+            return Label.STAND
+        return Label[(self._from if self._change.share < 0.5 else self._to).name]
+
+    @property
+    def at_rest(self) -> Activity:
+        """Where one stays when the machine stops: on the seat, on the ground, else standing."""
+        if self.fall.state in (FallState.FALLING, FallState.LYING):
+            return Activity.FALL
+        return Activity.SIT if self._sit.share == 1.0 else Activity.STAND
+
+    def gaits(self) -> list[tuple[Gait, float]]:
+        """The gaits that make up the present one, each with its share."""
+        share = self._change.smooth
+        if share == 0.0:
+            return [(GAITS[self._from], 1.0)]
+        return [(GAITS[self._from], 1.0 - share), (GAITS[self._to], share)]
+
+    def leg_phase(self, side: int) -> float:
+        """Of one leg's own stride."""
+        phase = self._rhythm.phase + (0.5 if side == RIGHT else 0.0)
+        if self.stumble.active and self.stumble.side == side:
+            phase -= self.stumble.lag
+        return phase % 1.0
+
+    def stance_share(self, side: int) -> float:
+        """Of one leg's stride; an impaired leg hands some of it to the other."""
+        impaired = self.wearer.impairment
+        return stance_share(self.shape.speed) + 0.03 * (impaired[1 - side] - impaired[side])
+
+    @property
+    def yaw_rate(self) -> float:
+        """Of the way (rad/s, to the left); a turn is made step by step."""
+        turn = sum(share * gait.turn for gait, share in self.gaits())
+        return turn * self.walking * (1.0 - self.fall.share) / self.shape.cycle_time
 
     @property
     def trunk(self) -> float:
         """Forward lean of the trunk (rad)."""
-        return self.shape.trunk_angle + _RISE_LEAN * 4.0 * self.sitting * (1.0 - self.sitting)
+        gait = self.walking * sum(share * gait.lean for gait, share in self.gaits())
+        upright = (
+            self._lag.values[4] + self.wearer.lean + gait + posture.lean(self.seating) + self.stumble.pitch
+        )
+        return upright + self.fall.share * (LYING_PITCH - upright)
 
-    def step(self, dt: float, activity: Activity, wanted: Shape) -> None:
-        """Move on by `dt` seconds towards `activity` and `wanted`; one stands between walking and sitting."""
-        self.shape = self._approach(wanted, 1.0 - math.exp(-dt / _SHAPE_TIME_S))
-        may_walk = activity is Activity.WALK and self._sit_share == 0.0
-        may_sit = activity is Activity.SIT and self._walk_share == 0.0
-        self._walk_share = _ramp(self._walk_share, may_walk, dt / _WALK_RAMP_S)
-        self._sit_share = _ramp(self._sit_share, may_sit, dt / _SIT_RAMP_S)
-        if self._walk_share > 0.0:
-            self.phase = (self.phase + dt / self.shape.cycle_time) % 1.0
-        else:
-            self.phase = _FIRST_PHASE
+    @property
+    def height_acceleration(self) -> float:
+        """Of the trunk (m/s², up) by what the posture does; the gait's comes from its steps."""
+        rate = self._sit.rate
+        sitting = (
+            posture.height_acceleration(self.seating, rate, self.wearer.leg_length) if rate != 0.0 else 0.0
+        )
+        return sitting + self.fall.height_acceleration
+
+    # -- the legs ----------------------------------------------------------------------------------------
 
     def legs(self) -> tuple[Leg, Leg]:
-        """Left and right leg; they walk in anti-phase."""
-        return self._leg(self.phase), self._leg((self.phase + 0.5) % 1.0)
+        """Left and right leg."""
+        return self._leg(LEFT), self._leg(RIGHT)
 
-    def _leg(self, phase: float) -> Leg:
-        walking, sitting = self.walking, self.sitting
-        pose = STANDING if walking == 0.0 else _mix(STANDING, leg(phase, self.shape), walking)
-        pose = _mix(pose, SITTING, sitting)
-        return pose._replace(hip=pose.hip + self.trunk)
+    def _leg(self, side: int) -> Leg:
+        walking, sitting, fallen = self.walking, self.sitting, self.fall.share
+        pose = STANDING if walking == 0.0 else mix(STANDING, self._stepping(side), walking)
+        pose = mix(pose, SITTING, sitting)
+        pose = pose._replace(hip=pose.hip + self.trunk)
+        if self.stumble.active and self.stumble.side == side:
+            pose = pose._replace(hip=pose.hip + self.stumble.hip, knee=pose.knee + self.stumble.knee)
+        return mix(pose, LYING, fallen)
 
-    def _approach(self, wanted: Shape, share: float) -> Shape:
-        now = self.shape
-        return Shape(
-            now.step_length + share * (wanted.step_length - now.step_length),
-            now.cycle_time + share * (wanted.cycle_time - now.cycle_time),
-            now.toe_height + share * (wanted.toe_height - now.toe_height),
-            now.trunk_angle + share * (wanted.trunk_angle - now.trunk_angle),
+    def _stepping(self, side: int) -> Leg:
+        """One leg in the present gait, with the wearer's habits and impairment."""
+        wearer, phase = self.wearer, self.leg_phase(side)
+        impaired = wearer.impairment[side]
+        asymmetry = 1.0 + (0.5 - side) * wearer.asymmetry
+        step = self._lag.values[side] * asymmetry * (1.0 - 0.2 * impaired)
+        parts = [
+            (gait.leg(phase, step * gait.steps[side], wearer.leg_length), share)
+            for gait, share in self.gaits()
+        ]
+        pose = parts[0][0] if len(parts) == 1 else mix(parts[0][0], parts[1][0], parts[1][1])
+        swinging = swing(phase, self.stance_share(side))
+        pose = lifted(pose, self._lag.values[3], swinging)
+        hip, knee, ankle = wearer.habits
+        return Leg(
+            pose.hip + hip(phase),
+            (pose.knee + knee(phase)) * (1.0 - 0.4 * impaired * swinging),
+            pose.ankle + ankle(phase) - 0.2 * impaired * swinging,
         )
-
-
-def _ramp(share: float, up: bool, change: float) -> float:
-    return min(max(share + (change if up else -change), 0.0), 1.0)
-
-
-def _mix(a: Leg, b: Leg, share: float) -> Leg:
-    return Leg(*(x + share * (y - x) for x, y in zip(a, b, strict=True)))

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from hil_sim.gait.curves import Curve, Leg, LegCurves, measured
-
-LEG_LENGTH = 0.80  # m, hip to ground of the modelled wearer
-STANCE = 0.62  # share of a stride that the foot is on the ground
+from hil_sim.gait.subject import NOMINAL_LEG_LENGTH
 
 # The measured hip angle counts from the pelvis, which tilts forward by about this much at every walking speed
 # (mean of the same data sets); the robot's hip counts from its upright trunk.
@@ -27,24 +25,45 @@ class Shape:
     toe_height: float
     trunk_angle: float
 
+    @property
+    def speed(self) -> float:
+        """Of walking (m/s): two steps a cycle."""
+        return 2.0 * self.step_length / self.cycle_time
 
-def hip_range(step_length: float) -> float:
+
+def hip_range(step_length: float, leg_length: float = NOMINAL_LEG_LENGTH) -> float:
     """Range of hip flexion (rad) that a step needs: both legs are the sides of an isosceles triangle."""
-    return 2.0 * math.asin(step_length / (2.0 * LEG_LENGTH))
+    return 2.0 * math.asin(step_length / (2.0 * leg_length))
 
 
-def swing(phase: float) -> float:
+def stance_share(speed: float) -> float:
+    """Share of a stride that a foot is on the ground; twice what is over ½ is double support.
+
+    The faster, the less: 0.60 at 1.4 m/s (Perry & Burnfield, Gait Analysis, 2010).
+    """
+    return min(max(0.655 - 0.04 * speed, 0.57), 0.66)
+
+
+def swing(phase: float, stance: float) -> float:
     """0 in stance, rising to 1 in mid-swing."""
-    return math.sin(math.pi * (phase - STANCE) / (1.0 - STANCE)) ** 2 if phase > STANCE else 0.0
+    return math.sin(math.pi * (phase - stance) / (1.0 - stance)) ** 2 if phase > stance else 0.0
 
 
-def leg(phase: float, shape: Shape) -> Leg:
+def lifted(pose: Leg, toe_height: float, swing: float) -> Leg:
+    """The leg with knee and ankle bent for another toe height (m) than the curves have."""
+    lift = (toe_height - _USUAL_TOE_HEIGHT) * swing
+    return Leg(
+        pose.hip, pose.knee * (1.0 + _KNEE_PER_TOE_HEIGHT * lift), pose.ankle + _ANKLE_PER_TOE_HEIGHT * lift
+    )
+
+
+def level(phase: float, step_length: float, leg_length: float = NOMINAL_LEG_LENGTH) -> Leg:
     """Angles of one leg at its own `phase` (0 … 1, heel strike is 0).
 
     Longer steps take the curves of faster walkers; the hip is then scaled to exactly the range that the step
     length needs, and the knee by half as much.
     """
-    wanted = hip_range(shape.step_length)
+    wanted = hip_range(step_length, leg_length)
     slower, faster, share = _between(wanted)
 
     def blend(a: Curve, b: Curve) -> tuple[float, float]:
@@ -54,11 +73,8 @@ def leg(phase: float, shape: Shape) -> Leg:
     hip, hip_mean = blend(slower.hip, faster.hip)
     knee, _ = blend(slower.knee, faster.knee)
     ankle, _ = blend(slower.ankle, faster.ankle)
-    lift = (shape.toe_height - _USUAL_TOE_HEIGHT) * swing(phase)
     return Leg(
-        hip=hip_mean - PELVIC_TILT + scale * (hip - hip_mean),
-        knee=knee * (0.5 + 0.5 * scale) * (1.0 + _KNEE_PER_TOE_HEIGHT * lift),
-        ankle=ankle + _ANKLE_PER_TOE_HEIGHT * lift,
+        hip=hip_mean - PELVIC_TILT + scale * (hip - hip_mean), knee=knee * (0.5 + 0.5 * scale), ankle=ankle
     )
 
 

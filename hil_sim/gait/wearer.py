@@ -1,29 +1,29 @@
-"""What the ground and the trunk feel of the motion: vertical force, centre of pressure, tilt, joint loads.
+"""What ground, trunk and joints feel of the motion: foot loads, attitude and acceleration, joint loads.
 
-Modelled, not measured: the double hump of the vertical ground reaction, the heel-to-toe way of the centre of
-pressure and the sway of the trunk follow the textbook shape (Perry & Burnfield, Gait Analysis, 2010), scaled
-so that both feet together carry the body's weight over a stride.
+Newton holds at every moment: all vertical forces (feet, seat, ground under a fallen body) less the weight are
+mass times the trunk's vertical acceleration, the body taken as a mass in its trunk. Over a stride the feet
+carry the weight.
 """
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import NamedTuple
 
+from hil_sim.gait import posture
+from hil_sim.gait.gaits import LEFT, RIGHT
 from hil_sim.gait.generator import Generator
-from hil_sim.gait.walk import STANCE
+from hil_sim.gait.ground import outward, shear, vertical_grf
 
 GRAVITY = 9.80665
 
-# Vertical force over stance: (share of stance, force), flat at each knot; scaled below.
-_HUMPS = ((0.0, 0.0), (0.23, 1.08), (0.50, 0.78), (0.77, 1.08), (1.0, 0.0))
-_HUMPS_MEAN = sum((b[0] - a[0]) * (a[1] + b[1]) / 2.0 for a, b in pairwise(_HUMPS))
-# Two feet, each on the ground for STANCE of the stride, together carry one body weight on average.
-_SCALE = 1.0 / (2.0 * STANCE * _HUMPS_MEAN)
-
-_COP_HEEL, _COP_TOE, _COP_STANDING = 0.030, 0.205, 0.110  # m from the heel
-_COP_OUTER, _COP_INNER = 0.006, -0.006  # m, y on the left foot
-_FEET_SHARE_SITTING = 0.18  # of the body weight, when the seat carries the rest
-_SWAY_HZ = 0.3
+_SIDEWAYS = 0.06  # how far (in its height) the trunk is beside the foot that it stands on
+# Quiet standing: frequencies (Hz), share of the load that goes from foot to foot, way of the pressure (m).
+_SWAY_HZ = (0.13, 0.31, 0.57)
+_SWAY_LOAD = (0.015, 0.010, 0.004)
+_SWAY_COP = (0.005, 0.003, 0.001)
+# The trunk in walking (rad): roll and yaw once a stride, pitch twice.
+_ROLL, _PITCH, _YAW = 0.04, 0.025, 0.07
+_IMPAIRED_LOAD = 0.1  # share of its load that a fully impaired leg gives to the other
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,55 +45,115 @@ class Trunk:
     acceleration: tuple[float, float, float]
 
 
-def vertical_grf(stance: float) -> float:
-    """Force of one foot in body weights at a share of its stance (0 … 1)."""
-    for (start, low), (end, high) in pairwise(_HUMPS):
-        if stance <= end:
-            share = (stance - start) / (end - start)
-            return _SCALE * (low + (high - low) * share * share * (3.0 - 2.0 * share))
-    return 0.0
+class _Contact(NamedTuple):
+    """One foot on the ground: load and shear in body weights, centre of pressure as in `Foot`."""
+
+    load: float
+    shear: float
+    cop_x: float
+    cop_y: float
+
+
+_STANDING = _Contact(0.5, 0.0, 0.110, 0.0)
+
+
+def _sway(amounts: tuple[float, ...], now_s: float) -> float:
+    return sum(
+        amount * math.sin(math.tau * hertz * now_s) for amount, hertz in zip(amounts, _SWAY_HZ, strict=True)
+    )
 
 
 class Wearer:
-    """A person of `mass` kg (the machine's included) who moves as the generator says."""
+    """The body of the generator's wearer, machine included, who moves as the generator says."""
 
-    def __init__(self, generator: Generator, mass: float = 90.0) -> None:
+    def __init__(self, generator: Generator) -> None:
         self._generator = generator
-        self.weight = mass * GRAVITY
+        self.mass = generator.wearer.mass
+        self.weight = self.mass * GRAVITY
+
+    # -- forces -----------------------------------------------------------------------------------------
 
     def feet(self, now_s: float) -> tuple[Foot, Foot]:
         """Left and right foot at `now_s` (s, for the sway of standing)."""
-        phase = self._generator.phase
-        sway = 0.03 * math.sin(math.tau * _SWAY_HZ * now_s)
-        return self._foot(phase, 1.0, sway), self._foot((phase + 0.5) % 1.0, -1.0, -sway)
+        carried = self._carried() * (1.0 - self._support())
+        swaying = self._generator.wearer.sway * self._standing()
+        load, place = (swaying * _sway(amounts, now_s) for amounts in (_SWAY_LOAD, _SWAY_COP))
+        left, right = self._contacts()
+        return (
+            Foot(carried * (left.load + load), left.cop_x + place, left.cop_y),
+            Foot(carried * (right.load - load), right.cop_x + place, right.cop_y),
+        )
 
-    def _foot(self, phase: float, side: float, sway: float) -> Foot:
+    def _standing(self) -> float:
+        """1 standing … 0 walking or sitting."""
+        return (1.0 - self._generator.walking) * (1.0 - self._generator.sitting)
+
+    def support(self) -> float:
+        """What the seat, or the ground under hands and body, carries (N)."""
+        return self._carried() * self._support()
+
+    def _carried(self) -> float:
+        """Weight and what the posture's acceleration adds (N)."""
+        return self.mass * (GRAVITY + self._generator.height_acceleration)
+
+    def _support(self) -> float:
         generator = self._generator
+        return max(posture.on_seat(generator.seating), generator.fall.on_ground)
+
+    def _contacts(self) -> tuple[_Contact, _Contact]:
+        return self._contact(LEFT), self._contact(RIGHT)
+
+    def _contact(self, side: int) -> _Contact:
+        generator, outside = self._generator, 1.0 - 2.0 * side
         walking = generator.walking
-        stance = min(phase / STANCE, 1.0)
-        standing = 0.5 + sway * (1.0 - generator.sitting)
-        upright = standing + walking * (vertical_grf(stance) - standing)
-        force = upright + generator.sitting * (_FEET_SHARE_SITTING / 2.0 - upright)
-        way = stance * stance * (3.0 - 2.0 * stance)
-        cop_x = _COP_STANDING + walking * (_COP_HEEL + way * (_COP_TOE - _COP_HEEL) - _COP_STANDING)
-        cop_y = side * walking * (_COP_OUTER + way * (_COP_INNER - _COP_OUTER))
-        return Foot(self.weight * force, cop_x, cop_y)
+        step = self._step(side) if walking > 0.0 else _STANDING
+        return _Contact(
+            (_STANDING.load + walking * (step.load - _STANDING.load)) * generator.stumble.load,
+            walking * step.shear,
+            _STANDING.cop_x + walking * (step.cop_x - _STANDING.cop_x),
+            outside * (walking * step.cop_y + generator.wearer.foot_roll),
+        )
+
+    def _step(self, side: int) -> _Contact:
+        """The foot in the present gait; y of the centre of pressure counts outward."""
+        generator = self._generator
+        speed, share = generator.shape.speed, generator.stance_share(side)
+        stance = min(generator.leg_phase(side) / share, 1.0)
+        impaired = generator.wearer.impairment
+        takes = 1.0 + _IMPAIRED_LOAD * (impaired[1 - side] - impaired[side])
+        load = place = 0.0
+        for gait, part in generator.gaits():
+            load += part * takes * vertical_grf(stance, gait.humps(speed), share)
+            place += part * gait.path.at(stance)
+        return _Contact(load, shear(stance, speed), place, outward(stance))
+
+    # -- trunk ------------------------------------------------------------------------------------------
 
     def trunk(self) -> Trunk:
+        """Attitude, and the acceleration that the forces give."""
         generator = self._generator
-        walking, angle = generator.walking, math.tau * generator.phase
-        left = vertical_grf(min(generator.phase / STANCE, 1.0))
-        right = vertical_grf(min((generator.phase + 0.5) % 1.0 / STANCE, 1.0))
+        upright = 1.0 - generator.fall.share
+        moving, angle = generator.walking * upright * generator.wearer.sway, math.tau * generator.phase
         return Trunk(
-            roll=0.03 * walking * math.sin(angle),
-            pitch=generator.trunk + 0.02 * walking * math.sin(2.0 * angle),
-            yaw=0.05 * walking * math.cos(angle),
-            acceleration=(
-                0.8 * walking * math.sin(2.0 * angle),
-                0.5 * walking * math.sin(angle),
-                GRAVITY * walking * (left + right - 1.0),
-            ),
+            roll=moving * _ROLL * math.sin(angle) + generator.fall.roll,
+            pitch=generator.trunk + moving * _PITCH * math.sin(2.0 * angle),
+            yaw=generator.heading + moving * _YAW * math.cos(angle),
+            acceleration=self._acceleration(),
         )
+
+    def _acceleration(self) -> tuple[float, float, float]:
+        """Forward, left and up along the way, then turned into the world's axes (m/s²)."""
+        generator = self._generator
+        contacts, support = self._contacts(), self._support()
+        loads = [contact.load for contact in contacts]
+        push = (1.0 - support) * sum(contact.shear for contact in contacts)
+        forward = GRAVITY * push + generator.stumble.acceleration + generator.fall.acceleration
+        aside = -GRAVITY * _SIDEWAYS * generator.walking * (1.0 - support) * (loads[LEFT] - loads[RIGHT])
+        up = self._carried() / self.mass * ((1.0 - support) * sum(loads) + support) - GRAVITY
+        cos, sin = math.cos(generator.heading), math.sin(generator.heading)
+        return forward * cos - aside * sin, forward * sin + aside * cos, up
+
+    # -- joints -----------------------------------------------------------------------------------------
 
     def joint_loads(self, now_s: float) -> tuple[float, ...]:
         """Moment that each joint's motor must hold (N·m; left hip, knee, ankle, then right)."""

@@ -16,7 +16,8 @@ from drivers.insole.device import Insole, pair
 from drivers.insole.settings import InsoleSettings
 from drivers.parsing import Parser
 from drivers.samples import State
-from hil_sim.gait.generator import Activity, Generator
+from hil_sim.gait.activity import Activity
+from hil_sim.gait.generator import Generator
 from hil_sim.gait.walk import Shape
 from hil_sim.gait.wearer import Foot, Wearer
 from hil_sim.sensors.faults import InsoleFaults, LineFaults
