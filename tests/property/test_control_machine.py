@@ -1,0 +1,235 @@
+"""Sessions, leases, writes, trials, stops and foreign masters in any order, against what must hold.
+
+One writer; all or nothing; a trial always ends, confirmed or taken back; a stop always answers; nothing that
+reads, writes, reverts or stops ever enables a drive; the journal tells exactly what happened.
+"""
+
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from drivers.errors import DeviceAbort
+from gateway.records.folder import RecordsFolder
+from gateway.records.journal import read_verified
+from tests.unit.gateway.harness import HEAD, ROBOT, Answered, Bench, Client, config, serving, until
+
+STEP, CYCLE = "gait.step_length", "gait.cycle_time"
+OBJECTS = {STEP: (0x2001, 0), CYCLE: (0x2002, 0)}
+CONTROLWORD = 0x6040
+ENABLE_OPERATION = 0x0F
+
+# Counts: within the limits of the robot's file, and (step length: at most 100 at once) sometimes too far.
+counts = {STEP: st.integers(250, 600), CYCLE: st.integers(1000, 1500)}
+changes = st.fixed_dictionaries({}, optional=counts).filter(bool)
+people = st.sampled_from(["ada", "ben"])
+
+
+class Trial:
+    """What the model knows of a write on trial."""
+
+    def __init__(self, number: int, before: dict[str, int], written: dict[str, int]) -> None:
+        self.number, self.before, self.written = number, before, written
+
+
+class ControlMachine(RuleBasedStateMachine):
+    """The gateway over fake devices, and a model of it that is a few dictionaries."""
+
+    @initialize()
+    def begin(self) -> None:
+        self.ending = ExitStack()
+        folder = Path(self.ending.enter_context(tempfile.TemporaryDirectory()))
+        self.ending.callback(self.the_journal_is_intact)
+        patch = self.ending.enter_context(pytest.MonkeyPatch.context())
+        self.bench = Bench()
+        patch.setattr("gateway.modules.component.assemble", self.bench.assemble)
+        text = ROBOT.replace(HEAD, HEAD.replace("port = 0", 'port = 0\nrecords = "records"'))
+        settled = config(folder, text)
+        self.folder = RecordsFolder(settled.records)
+        self.address = self.ending.enter_context(serving(settled))
+        self.clients = {name: self.client() for name in ("ada", "ben", "watcher")}
+        self.values = {name: self.held(name) for name in OBJECTS}
+        self.lease: str | None = None
+        self.trials: list[Trial] = []
+        self.stopped = False
+        self.happened: list[str] = []
+
+    def client(self) -> Client:
+        return self.ending.enter_context(Client(self.address))
+
+    def held(self, name: str) -> int:
+        return int.from_bytes(self.bench.gait.node.objects[OBJECTS[name]], "little")
+
+    def refused(self, who: str, method: str, **params: Any) -> str | None:
+        """The kind of error that a call is answered with; `None` where it is done."""
+        try:
+            self.answer = self.clients[who].call(method, **params)
+        except Answered as error:
+            return error.kind
+        return None
+
+    # What people do
+
+    @rule(who=people)
+    def acquire(self, who: str) -> None:
+        expected = "lease_held" if self.lease not in (None, who) else None
+        assert self.refused(who, "control.acquire", ttl_s=300) == expected
+        if self.lease is None:
+            self.lease = who
+            self.happened.append("lease taken")
+
+    @rule(who=people)
+    def release(self, who: str) -> None:
+        assert self.refused(who, "control.release") == (None if self.lease == who else "no_lease")
+        if self.lease == who:
+            self.lease_ends("lease given back")
+
+    @rule(who=people)
+    def vanish(self, who: str) -> None:
+        self.clients[who].close()
+        self.clients[who] = self.client()
+        if self.lease == who:
+            self.lease_ends("lease lost with the connection")
+
+    @rule(who=people, wanted=changes, trial=st.booleans(), aborts_at=st.none() | st.integers(0, 2))
+    def write(self, who: str, wanted: dict[str, int], trial: bool, aborts_at: int | None) -> None:
+        self.abort_download(aborts_at)
+        params = {"trial_s": 300} if trial else {}
+        named = {name: value / 1000 for name, value in wanted.items()}
+        kind = self.refused(who, "parameter.write", changes=named, **params)
+        self.bench.gait.node.before_download = lambda _index, _data: None
+        assert kind == self.expected(who, wanted, trial, aborts_at)
+        if kind is None:
+            self.wrote(who, wanted, trial)
+        elif kind in ("device_abort", "rolled_back"):
+            self.happened += ["write", "write taken back"]
+        elif kind in ("out_of_limit", "trial_pending"):
+            self.happened.append("write refused")
+
+    @precondition(lambda self: self.trials)
+    @rule(who=people)
+    def confirm(self, who: str) -> None:
+        trial = self.trials[-1]
+        changed = any(self.values[name] != value for name, value in trial.written.items())
+        expected = "no_lease" if self.lease != who else "mismatch" if changed else None
+        assert self.refused(who, "parameter.confirm", write=trial.number) == expected
+        if expected is None:
+            self.trials.remove(trial)
+            self.happened.append("trial confirmed")
+
+    @precondition(lambda self: self.trials)
+    @rule(who=people)
+    def revert(self, who: str) -> None:
+        trial = self.trials[0]
+        expected = None if self.lease == who else "no_lease"
+        assert self.refused(who, "parameter.revert", write=trial.number) == expected
+        if expected is None:
+            self.take_back(trial)
+
+    @rule(who=st.sampled_from(["ada", "ben", "watcher"]))
+    def stop(self, who: str) -> None:
+        answer = self.clients[who].call("robot.stop", reason="any")
+        assert answer["drives"] == {"left_knee": "confirmed", "right_knee": "confirmed"}
+        self.stopped = True
+        self.happened += ["stop", "stop answered"]
+
+    @rule(name=st.sampled_from([STEP, CYCLE]), data=st.data())
+    def somebody_else_writes(self, name: str, data: st.DataObject) -> None:
+        self.values[name] = data.draw(counts[name])
+        self.bench.gait.node.objects[OBJECTS[name]] = self.values[name].to_bytes(2, "little")
+
+    # What follows from it
+
+    def abort_download(self, number: int | None) -> None:
+        seen = 0
+
+        def before(_index: int, _data: bytes) -> None:
+            nonlocal seen
+            seen += 1
+            if seen - 1 == number:
+                raise DeviceAbort("refused", 0x0800_0000)
+
+        self.bench.gait.node.before_download = before
+
+    def expected(self, who: str, wanted: dict[str, int], trial: bool, aborts_at: int | None) -> str | None:
+        if self.lease != who:
+            return "no_lease"
+        if STEP in wanted and abs(wanted[STEP] - self.values[STEP]) > 100:
+            return "out_of_limit"
+        if not trial and any(set(wanted) & set(one.written) for one in self.trials):
+            return "trial_pending"
+        if aborts_at is None or aborts_at >= len(wanted):
+            return None
+        order = sorted(wanted, key=lambda name: wanted[name] > self.values[name])
+        written = [name for name in order[:aborts_at] if wanted[name] != self.values[name]]
+        return "rolled_back" if written else "device_abort"
+
+    def wrote(self, who: str, wanted: dict[str, int], trial: bool) -> None:
+        before = {name: self.values[name] for name in wanted}
+        self.values |= wanted
+        self.happened += ["write", "trial begun" if trial else "write done"]
+        if not trial:
+            return
+        for old in [one for one in self.trials if set(one.written) & set(wanted)]:
+            self.trials.remove(old)
+            before, wanted = {**before, **old.before}, {**old.written, **wanted}
+        self.trials.append(Trial(self.answer["write"], before, wanted))
+        assert {name: round(value * 1000) for name, value in self.answer["before"].items()} == before
+
+    def lease_ends(self, what: str) -> None:
+        self.lease = None
+        self.happened.append(what)
+        for trial in tuple(self.trials):
+            self.take_back(trial)
+
+    def take_back(self, trial: Trial) -> None:
+        self.trials.remove(trial)
+        for name, written in trial.written.items():
+            if self.values[name] == written:
+                self.values[name] = trial.before[name]
+        self.happened.append("taken back")
+
+    # What must hold
+
+    @invariant()
+    def devices_and_trials_are_as_the_model_says(self) -> None:
+        expected = [trial.number for trial in self.trials]
+        watcher = self.clients["watcher"]
+        until(
+            lambda: [one["write"] for one in watcher.call("robot.describe")["trials"]] == expected,
+            f"trials are {expected}",
+        )
+        assert {name: self.held(name) for name in OBJECTS} == self.values
+        assert self.folder.undo.exists() == bool(self.trials)
+        assert watcher.call("robot.describe")["stop"]["held"] == self.stopped
+
+    @invariant()
+    def nobody_has_enabled_a_drive(self) -> None:
+        for drive in (self.bench.left, self.bench.right):
+            written = [data for what, index, data in drive.node.log if what == "download"]
+            assert not [data for data in written if data and data[0] & ENABLE_OPERATION == ENABLE_OPERATION]
+
+    @invariant()
+    def the_journal_tells_exactly_what_happened(self) -> None:
+        watcher = self.clients["watcher"]
+        entries = watcher.call("journal.tail", n=1000)["entries"]
+        assert [one["what"] for one in entries] == self.happened
+
+    def the_journal_is_intact(self) -> None:
+        if self.folder.journal.exists():
+            read_verified(self.folder.journal)
+
+    def teardown(self) -> None:
+        if hasattr(self, "ending"):
+            self.ending.close()
+
+
+ControlMachine.TestCase.settings = settings(
+    max_examples=25, stateful_step_count=25, deadline=None, suppress_health_check=list(HealthCheck)
+)
+TestControl = ControlMachine.TestCase
