@@ -17,7 +17,7 @@ from drivers.insole.settings import InsoleSettings
 from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
 from gateway.guard.checks import complaints as about_guard
-from gateway.guard.settings import WATCHES, GuardSettings, Rule
+from gateway.guard.settings import WATCHES, GuardSettings
 from gateway.records.folder import default_folder
 
 Table = Mapping[str, Any]
@@ -104,6 +104,16 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     parameter: dict[str, ParameterSettings] = {}
     guard: GuardSettings | None = None
 
+    def sharing(self, component: str) -> tuple[str, ...]:
+        """The joints and devices on one's node, itself among them: the axes of one drive."""
+        tables: dict[str, JointTable | DeviceTable] = {**self.joint, **self.device}
+        bus, node_id = tables[component].bus, tables[component].node_id
+        return tuple(name for name, one in tables.items() if (one.bus, one.node_id) == (bus, node_id))
+
+    def drives_of(self, component: str) -> tuple[str, ...]:
+        """The joints that its parameters may move: those on its node; where it has none, every joint."""
+        return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
+
     @property
     def records(self) -> Path:
         """The folder of this robot's records."""
@@ -163,21 +173,19 @@ def _convert(path: Path, document: Table) -> RobotConfig:
 
 def _guard(table: Any) -> Struct:
     """`[guard]` with its rules, each by what it watches."""
-    rules = table.get("rule", {}) if isinstance(table, dict) else {}
-    settings = _struct("[guard]", {**table, "rule": {}} if isinstance(table, dict) else table, GuardSettings)
-    if not isinstance(rules, dict):
-        raise ConfigError("[guard] rule holds tables: write [guard.rule.NAME]")
-    return msgspec.structs.replace(settings, rule={name: _rule(name, rule) for name, rule in rules.items()})
+    if not isinstance(table, dict) or not isinstance(table.get("rule", {}), dict):
+        raise ConfigError("[guard] is a table, and so is each of its rules: write [guard.rule.NAME]")
+    rules = {name: _rule(f"[guard.rule.{name}]", name, rule) for name, rule in table.get("rule", {}).items()}
+    return msgspec.structs.replace(_struct("[guard]", {**table, "rule": {}}, GuardSettings), rule=rules)
 
 
-def _rule(name: str, table: Any) -> Struct:
-    where = _header("guard.rule", name)
+def _rule(where: str, name: str, table: Any) -> Struct:
+    watch = table.get("watch") if isinstance(table, dict) else None
+    if not isinstance(watch, str) or watch not in WATCHES:
+        raise ConfigError(f"{where} watch: say what it watches, one of {', '.join(WATCHES)}")
     if not _NAME.fullmatch(name):
         raise ConfigError(f"{where}: a name is a letter, then letters, digits, _ and -")
-    watch = table.get("watch") if isinstance(table, dict) else None
-    if watch is not None and watch not in WATCHES:
-        raise ConfigError(f"{where} watch: there is no {watch!r}; allowed are {', '.join(WATCHES)}")
-    return _struct(where, table, Rule if watch is None else WATCHES[watch].rule)
+    return _struct(where, table, WATCHES[watch].rule)
 
 
 def _header(table: str, name: str) -> str:

@@ -220,10 +220,31 @@ class StopInfo(Struct, frozen=True):
     drives: dict[str, DriveReaction]
 
 
+class GuardRuleInfo(Struct, frozen=True):
+    """One rule of the guard: `state` is the worst of its inputs', `problems` says which it cannot see."""
+
+    name: str
+    watch: str
+    limit: str  # what makes it trip, in words
+    on: list[str]
+    actions: list[str]
+    blind: str  # what it does where it cannot see: alarm or act
+    state: str  # watching, cleared, blind, tripped
+    since_ns: int
+    reason: str | None
+    trips: int
+    problems: list[str]
+
+
 class GuardInfo(Struct, frozen=True):
-    """The always-on watch."""
+    """The always-on watch; `arming` says of each joint whether it stops when the gateway dies, or why not."""
 
     configured: bool = False
+    problem: str | None = None  # why it does not run
+    heartbeat_ms: int | None = None
+    rules: list[GuardRuleInfo] = []
+    arming: dict[str, str] = {}
+    alarms: int = 0  # since it began
 
 
 class Description(Struct, frozen=True):

@@ -60,6 +60,7 @@ MODULES: Mapping[str, Spec] = {
     "component": Spec("gateway.modules.component:ComponentModule"),
     "status": Spec("gateway.modules.status:StatusModule", needs=("component", "resource")),
     "control": Spec("gateway.modules.control:ControlModule", needs=("component",)),
+    "guard": Spec("gateway.guard.module:GuardModule", needs=("component", "control")),
 }
 
 

@@ -17,7 +17,7 @@ from drivers.samples import Channel, State
 from gateway.futures import done, then
 from gateway.messages import ChannelInfo, ComponentInfo, QualityInfo, Snapshot, SnapshotParams
 from gateway.modules.assembly import Robot, assemble, facts
-from gateway.sources import Selection, channel_info, check_globs, narrow, whole
+from gateway.sources import Selection, Source, channel_info, check_globs, narrow, whole
 
 if TYPE_CHECKING:
     from gateway.registry import Context
@@ -54,6 +54,7 @@ class ComponentModule:
 
     def __init__(self, context: "Context") -> None:
         self.robot = Robot()
+        self.sources: list[Source] = []  # what is no component and has channels all the same
         self._context = context
         self._warm_ns = 0
         self._waiting: list[tuple[Callable[[], bool], Future[None]]] = []
@@ -89,7 +90,8 @@ class ComponentModule:
         return {name: why for name, (_kind, why) in self.robot.absent.items()}
 
     def selections(self) -> list[Selection]:
-        return [whole(ComponentSource(one)) for one in self.robot.components.values() if one.channels]
+        components = [ComponentSource(one) for one in self.robot.components.values() if one.channels]
+        return [whole(one) for one in (*components, *self.sources)]
 
     def when_ready(self, names: Iterable[str]) -> "Future[None]":
         """Done when these components are there, or the time for a cold start is over."""
@@ -147,7 +149,9 @@ class ComponentModule:
         return found
 
     def channels(self) -> list[ChannelInfo]:
-        return [channel_info(channel) for one in self.robot.components.values() for channel in one.channels]
+        channels = [one.channels for one in self.robot.components.values()]
+        channels += [one.channels for one in self.sources]
+        return [channel_info(channel) for some in channels for channel in some]
 
     def _snapshot(self, _session: "Session", params: SnapshotParams) -> "Answer":
         selections = self.selections()

@@ -11,6 +11,7 @@ from gateway.futures import then
 from gateway.modules.lease import RENEWED, TAKEN, Leases
 from gateway.modules.stop import Drive, Stop
 from gateway.modules.tuning import Tuning
+from gateway.records.journal import Journal
 from gateway.records.records import Records
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ class ControlModule:
         self._component = cast("ComponentModule", context.needs["component"])
         self._leases = Leases(context.loop, self._lease_changed)
         self._awake: set[str] = set()  # why the bus is kept, clients or not
+        self.armed: Callable[[str], bool] = lambda _name: False  # the guard's, where there is one
+        self.refuses_reset: Callable[[], str | None] = lambda: None  # the guard's too: why not now
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
             "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
             "control.release": self._release,
@@ -47,7 +50,7 @@ class ControlModule:
             "parameter.write": self._write,
             "parameter.confirm": self._confirm,
             "parameter.revert": self._revert,
-            "robot.stop": self._stop_robot,
+            "robot.stop": lambda session, params: self.stop_robot(session.who, str(params.reason)),
             "journal.tail": lambda _session, params: self._tail(params.n),
         }
 
@@ -83,7 +86,7 @@ class ControlModule:
             reason=self._stop.reason,
             since_ns=self._stop.since_ns,
             stopped_again=self._stop.again,
-            drives={name: reaction(drive) for name, drive in self._drives.items()},
+            drives={name: reaction(drive, self.armed(name)) for name, drive in self._drives.items()},
         )
         return Described(
             components=self._component.components(),
@@ -141,26 +144,41 @@ class ControlModule:
         self._leases.require(session)
         return self._tuning.trials.revert(params.write)
 
-    def _stop_robot(self, session: "Session", params: messages.StopParams) -> "Future[messages.Stopped]":
+    @property
+    def drives(self) -> Mapping[str, Drive]:
+        """Every joint that is there."""
+        return self._drives
+
+    @property
+    def journal(self) -> Journal:
+        return self._records.journal
+
+    @property
+    def stop_held(self) -> bool:
+        return self._stop.held
+
+    def stop_robot(self, who: str, reason: str) -> "Future[messages.Stopped]":
+        """Quick stop on every drive, held until it is reset. In the loop's thread."""
         self.keep_awake("stop", True)
         self._tuning.interrupt()
-        stopped = self._stop.stop(str(params.reason), lambda name: self._component.when_ready([name]))
+        stopped = self._stop.stop(reason, lambda name: self._component.when_ready([name]))
         journal = self._records.journal  # told after the drives were, and nobody waits for it
-        journal.append(session.who, "stop", reason=str(params.reason))
-        return then(stopped, lambda answer: self._journal_stop(session, answer))
+        journal.append(who, "stop", reason=reason)
+        return then(stopped, lambda answer: self._journal_stop(who, answer))
 
-    def _journal_stop(self, session: "Session", stopped: messages.Stopped) -> messages.Stopped:
-        self._records.journal.append(session.who, "stop answered", result=stopped.drives)
+    def _journal_stop(self, who: str, stopped: messages.Stopped) -> messages.Stopped:
+        self._records.journal.append(who, "stop answered", result=stopped.drives)
         return stopped
 
 
-def reaction(drive: Drive) -> messages.DriveReaction:
+def reaction(drive: Drive, armed: bool) -> messages.DriveReaction:
     """What a drive does by itself, as it said when it came up."""
     options = {} if drive.reading is None else drive.reading.options
     quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
     return messages.DriveReaction(
         quick_stop_option=quick_stop,
         abort_connection_option=abort_connection,
+        armed=armed,
         quick_stop=option_text(QUICK_STOP_OPTIONS, quick_stop),
         abort_connection=option_text(ABORT_CONNECTION_OPTIONS, abort_connection),
     )

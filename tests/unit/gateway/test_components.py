@@ -135,7 +135,7 @@ def test_describe_tells_all_a_client_needs(client: Client) -> None:
     assert described["modules"]["control"] == "running"
     assert described["stop"]["held"] is False
     assert set(described["stop"]["drives"]) == {"left_knee", "right_knee"}
-    assert described["guard"] == {"configured": False}
+    assert described["guard"]["configured"] is False
     assert described["clock"]["boot_id"] == described["boot_id"]
 
 

@@ -1,0 +1,146 @@
+"""What a rule can look at: a channel, a component's signs of life, its emergency messages, or nothing."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.bus.emcy import Emcy
+from gateway.guard.conditions import Band
+from gateway.guard.settings import EmcyRule, Rule
+from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
+
+Changed = Callable[[Watcher, Change], None]
+AGAIN_NS = 100_000_000  # how soon to look again for something that is not there
+
+
+@dataclass(frozen=True, slots=True)
+class Pulse:
+    """A component's signs of life: when the last one came, and how long it may be silent."""
+
+    last_ns: Callable[[], int | None]
+    timeout_s: Callable[[], float]
+
+
+class LevelWatcher(Watcher):
+    """One channel; `measure` makes of its value what is compared with the band."""
+
+    def __init__(
+        self,
+        rule: Rule,
+        channel: str,
+        unit: str,
+        now_ns: int,
+        changed: Changed,
+        *,
+        band: Band,
+        stale_ns: int,
+        for_s: float = 0.0,
+        measure: Callable[[int, float], float] = lambda _stamp_ns, value: value,
+    ) -> None:
+        super().__init__(rule, channel.partition(".")[0], channel, now_ns, changed)
+        self._band = band
+        self._unit = unit
+        self._for_ns = round(for_s * 1e9)
+        self._stale_ns = stale_ns
+        self._measure = measure
+        self._seen_ns: int | None = None
+        self._began_ns = now_ns
+
+    def see(self, stamp_ns: int, value: float | None) -> None:
+        """The channel's value; what is no number is not seen."""
+        if value is None or not math.isfinite(value):
+            return
+        self._seen_ns = stamp_ns
+        number = self._measure(stamp_ns, value)
+        over = self._band.left(number, tripped=self.state is State.TRIPPED)
+        if not over and self.state > State.CLEARED and time.monotonic_ns() - stamp_ns > self._stale_ns:
+            return  # late is not live: it ends nothing
+        self.judge(stamp_ns, over, lambda: f"{number:.4g}{self._unit}, {self.rule.words}", self._for_ns)
+
+    def look(self, now_ns: int) -> int:
+        seen_ns = self._seen_ns
+        due_ns = self._began_ns + GRACE_NS if seen_ns is None else seen_ns + self._stale_ns
+        if now_ns <= due_ns:
+            return due_ns + 1
+        self.unseen(now_ns, lambda: _no_value(seen_ns, now_ns))
+        return now_ns + AGAIN_NS
+
+
+class SilenceWatcher(Watcher):
+    """A component that must be heard. One that was never heard is not lost: it cannot be seen."""
+
+    def __init__(self, rule: Rule, component: str, now_ns: int, changed: Changed, pulse: Pulse) -> None:
+        super().__init__(rule, component, component, now_ns, changed)
+        self._pulse = pulse
+        self._heard_ns: int | None = None
+        self._began_ns = now_ns
+
+    def look(self, now_ns: int) -> int:
+        self._heard_ns = self._pulse.last_ns() or self._heard_ns
+        if self._heard_ns is None:
+            if now_ns - self._began_ns > GRACE_NS:
+                self.unseen(now_ns, lambda: "has not been heard yet")
+            return now_ns + AGAIN_NS
+        silent_s, timeout_s = (now_ns - self._heard_ns) / 1e9, self._pulse.timeout_s()
+        over = silent_s > timeout_s
+        self.judge(now_ns, over, lambda: f"silent for {silent_s:.2f} s")
+        well = self.state in (State.WATCHING, State.CLEARED)
+        return self._heard_ns + round(timeout_s * 1e9) + 1 if well else now_ns + AGAIN_NS
+
+    def on_emcy(self, _emcy: Emcy) -> None:
+        """It speaks, which its pulse tells too."""
+
+    def on_boot_up(self, stamp_ns: int) -> None:
+        """One that was heard before has lost all that it was doing."""
+        if self._heard_ns is not None:
+            self.judge(stamp_ns, True, lambda: "has booted anew")
+
+
+class EmcyWatcher(Watcher):
+    """A node's emergency messages; of a node that is silent nobody knows."""
+
+    def __init__(
+        self, rule: EmcyRule, component: str, now_ns: int, changed: Changed, pulse: Pulse, vendor: int | None
+    ) -> None:
+        super().__init__(rule, component, component, now_ns, changed)
+        self._codes = tuple(code.lower() for code in rule.codes or ("0x",))
+        self._pulse = pulse
+        self._vendor = vendor
+        self._active: Emcy | None = None
+        self._began_ns = now_ns
+
+    def on_emcy(self, emcy: Emcy) -> None:
+        if emcy.resets:
+            self._active = None
+        elif f"0x{emcy.code:04x}".startswith(self._codes):
+            self._active = emcy
+            self.judge(emcy.stamp_ns, True, lambda: emcy.text(self._vendor))
+
+    def on_boot_up(self, _stamp_ns: int) -> None:
+        self._active = None
+
+    def look(self, now_ns: int) -> int:
+        heard_ns = self._pulse.last_ns()
+        if heard_ns is not None and (now_ns - heard_ns) / 1e9 <= self._pulse.timeout_s():
+            if self._active is None:
+                self.judge(now_ns, False, lambda: "")
+        elif now_ns - self._began_ns > GRACE_NS:
+            self.unseen(now_ns, lambda: "is silent, so nobody knows whether it has an emergency")
+        return now_ns + AGAIN_NS
+
+
+class UnseenWatcher(Watcher):
+    """Something that cannot be watched on this robot, and why."""
+
+    def __init__(self, rule: Rule, component: str, now_ns: int, changed: Changed, why: str) -> None:
+        super().__init__(rule, component, component, now_ns, changed)
+        self.why = why
+
+    def look(self, now_ns: int) -> int:
+        self.unseen(now_ns, lambda: self.why)
+        return now_ns + GRACE_NS
+
+
+def _no_value(seen_ns: int | None, now_ns: int) -> str:
+    return "has had no value yet" if seen_ns is None else f"no value for {(now_ns - seen_ns) / 1e9:.2f} s"

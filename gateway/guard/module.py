@@ -1,0 +1,195 @@
+"""The guard's module: it runs without clients; a rule that trips stops the drives in the thread that saw it.
+
+All else that a rule leads to, the held stop, the journal and what clients see, follows in the loop.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from functools import partial
+from typing import TYPE_CHECKING, Any, cast
+
+from drivers.bus.arming import Arming
+from drivers.joint.quick_stop import StopOutcome
+from gateway import messages
+from gateway.futures import failed
+from gateway.guard.alarms import WHO, Alarms, GuardSource
+from gateway.guard.armings import Armings
+from gateway.guard.settings import Action, GuardSettings
+from gateway.guard.watcher import Change, State, Watcher
+from gateway.guard.wiring import Wiring
+from gateway.modules.stop import Drive
+
+if TYPE_CHECKING:
+    from drivers.joint.drive import JointDrive
+    from gateway.modules.component import ComponentModule
+    from gateway.modules.control import ControlModule
+    from gateway.registry import Context
+    from gateway.session import Answer, Session
+
+LOOK_NS = (
+    250_000_000  # how often the loop looks at the latest; each watcher says when it wants to be looked at
+)
+LEAST_S = 0.005
+
+
+class GuardModule:
+    """`[guard]` of the robot's file, running."""
+
+    def __init__(self, context: "Context") -> None:
+        self._context = context
+        self._loop = context.loop
+        self._component = cast("ComponentModule", context.needs["component"])
+        self._control = cast("ControlModule", context.needs["control"])
+        self._settings = context.config.guard or GuardSettings()
+        self._wirings: dict[str, Wiring] = {}
+        self._stopping: dict[str, Future[StopOutcome]] = {}
+        self._source = GuardSource(tuple(self._settings.rule))
+        self._count = 0
+        self._ended = False
+        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {}
+
+    def start(self) -> None:
+        """Begin to watch, and arm the drives as they come up."""
+        self._alarms = Alarms(self._loop, self._control.journal.append)
+        drives = cast("Mapping[str, JointDrive]", self._control.drives)
+        self._armings = Armings(drives, self._settings.heartbeat_ms, self._arming_changed)
+        self._armings.start()
+        now_ns = time.monotonic_ns()
+        self._wirings = {
+            name: Wiring(rule, self._component.robot, now_ns, partial(self._changed, name))
+            for name, rule in self._settings.rule.items()
+        }
+        for wiring in self._wirings.values():
+            wiring.open()
+        self._component.sources.append(self._source)
+        self._control.refuses_reset = self._refuses_reset
+        self._control.armed = lambda name: name in self._armings.armed
+        self._loop.post(self._look)
+
+    def stop(self) -> None:
+        """Disarm the drives, and watch no more."""
+        self._ended = True
+        self._component.sources.remove(self._source)
+        for wiring in self._wirings.values():
+            wiring.close()
+        for failure in self._armings.stop():
+            self._control.journal.append(WHO, "not disarmed", reason=failure)
+
+    def objection(self) -> str | None:
+        """Why the gateway must not end now, in words; that it was asked to is put down."""
+        why = self._armings.objection()
+        if why is not None:
+            self._control.journal.append(WHO, "end refused", reason=why)
+        return why
+
+    def info(self) -> messages.GuardInfo:
+        """As `robot.describe` shows it."""
+        return messages.GuardInfo(
+            configured=True,
+            heartbeat_ms=self._settings.heartbeat_ms,
+            rules=[_info(name, wiring) for name, wiring in self._wirings.items()],
+            arming=self._armings.texts,
+            alarms=self._count,
+        )
+
+    # In the thread that saw it.
+
+    def _changed(self, name: str, watcher: Watcher, change: Change) -> None:
+        if change.acts and Action.QUICK_STOP in watcher.rule.actions:
+            self._stop_drives()
+        self._loop.post(lambda: self._follow(name, watcher, change))
+
+    def _stop_drives(self) -> None:
+        """At once, past the loop; one that is being stopped so already is not asked twice."""
+        for name, drive in self._control.drives.items():
+            running = self._stopping.get(name)
+            if running is None or running.done():
+                self._stopping[name] = _quick_stop(drive)
+
+    def _arming_changed(self, joints: str, arming: Arming) -> None:
+        what = "armed" if arming.armed else "alarm"
+        self._loop.post(lambda: self._tell(joints, what, arming.text))
+
+    # In the loop.
+
+    def _follow(self, name: str, watcher: Watcher, change: Change) -> None:
+        if change.acts:
+            self._act(name, watcher, change)
+        elif change.state is State.BLIND:
+            self._tell(name, "alarm", change.reason)
+        else:
+            self._tell(name, "alarm over", f"{watcher.what} is {change.state.words}")
+        self._publish()
+
+    def _act(self, name: str, watcher: Watcher, change: Change) -> None:
+        """What else a trip leads to; a stop that is held already stays as it is."""
+        actions, why = watcher.rule.actions, f"guard rule {name}: {change.reason}"
+        if Action.QUICK_STOP in actions and not self._control.stop_held:
+            self._control.stop_robot(WHO, why)
+        if Action.REVERT_TRIALS in actions:
+            self._control.revert_trials(why)
+        if Action.ALARM in actions:
+            self._tell(name, "alarm", change.reason)
+
+    def _tell(self, about: str, what: str, reason: str) -> None:
+        if not self._ended:
+            self._count += what == "alarm"
+            self._alarms.tell(about, what, reason)
+
+    def _refuses_reset(self) -> str | None:
+        """A stop whose reason is still there is not reset."""
+        found = [
+            f"{name} ({_worst(wiring).last.reason})"
+            for name, wiring in self._wirings.items()
+            if Action.QUICK_STOP in wiring.rule.actions and _worst(wiring).state is State.TRIPPED
+        ]
+        return f"the guard's rule is tripped: {', '.join(found)}" if found else None
+
+    def _look(self) -> None:
+        """See what has not come; as long as this turns, the gateway counts as alive."""
+        if self._ended:
+            return
+        now_ns = time.monotonic_ns()
+        due_ns = now_ns + LOOK_NS
+        try:
+            for wiring in self._wirings.values():
+                due_ns = min(due_ns, *(watcher.look(now_ns) for watcher in wiring.watchers))
+            self._publish()
+            self._armings.feed()
+        finally:
+            delay_s = max(LEAST_S, (due_ns - now_ns) / 1e9)
+            self._loop.call_later(delay_s, self._look)
+
+    def _publish(self) -> None:
+        states = {name: _worst(wiring).state for name, wiring in self._wirings.items()}
+        self._source.publish(time.monotonic_ns(), self._count, states)
+
+
+def _quick_stop(drive: Drive) -> "Future[StopOutcome]":
+    try:
+        return drive.quick_stop()
+    except Exception as error:  # noqa: BLE001 - the other drives are to be stopped all the same
+        return failed(error)
+
+
+def _worst(wiring: Wiring) -> Watcher:
+    """The input that decides a rule's state; the one that changed last of those that are equally bad."""
+    return max(wiring.watchers, key=lambda one: (one.state, one.last.stamp_ns))
+
+
+def _info(name: str, wiring: Wiring) -> messages.GuardRuleInfo:
+    rule, worst = wiring.rule, _worst(wiring)
+    return messages.GuardRuleInfo(
+        name=name,
+        watch=rule.watch,
+        limit=rule.words,
+        on=list(dict.fromkeys(watcher.component for watcher in wiring.watchers)),
+        actions=[action.value for action in rule.actions],
+        blind=rule.blind.value,
+        state=worst.state.words,
+        since_ns=worst.last.stamp_ns,
+        reason=worst.last.reason or None,
+        trips=sum(watcher.trips for watcher in wiring.watchers),
+        problems=[watcher.last.reason for watcher in wiring.watchers if watcher.state is State.BLIND],
+    )

@@ -1,0 +1,117 @@
+"""One input of one rule, and its state: what is seen is judged in the thread that brings it.
+
+    WATCHING ── is where it must not be, for long enough ──▶ TRIPPED ── well for clear_s ──▶ CLEARED
+        └────── nothing to see for too long ──▶ BLIND (or TRIPPED, where the rule says so)
+
+What is unknown never ends a trip, and never counts as well.
+"""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from gateway.guard.settings import Blind, Rule
+
+GRACE_NS = 3_000_000_000  # how long a device that nobody has heard yet may take to come up
+
+
+class State(IntEnum):
+    """State of a rule or of one of its inputs; the worst counts."""
+
+    WATCHING = 0
+    CLEARED = 1  # it had tripped, and that is over
+    BLIND = 2  # it cannot see what it watches
+    TRIPPED = 3
+
+    @property
+    def words(self) -> str:
+        return self.name.lower()
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What has become of a watcher; `acts` where the rule's actions are due."""
+
+    state: State
+    stamp_ns: int
+    reason: str
+
+    @property
+    def acts(self) -> bool:
+        return self.state is State.TRIPPED
+
+
+class Watcher:
+    """One input of one rule. Any thread may bring something; `changed` is called in that thread.
+
+    `component` is whose input it is, `what` is the input in words.
+    """
+
+    def __init__(
+        self, rule: Rule, component: str, what: str, now_ns: int, changed: "Callable[[Watcher, Change], None]"
+    ) -> None:
+        self.rule = rule
+        self.component = component
+        self.what = what
+        self.last = Change(State.WATCHING, now_ns, "")
+        self.trips = 0
+        self._changed = changed
+        self._clear_ns = round(rule.clear_s * 1e9)
+        self._lock = threading.Lock()
+        self._over_since_ns: int | None = None
+        self._well_since_ns: int | None = None
+
+    @property
+    def state(self) -> State:
+        return self.last.state
+
+    def look(self, now_ns: int) -> int:
+        """See what has not come; returns when to look again at the latest (ns)."""
+        raise NotImplementedError
+
+    def judge(self, stamp_ns: int, over: bool, words: Callable[[], str], for_ns: int = 0) -> None:
+        """What was seen at `stamp_ns` is `over` the limit, or is well; over for `for_ns` it trips."""
+        with self._lock:
+            change = self._on_over(stamp_ns, words, for_ns) if over else self._on_well(stamp_ns)
+        self._tell(change)
+
+    def unseen(self, now_ns: int, words: Callable[[], str]) -> None:
+        """There is nothing to see, and has not been for too long."""
+        with self._lock:
+            self._over_since_ns = self._well_since_ns = None
+            change = None
+            if self.state not in (State.BLIND, State.TRIPPED):
+                state = State.TRIPPED if self.rule.blind is Blind.ACT else State.BLIND
+                change = self._go(state, now_ns, f"{self.what}: {words()}")
+        self._tell(change)
+
+    def _on_over(self, stamp_ns: int, words: Callable[[], str], for_ns: int) -> Change | None:
+        self._well_since_ns = None
+        if self._over_since_ns is None:
+            self._over_since_ns = stamp_ns
+        if self.state is State.TRIPPED or stamp_ns - self._over_since_ns < for_ns:
+            return None
+        return self._go(State.TRIPPED, stamp_ns, f"{self.what}: {words()}")
+
+    def _on_well(self, stamp_ns: int) -> Change | None:
+        self._over_since_ns = None
+        if self.state is State.BLIND:
+            return self._go(State.CLEARED if self.trips else State.WATCHING, stamp_ns, "")
+        if self.state is not State.TRIPPED:
+            return None
+        if self._well_since_ns is None:
+            self._well_since_ns = stamp_ns
+        if stamp_ns - self._well_since_ns < self._clear_ns:
+            return None
+        return self._go(State.CLEARED, stamp_ns, self.last.reason)
+
+    def _go(self, state: State, stamp_ns: int, reason: str) -> Change:
+        self._over_since_ns = self._well_since_ns = None
+        self.trips += state is State.TRIPPED
+        self.last = Change(state, stamp_ns, reason)
+        return self.last
+
+    def _tell(self, change: Change | None) -> None:
+        if change is not None:
+            self._changed(self, change)
