@@ -5,7 +5,7 @@ import random
 from hil_sim.gait import posture
 from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.curves import Leg
-from hil_sim.gait.gaits import GAITS, LEFT, RIGHT, Gait
+from hil_sim.gait.gaits import GAITS, LEFT, RIGHT
 from hil_sim.gait.mishaps import LYING_PITCH, TRIP_PHASE, Fall, FallState, Stumble, side_of_fall
 from hil_sim.gait.posture import LYING, SITTING, STANDING
 from hil_sim.gait.profiles import Ramp, mix
@@ -45,6 +45,7 @@ class Generator:
         self._from = self._to = Activity.WALK
         self._activity = Activity.STAND
         self._mishap: Activity | None = None
+        self._show()
 
     # -- moving on ---------------------------------------------------------------------------------------
 
@@ -60,6 +61,18 @@ class Generator:
         self._walk.step(dt, base in GAITS and self._sit.share == 0.0)
         self._sit.step(dt, base is Activity.SIT and self._walk.share == 0.0)
         self._step_phase(dt)
+        self._show()
+
+    def _show(self) -> None:
+        """What follows from the present state and is asked for again and again."""
+        left, right, cycle_time, toe_height, trunk_angle = self._lag.values
+        self.shape = Shape((left + right) / 2.0, cycle_time, toe_height, trunk_angle)
+        self.walking = self._walk.smooth  # 0 standing … 1 moving in a gait
+        self.sitting = posture.bent(self._sit.share)  # 0 upright … 1 legs bent as one sits
+        share = self._change.smooth
+        parts = ((self._from, 1.0 - share), (self._to, share))
+        self.gaits = tuple((GAITS[gait], part) for gait, part in parts if part > 0.0)  # each with its share
+        self._legs: tuple[Leg, Leg] | None = None
 
     def _notice(self, activity: Activity) -> None:
         """A stumble or fall that is newly wanted happens at the next occasion, once."""
@@ -119,25 +132,9 @@ class Generator:
         return self._rhythm.phase
 
     @property
-    def shape(self) -> Shape:
-        """The gait's shape as it is now, on the way to what is wanted."""
-        left, right, cycle_time, toe_height, trunk_angle = self._lag.values
-        return Shape((left + right) / 2.0, cycle_time, toe_height, trunk_angle)
-
-    @property
-    def walking(self) -> float:
-        """0 standing … 1 moving in a gait."""
-        return self._walk.smooth
-
-    @property
     def seating(self) -> float:
         """Share of the way from standing (0) to the seat (1)."""
         return self._sit.share
-
-    @property
-    def sitting(self) -> float:
-        """0 upright … 1 legs bent as one sits."""
-        return posture.bent(self._sit.share)
 
     @property
     def in_transition(self) -> bool:
@@ -166,13 +163,6 @@ class Generator:
             return Activity.FALL
         return Activity.SIT if self._sit.share == 1.0 else Activity.STAND
 
-    def gaits(self) -> list[tuple[Gait, float]]:
-        """The gaits that make up the present one, each with its share."""
-        share = self._change.smooth
-        if share == 0.0:
-            return [(GAITS[self._from], 1.0)]
-        return [(GAITS[self._from], 1.0 - share), (GAITS[self._to], share)]
-
     def leg_phase(self, side: int) -> float:
         """Of one leg's own stride."""
         phase = self._rhythm.phase + (0.5 if side == RIGHT else 0.0)
@@ -188,15 +178,15 @@ class Generator:
     @property
     def yaw_rate(self) -> float:
         """Of the way (rad/s, to the left); a turn is made step by step."""
-        turn = sum(share * gait.turn for gait, share in self.gaits())
+        turn = sum(share * gait.turn for gait, share in self.gaits)
         return turn * self.walking * (1.0 - self.fall.share) / self.shape.cycle_time
 
     @property
     def trunk(self) -> float:
         """Forward lean of the trunk (rad)."""
-        gait = self.walking * sum(share * gait.lean for gait, share in self.gaits())
+        gait = self.walking * sum(share * gait.lean for gait, share in self.gaits)
         upright = (
-            self._lag.values[4] + self.wearer.lean + gait + posture.lean(self.seating) + self.stumble.pitch
+            self.shape.trunk_angle + self.wearer.lean + gait + posture.lean(self.seating) + self.stumble.pitch
         )
         return upright + self.fall.share * (LYING_PITCH - upright)
 
@@ -213,7 +203,9 @@ class Generator:
 
     def legs(self) -> tuple[Leg, Leg]:
         """Left and right leg."""
-        return self._leg(LEFT), self._leg(RIGHT)
+        if self._legs is None:
+            self._legs = self._leg(LEFT), self._leg(RIGHT)
+        return self._legs
 
     def _leg(self, side: int) -> Leg:
         walking, sitting, fallen = self.walking, self.sitting, self.fall.share
@@ -231,12 +223,11 @@ class Generator:
         asymmetry = 1.0 + (0.5 - side) * wearer.asymmetry
         step = self._lag.values[side] * asymmetry * (1.0 - 0.2 * impaired)
         parts = [
-            (gait.leg(phase, step * gait.steps[side], wearer.leg_length), share)
-            for gait, share in self.gaits()
+            (gait.leg(phase, step * gait.steps[side], wearer.leg_length), share) for gait, share in self.gaits
         ]
         pose = parts[0][0] if len(parts) == 1 else mix(parts[0][0], parts[1][0], parts[1][1])
         swinging = swing(phase, self.stance_share(side))
-        pose = lifted(pose, self._lag.values[3], swinging)
+        pose = lifted(pose, self.shape.toe_height, swinging)
         hip, knee, ankle = wearer.habits
         return Leg(
             pose.hip + hip(phase),

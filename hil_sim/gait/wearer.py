@@ -122,7 +122,7 @@ class Wearer:
         impaired = generator.wearer.impairment
         takes = 1.0 + _IMPAIRED_LOAD * (impaired[1 - side] - impaired[side])
         load = place = 0.0
-        for gait, part in generator.gaits():
+        for gait, part in generator.gaits:
             load += part * takes * vertical_grf(stance, gait.humps(speed), share)
             place += part * gait.path.at(stance)
         return _Contact(load, shear(stance, speed), place, outward(stance))
