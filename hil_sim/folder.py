@@ -6,6 +6,8 @@ from typing import IO
 
 from hil_sim import robot_file
 from hil_sim.errors import SimulatorError
+from hil_sim.sensors.suite import SensorChoice
+from hil_sim.sensors.tables import companions
 
 
 class Folder:
@@ -54,16 +56,18 @@ class Folder:
         if port != self.hub_port():
             self._port_file.write_text(f"{port}\n", encoding="ascii")
 
-    def write_config(self, bus: str) -> bool:
+    def write_config(self, bus: str, sensors: SensorChoice) -> bool:
         """Write robot.toml with the table of its `bus`, unless there is one: whoever edited it keeps that.
 
-        Says whether the file was written.
+        Says whether the file was written; what it names is written beside it.
         """
         try:
             with self.config.open("x", encoding="utf-8") as file:
-                file.write(robot_file.text(self.path, bus))
+                file.write(robot_file.text(self.path, bus, sensors))
         except FileExistsError:
             return False
+        for name, content in companions(sensors).items():
+            (self.path / name).write_text(content, encoding="utf-8")
         return True
 
     def link(self, sensor: str) -> Path:

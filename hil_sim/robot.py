@@ -16,6 +16,7 @@ from hil_sim.folder import Folder
 from hil_sim.loop import Loop
 from hil_sim.operator import Operator
 from hil_sim.sensors.serial_port import SerialPort
+from hil_sim.sensors.suite import SensorChoice
 
 
 class SimulatedRobot:
@@ -39,8 +40,9 @@ class SimulatedRobot:
         virtual_channel: str | None = None,
         speed: float | None = 1.0,
         epoch_s: float = 0.0,
+        sensors: SensorChoice | None = None,
     ) -> None:
-        self.exoskeleton = Exoskeleton(scenario, seed)
+        self.exoskeleton = Exoskeleton(scenario, seed, sensors)
         self.folder = Folder(folder)
         self.faults = Faults(self.exoskeleton, self.folder.path, seed)
         self.operator = Operator(self.exoskeleton, self.faults)
@@ -84,13 +86,16 @@ class SimulatedRobot:
     def _open_bus(self, loop: Loop, closing: ExitStack) -> None:
         if self._virtual_channel is not None:
             closing.callback(VirtualBridge(self.exoskeleton.bus, self._virtual_channel).close)
-            self.config_is_ours = self.folder.write_config(robot_file.virtual_bus(self._virtual_channel))
+            self._write_config(robot_file.virtual_bus(self._virtual_channel))
             return
         hub = Hub(loop, self.exoskeleton.bus, self.folder.hub_port(), self._epoch_s)
         closing.callback(hub.close)
         self.port = hub.port
         self.folder.remember_port(hub.port)
-        self.config_is_ours = self.folder.write_config(robot_file.hub_bus(hub.port))
+        self._write_config(robot_file.hub_bus(hub.port))
+
+    def _write_config(self, bus: str) -> None:
+        self.config_is_ours = self.folder.write_config(bus, self.exoskeleton.sensors.choice)
 
     def _open_sensors(self, closing: ExitStack) -> None:
         for name, line in self.exoskeleton.sensors.lines.items():

@@ -4,6 +4,8 @@ from pathlib import Path
 
 from hil_sim.bus.hub import HOST
 from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_EDS, CONTROLLER_NODE, DRIVE_EDS, JOINTS
+from hil_sim.sensors.suite import SensorChoice
+from hil_sim.sensors.tables import tables
 
 CHANNEL = "sim"
 
@@ -69,24 +71,7 @@ bus = "main"
 node_id = {controller_node}
 eds = "{controller_eds}"
 
-[insole.left_insole]
-port = "{folder}/left_insole"   # a path that stays: for real ones /dev/serial/by-id/…
-baudrate = 230400               # two feet of 16 cells at 100 Hz need more than 115200
-format = "insole-cobs"          # how the insole talks
-layout = "insole-16"            # where its 16 cells are; a .toml file of your own for another insole
-
-[insole.right_insole]           # the same for the other foot: the layout is mirrored
-port = "{folder}/right_insole"
-baudrate = 230400
-format = "insole-cobs"
-layout = "insole-16"
-
-[imu.trunk]
-port = "{folder}/trunk"
-baudrate = 115200               # 44 bytes at 100 Hz
-format = "witmotion"
-axes = ["x", "y", "z"]          # which sensor axes point forward, left and up along the trunk
-
+{sensors}
 # Parameters: what may be changed, within which limits. The name before the dot is the component it belongs
 # to. The stricter of these limits and those of the EDS counts.
 
@@ -163,8 +148,8 @@ def virtual_bus(channel: str) -> str:
     return _VIRTUAL.format(channel=channel)
 
 
-def text(folder: Path, bus: str) -> str:
-    """The file for the simulator in `folder` (absolute), with the table of its bus."""
+def text(folder: Path, bus: str, sensors: SensorChoice) -> str:
+    """The file for the simulator in `folder` (absolute), with the tables of its bus and its sensors."""
     first, *others = JOINTS.items()
     joints = [(_FIRST_JOINT, first), *((_JOINT, other) for other in others)]
     return "".join(
@@ -172,7 +157,7 @@ def text(folder: Path, bus: str) -> str:
             _HEAD.format(path=folder / "robot.toml", bus=bus),
             *(template.format(name=name, node_id=node, eds=DRIVE_EDS) for template, (name, node) in joints),
             _DEVICES.format(
-                folder=folder,
+                sensors=tables(sensors, folder),
                 controller=CONTROLLER,
                 controller_node=CONTROLLER_NODE,
                 controller_eds=CONTROLLER_EDS,

@@ -15,6 +15,7 @@ from hil_sim.exoskeleton import Scenario
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
+from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
 _DESCRIPTION = """\
 A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen
@@ -28,7 +29,8 @@ what is in DIR
                    like, delete it to have it written anew
   control          socket for faults while it runs: gwrms sim-fault --dir DIR …
   left_insole, right_insole, trunk
-                   links to the sensors' pseudo-terminals (230400, 230400, 115200 baud)
+                   links to the sensors' pseudo-terminals; a reader at another baud rate than in robot.toml
+                   hears what it would hear on a wire. An IMU on the bus has none
   hub.port         TCP port of the bus: python-can's "socketcand" interface at 127.0.0.1, channel "sim"
   The same DIR keeps the same port and paths from start to start, also after a crash. One simulator at a time.
 
@@ -43,6 +45,10 @@ the drives
   Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
   bus. It keeps commanding "enable operation" until a drive leaves that state. Then it stops all drives and
   waits for 1 in its object 2000h.
+
+sensors
+  --imu and --insole choose the languages that they speak, from the makers' manuals. `gwrms sensor
+  DIR/trunk` finds out which.
 
 scenario files
   gwrms sim run FILE        runs it against a gateway and checks what it expects (--help says more)
@@ -77,6 +83,10 @@ def _parser() -> argparse.ArgumentParser:
         "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; made if needed"
     )
     parser.add_argument("--scenario", choices=[str(scenario) for scenario in Scenario], help="default: walk")
+    parser.add_argument("--imu", choices=IMUS, default=SensorChoice().imu, help="default: %(default)s")
+    parser.add_argument(
+        "--insole", choices=INSOLES, default=SensorChoice().insole, help="default: %(default)s"
+    )
     parser.add_argument("--script", type=Path, metavar="FILE", help="a scenario file: what happens, and when")
     parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds (default: run on)")
     parser.add_argument(
@@ -110,6 +120,7 @@ def main(argv: list[str]) -> int:
         script.seed if arguments.seed is None else arguments.seed,
         speed=arguments.speed,
         epoch_s=time.time(),
+        sensors=SensorChoice(arguments.imu, arguments.insole),
     )
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -61,6 +61,7 @@ class SensorSuite:
     """
 
     def __init__(self, choice: SensorChoice, clock: Clock, bus: CanBus, seed: int) -> None:
+        self.choice = choice
         self.insole_faults = {name: InsoleFaults() for name in FEET}
         self.faults: dict[str, LineFaults] = {**self.insole_faults, TRUNK: LineFaults()}
         self.lines: dict[str, SerialLine] = {}
