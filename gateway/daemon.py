@@ -45,6 +45,7 @@ class Daemon:
     def run(self, ready: Callable[[], object] = lambda: None) -> None:
         """Serve until `end`; `ready` is called once when clients can connect."""
         self._listen()
+        self._loop.post(self._service.resume)
         self._loop.post(ready)
         try:
             self._loop.run()
@@ -53,7 +54,10 @@ class Daemon:
             self._loop.close()
 
     def end(self) -> None:
-        """Close every client, stop every module, and let `run` return; from any thread or signal handler."""
+        """Close every client, stop every module, and let `run` return; from any thread or signal handler.
+
+        Where a guard has armed the drives it is refused, in the log and the journal, while one is enabled.
+        """
         self._loop.post(self._end)
 
     def end_on_signals(self) -> "contextlib.AbstractContextManager[None]":
@@ -94,6 +98,10 @@ class Daemon:
 
     def _end(self) -> None:
         if self._ending:
+            return
+        objection = self._service.objection()
+        if objection is not None:
+            log.error("%s", objection)
             return
         self._ending = True
         self._loop.watch(self._listener, 0, lambda _events: None)

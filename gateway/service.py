@@ -1,5 +1,6 @@
 """What the gateway answers: parameters are checked, the method's module is started, its answer given."""
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -16,6 +17,9 @@ from gateway.session import Answer, Session
 from gateway.sources import channel_info, check_globs, merge, narrow
 from gateway.streams import Streams
 
+log = logging.getLogger(__name__)
+
+GUARD_AGAIN_S = 5.0  # how soon a guard that could not start is tried again
 CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are configured
 
 # Which module answers what; the rest is the service's own.
@@ -46,7 +50,9 @@ class Service:
         self.registry = Registry(config, loop, specs)
         self.streams = Streams(loop)
         self._config = config
+        self._loop = loop
         self._boot_id = boot_id()
+        self._guard_problem = "it has not started yet"
         self._own: Mapping[str, Callable[[Session, Any], Answer]] = {
             "hello": self._hello,
             "clock.read": lambda _session, _params: self._clock(),
@@ -54,6 +60,23 @@ class Service:
             "stream.start": self._stream_start,
             "stream.stop": self._stream_stop,
         }
+
+    def resume(self) -> None:
+        """Begin what runs without any client: a guard that the robot's file asks for."""
+        if self._config.guard is not None:
+            self.registry.use("guard", "guard").add_done_callback(self._guard_began)
+
+    def _guard_began(self, guard: "Future[Module]") -> None:
+        error = guard.exception()
+        if error is not None:
+            self._guard_problem = str(error)
+            log.critical("the guard does not run: %s", error)
+            self._loop.call_later(GUARD_AGAIN_S, self.resume)
+
+    def objection(self) -> str | None:
+        """Why the gateway must not end now, in words; `None` where it may."""
+        guard: Any = self.registry.running("guard") if self._config.guard is not None else None
+        return None if guard is None else guard.objection()
 
     def opened(self, session: Session) -> None:
         """A client has come."""
@@ -108,10 +131,19 @@ class Service:
             modules=self.registry.phases,
             clock=self._clock(),
             stop=robot.stop,
-            guard=messages.GuardInfo(),
+            guard=self._guard_info(),
             trials=robot.trials,
             records=robot.records,
         )
+
+    def _guard_info(self) -> messages.GuardInfo:
+        if self._config.guard is None:
+            return messages.GuardInfo()
+        guard: Any = self.registry.running("guard")
+        if guard is None:
+            return messages.GuardInfo(configured=True, problem=self._guard_problem)
+        info: messages.GuardInfo = guard.info()
+        return info
 
     def _stream_start(self, session: Session, params: messages.StreamStartParams) -> Answer:
         modules: dict[str, Future[Any]] = {name: self._use(name, session) for name in params.modules}

@@ -54,7 +54,6 @@ class GuardModule:
         self._alarms = Alarms(self._loop, self._control.journal.append)
         drives = cast("Mapping[str, JointDrive]", self._control.drives)
         self._armings = Armings(drives, self._settings.heartbeat_ms, self._arming_changed)
-        self._armings.start()
         now_ns = time.monotonic_ns()
         self._wirings = {
             name: Wiring(rule, self._component.robot, now_ns, partial(self._changed, name))
@@ -62,6 +61,7 @@ class GuardModule:
         }
         for wiring in self._wirings.values():
             wiring.open()
+        self._armings.start()
         self._component.sources.append(self._source)
         self._control.refuses_reset = self._refuses_reset
         self._control.armed = lambda name: name in self._armings.armed
