@@ -177,7 +177,11 @@ class JointDrive(Node):
             self._mode.command(controlword, controlword & ~previous)
 
     def _target_taker(self, key: Key) -> Callable[[Value], None]:
-        return lambda _: self._mode.target_written(key)
+        def written(value: Value) -> None:
+            if self.power.follows:
+                self._mode.target_written(key, value != self.dictionary[key].value)
+
+        return written
 
     def _power_changed(self, before: PowerState) -> None:
         self._following.late_s = 0.0

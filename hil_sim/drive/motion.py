@@ -94,15 +94,19 @@ class VelocityRamp:
 class TorqueRamp:
     """Change the torque to `target` by `slope` (N·m/s) and keep it."""
 
-    def __init__(self, target: float, slope: float) -> None:
-        self.target = target
-        self.slope = slope
+    def __init__(self) -> None:
         self.done = False
+        self._target = self._slope = 0.0
+
+    def aim(self, target: float, slope: float) -> None:
+        """Go on to `target`, whatever it was before."""
+        self.done = self.done and target == self._target
+        self._target, self._slope = target, slope
 
     def step(self, reference: Reference, dt: float) -> None:
-        change, most = self.target - reference.torque, self.slope * dt
+        change, most = self._target - reference.torque, self._slope * dt
         self.done = abs(change) <= most
-        reference.torque = self.target if self.done else reference.torque + math.copysign(most, change)
+        reference.torque = self._target if self.done else reference.torque + math.copysign(most, change)
 
 
 class _Track:

@@ -20,14 +20,13 @@ class Cyclic(Mode):
 
     target: ClassVar[Key]
     control: ClassVar[Control]
-    _targeted = False
 
     def enter(self) -> None:
         super().enter()
         self._targeted = False
         self._closed = False
 
-    def target_written(self, key: Key) -> None:
+    def target_written(self, key: Key, changed: bool) -> None:  # noqa: ARG002 - the same target is one too
         self._targeted |= key == self.target
 
     def synchronise(self) -> None:

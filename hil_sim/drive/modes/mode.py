@@ -65,8 +65,8 @@ class Mode:
     def resume(self) -> None:
         """Bit 8 has fallen."""
 
-    def target_written(self, key: Key) -> None:
-        """A target object was written, with whatever value."""
+    def target_written(self, key: Key, changed: bool) -> None:
+        """A target object is being written, be it with another value or the same."""
 
     def synchronise(self) -> None:
         """A SYNC came; received PDOs have taken effect."""

@@ -65,8 +65,9 @@ class ProfilePosition(Mode):
         if self._now.done and self._waiting is not None:
             profile, self._waiting = self._waiting, None
             self._start(profile)
-        error = self._now.target - self.servo.position
-        self._arrival.update(error, self.servo.settings.position_window, elapsed_s)
+        if self._now.done:
+            error = self._now.target - self.servo.position
+            self._arrival.update(error, self.servo.settings.position_window, elapsed_s)
 
     def status(self) -> int:
         arrived = self.servo.at_rest if self.halted or self._now is None else self._arrival.reached

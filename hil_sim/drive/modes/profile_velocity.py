@@ -7,6 +7,7 @@ from hil_sim.drive.modes.mode import BIT_12, TARGET_REACHED, Dwell, Mode
 from hil_sim.drive.motion import VelocityRamp
 from hil_sim.drive.servo import Servo
 from hil_sim.drive.settings import Control
+from hil_sim.node.dictionary import Key
 
 
 def within_limits(servo: Servo, wanted: float) -> float:
@@ -30,6 +31,10 @@ class ProfileVelocity(Mode):
         self._ramp = VelocityRamp(0.0, 0.0, 0.0)
         self._follow()
         self.servo.motion = self._ramp
+
+    def target_written(self, key: Key, changed: bool) -> None:
+        if changed and key == od.TARGET_VELOCITY:
+            self._reached.restart()
 
     def _follow(self) -> None:
         settings = self.servo.settings
