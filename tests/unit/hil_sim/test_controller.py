@@ -10,6 +10,7 @@ from hil_sim.bus.can_bus import Frame
 from hil_sim.controller import ControllerState
 from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import Exoskeleton, Scenario
+from hil_sim.gait.activity import Activity, Label
 from tests.unit.hil_sim.bench import Heard
 
 
@@ -143,6 +144,61 @@ def test_a_drive_that_vanishes_stops_the_others(robot: Robot) -> None:
     assert robot.states() == {PowerState.OPERATION_ENABLED}
 
 
+def test_a_missing_heartbeat_stops_all_and_is_told(robot: Robot) -> None:
+    """The drive still sends its PDOs; only its heartbeat is gone."""
+    assert robot.download(5, 0x1017, 0, 2) == "ok"
+    robot.run(0.7)
+    assert robot.exo.controller.controller_state is ControllerState.HELD
+    assert robot.exo.controller.dictionary.read(0x2012, 0) == bytes([5])
+    assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
+    assert struct.unpack_from("<H", robot.heard_last(0x90))[0] == 0x8130
+    robot.run(3.0)
+    assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
+    assert robot.download(5, 0x1017, 100, 2) == "ok"
+    assert robot.download(16, 0x2000, 1, 1) == "ok"
+    robot.run(1.0)
+    assert robot.states() == {PowerState.OPERATION_ENABLED}
+    assert struct.unpack_from("<H", robot.heard_last(0x90))[0] == 0x0000
+
+
+def test_a_drive_that_somebody_takes_out_of_operational_stops_the_others(robot: Robot) -> None:
+    robot.exo.bus.send(Frame(0x000, bytes([128, 3])), "client")
+    robot.run(0.5)
+    assert robot.exo.controller.controller_state is ControllerState.HELD
+    assert robot.exo.controller.dictionary.read(0x2012, 0) == bytes([3])
+    assert robot.exo.drives["left_hip"].power_state is PowerState.SWITCH_ON_DISABLED
+    assert robot.download(16, 0x2000, 1, 1) == "ok"
+    robot.run(1.0)
+    assert robot.states() == {PowerState.OPERATION_ENABLED}
+
+
+def test_it_shows_its_own_heartbeat(robot: Robot) -> None:
+    robot.heard.clear()
+    robot.run(1.0)
+    beats = [heard.data for heard in robot.heard if heard.cob_id == 0x710]
+    assert len(beats) == pytest.approx(10, abs=1)
+    assert set(beats) == {b"\x05"}
+
+
+def test_every_activity_is_one_that_the_drives_can_follow(robot: Robot) -> None:
+    controller = robot.exo.controller
+    for activity in (*Activity, Activity.WALK):
+        controller.go(activity, pace=(0.45, 1.4))
+        robot.run(2.5)
+        assert controller.controller_state is ControllerState.RUNNING
+        wanted = [angle for leg in controller.generator.legs() for angle in leg]
+        actual = [drive.joint.position for drive in robot.exo.drives.values()]
+        assert max(abs(a - b) for a, b in zip(wanted, actual, strict=True)) < 0.25
+
+
+def test_who_is_stopped_on_the_ground_stays_there(robot: Robot) -> None:
+    robot.exo.controller.go(Activity.FALL)
+    robot.run(4.0)
+    assert robot.download(16, 0x2000, 0, 1) == "ok"
+    robot.run(4.0)
+    assert robot.exo.controller.generator.label is Label.LYING
+
+
 def test_where_the_drive_stays_in_quick_stop_the_controllers_next_command_wins(robot: Robot) -> None:
     """605Ah = 6: transition 16 lets 0Fh enable the drive again before a TPDO has shown that it stopped."""
     robot.download(2, 0x605A, 6, 2)
@@ -165,7 +221,8 @@ def test_where_the_drive_stays_in_quick_stop_the_controllers_next_command_wins(r
         (0x2004, 2, -101, "06090032"),
         (0x2004, 2, 301, "06090031"),
         (0x2004, 2, -100, "ok"),
-        (0x2005, 1, 3, "06090031"),
+        (0x2005, 1, 10, "ok"),
+        (0x2005, 1, 11, "06090031"),
     ],
 )
 def test_gait_parameters_have_limits(robot: Robot, index: int, size: int, value: int, answer: str) -> None:

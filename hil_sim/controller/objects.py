@@ -1,0 +1,31 @@
+"""The objects of the gait controller (gait_controller.eds), and what the numbers in them mean."""
+
+from enum import IntEnum
+
+COMMAND = (0x2000, 0)
+STEP_LENGTH = (0x2001, 0)
+CYCLE_TIME = (0x2002, 0)
+TOE_HEIGHT = (0x2003, 0)
+TRUNK_ANGLE = (0x2004, 0)
+ACTIVITY = (0x2005, 0)
+STATE = (0x2010, 0)
+PHASE = (0x2011, 0)
+HOLDER = (0x2012, 0)
+CONTROLWORDS, MODES, TARGETS = 0x2110, 0x2111, 0x2112
+STATUSWORDS, POSITIONS = 0x2120, 0x2121
+CYCLE_PERIOD = (0x1006, 0)
+
+STOPPED_BY_COMMAND = 255  # in HOLDER
+
+
+class ControllerState(IntEnum):
+    """What object 2010h shows."""
+
+    IDLE = 0  # not booted
+    STARTING = 1  # waits for the statusword of every drive
+    ENABLING = 2  # brings the drives up
+    RUNNING = 3
+    HELD = 4  # quick stop to all until the start object is written
+
+
+COMMANDING = (ControllerState.STARTING, ControllerState.ENABLING, ControllerState.RUNNING)
