@@ -102,9 +102,11 @@ class Node(BusUser):
         """Read an object's bytes, no more than its type has."""
         return self.worker.submit(lambda sdo: self._trim(index, subindex, sdo.upload(index, subindex)))
 
-    def download(self, index: int, subindex: int, data: bytes) -> Future[None]:
+    def download(
+        self, index: int, subindex: int, data: bytes, timeout_s: float | None = None
+    ) -> Future[None]:
         """Write an object, once: `DeviceTimeout` means that nobody knows whether the device took it."""
-        return self.worker.submit(lambda sdo: sdo.download(index, subindex, data))
+        return self.worker.submit(lambda sdo: sdo.download(index, subindex, data, timeout_s))
 
     def urgent_download(self, index: int, subindex: int, data: bytes) -> Future[None]:
         """Write ahead of everything queued; ends our own transfer in flight."""

@@ -76,13 +76,14 @@ class SdoChannel:
                 continue
         return self._transfer(sdo.upload(index, subindex), index, subindex, what, wait_s)
 
-    def download(self, index: int, subindex: int, data: bytes) -> None:
+    def download(self, index: int, subindex: int, data: bytes, timeout_s: float | None = None) -> None:
         """Write an object, once; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
         self._check_interrupted()
         what = f"{self.label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
         unknown = "whether the device took it is not known, read it back"
         try:
-            self._transfer(sdo.download(index, subindex, data), index, subindex, what, self.timeout_s)
+            wait_s = timeout_s or self.timeout_s
+            self._transfer(sdo.download(index, subindex, data), index, subindex, what, wait_s)
         except Interrupted as error:
             raise DeviceTimeout(f"{what}: interrupted by an urgent request; {unknown}") from error
         except DeviceTimeout as error:

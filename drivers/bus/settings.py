@@ -44,6 +44,7 @@ class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """How long one node is waited for, and by which SDO channel it is asked."""
 
     sdo_timeout_s: Positive = 0.5
+    store_timeout_s: Positive = 10.0  # for the answer to 1010h and 1011h: flash takes its time
     sdo_cob_ids: tuple[CobId, CobId] | None = None  # request, response; None: 600h and 580h + node id
     heartbeat_timeout_s: Positive | None = None  # None: 2.5 times what the device says in 1017h
     guard_time_s: Positive | None = None  # node guarding by us, for a device without heartbeat; master only

@@ -20,6 +20,10 @@ class DriveState(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
+# States in which a drive may move.
+ENERGISED = frozenset(
+    {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE}
+)
 STATE_WORDS: dict[int, str] = {int(state): state.words for state in DriveState}
 
 # Statusword bits that tell the state: (mask, pattern) of CiA 402-2 table "state coding".

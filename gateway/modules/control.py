@@ -10,6 +10,7 @@ from gateway import messages
 from gateway.futures import then
 from gateway.modules.lease import RENEWED, TAKEN, Leases
 from gateway.modules.stop import Drive, Stop
+from gateway.modules.storage import RESTORING, STORING, Command
 from gateway.modules.tuning import Tuning
 from gateway.records.journal import Journal
 from gateway.records.records import Records
@@ -50,6 +51,8 @@ class ControlModule:
             "parameter.write": self._write,
             "parameter.confirm": self._confirm,
             "parameter.revert": self._revert,
+            "parameter.store": lambda session, params: self._store(STORING, session, params.component),
+            "parameter.restore": lambda session, params: self._store(RESTORING, session, params.component),
             "robot.stop": lambda session, params: self.stop_robot(session.who, str(params.reason)),
             "journal.tail": lambda _session, params: self._tail(params.n),
         }
@@ -143,6 +146,10 @@ class ControlModule:
     def _revert(self, session: "Session", params: messages.WriteNumberParams) -> "Future[messages.Reverted]":
         self._leases.require(session)
         return self._tuning.trials.revert(params.write)
+
+    def _store(self, command: Command, session: "Session", component: str) -> "Future[messages.Stored]":
+        self._leases.require(session)
+        return self._tuning.storage.run(command, session.who, component)
 
     @property
     def drives(self) -> Mapping[str, Drive]:

@@ -8,14 +8,14 @@ import itertools
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from drivers.bus.settings import DeviceSettings
 from drivers.bus.values import unsigned
 from drivers.errors import DriverError
-from drivers.joint.cia402 import STATE_WORDS, DriveState, drive_state
+from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.quick_stop import STATUSWORD
 from drivers.joint.settings import JointSettings
@@ -28,6 +28,7 @@ from gateway.modules.catalogue import resolve
 from gateway.modules.component import ComponentModule
 from gateway.modules.ledger import Keeping, WriteLedger
 from gateway.modules.parameters import Parameter
+from gateway.modules.storage import Storage
 from gateway.modules.taking_back import OutOfReach
 from gateway.modules.transaction import ANSWER_S, Change, Node, Outcome, Transaction, device_error
 from gateway.modules.trials import Trials
@@ -42,11 +43,6 @@ log = logging.getLogger(__name__)
 
 Changed = Callable[[], None]
 
-# States in which a drive may move; a parameter that is not live needs another one.
-ENERGISED = frozenset(
-    {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE}
-)
-
 
 class Tuning:
     """Every parameter of the robot. It belongs to the loop's thread, but for `_check`."""
@@ -56,7 +52,7 @@ class Tuning:
     ) -> None:
         self._component = component
         self._loop = loop
-        self._joints = config.joint
+        self._config = config
         self._devices: dict[str, JointSettings | DeviceSettings] = {**config.joint, **config.device}
         self._parameters = resolve(config, component.robot.descriptions, component.absent)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
@@ -66,6 +62,9 @@ class Tuning:
         undo = UndoFile(records.folder.undo)
         self._keeping = Keeping(undo, records.journal, self._place, records.unusable)
         self.trials = Trials(loop, self._writer.submit, self._keeping, self._reach, changed)
+        self.storage = Storage(
+            config, component, self._parameters, self._keeping, self._state, self._writer.submit
+        )
 
     def close(self) -> None:
         """Take back what is being written, and end the writer's thread."""
@@ -224,7 +223,7 @@ class Tuning:
             raise parameter.refusal(Kind.OUT_OF_LIMIT, text, most)
         allowed = allowed_states(parameter)
         if allowed is not None:
-            for drive in self._drives_of(parameter):
+            for drive in self._config.drives_of(parameter.component):
                 self._check_state(parameter, drive, allowed)
 
     def _check_state(self, parameter: Parameter, drive: str, allowed: frozenset[DriveState]) -> None:
@@ -241,7 +240,7 @@ class Tuning:
         component: Any = self._component.robot.components.get(drive)
         if component is None:
             return None, self._component.absent.get(drive, "it is not there")
-        index = STATUSWORD + AXIS_OFFSET * self._joints[drive].axis
+        index = STATUSWORD + AXIS_OFFSET * self._config.joint[drive].axis
         try:
             statusword = unsigned(component.node.upload(index, 0).result(ANSWER_S))
         except (DriverError, TimeoutError) as error:
@@ -268,10 +267,6 @@ class Tuning:
             raise OutOfReach(str(quality["problem"] or "it is silent"), final=False)
         node: Node = component.node
         return node
-
-    def _drives_of(self, parameter: Parameter) -> Iterable[str]:
-        """A joint's parameter concerns its own drive; another device's may move them all."""
-        return (parameter.component,) if parameter.component in self._joints else tuple(self._joints)
 
 
 def allowed_states(parameter: Parameter) -> frozenset[DriveState] | None:

@@ -173,3 +173,14 @@ def test_a_worker_can_be_started_again(device: Device) -> None:
         worker.start()
         assert upload(worker, 0x1000).result(WAIT_S)
         worker.stop()
+
+
+def test_a_write_may_be_given_more_time_than_others(worker: SdoWorker, device: Device) -> None:
+    device.deaf_to[0x1010] = 1
+    later = threading.Timer(2 * device.channel.timeout_s, lambda: device.hear(device.requests[-1]))
+    stored = worker.submit(lambda sdo: sdo.download(0x1010, 1, b"save", timeout_s=WAIT_S))
+    later.start()
+    stored.result(WAIT_S)
+    later.join()
+    assert device.commands() == ["23 1010", "23 1010"]  # the second is the timer's
+    assert device.channel.counters.timeouts == 0

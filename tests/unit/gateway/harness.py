@@ -150,7 +150,9 @@ class FakeNode:
     def upload(self, index: int, subindex: int) -> "Future[bytes]":
         return self._do(lambda: self._upload(index, subindex))
 
-    def download(self, index: int, subindex: int, data: bytes) -> "Future[None]":
+    def download(
+        self, index: int, subindex: int, data: bytes, timeout_s: float | None = None
+    ) -> "Future[None]":
         return self._do(lambda: self._download(index, subindex, data))
 
     def written(self) -> list[tuple[int, bytes | None]]:

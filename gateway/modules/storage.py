@@ -1,0 +1,254 @@
+"""Store (1010h) and restore (1011h): what a device keeps over a reset, on command, verified (CiA 301 §7.5.2).
+
+Refused unless the device says that it can, every drive that it may move is known to be at rest, and nothing
+is on trial that would become permanent.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from drivers.bus.values import unsigned
+from drivers.errors import DeviceAbort, DriverError
+from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState
+from gateway.coding import Number, text
+from gateway.config import RESTORE, STORE, DeviceTable, JointTable, RobotConfig
+from gateway.futures import then
+from gateway.messages import Stored
+from gateway.modules.ledger import Keeping
+from gateway.modules.parameters import READABLE, Parameter
+from gateway.modules.transaction import ANSWER_S, read
+from gateway.wire import Kind, RpcError, refuse
+
+if TYPE_CHECKING:
+    from gateway.modules.component import ComponentModule
+
+T = TypeVar("T")
+
+ALL = 1  # the sub-index of all parameters
+_ON_COMMAND, _BY_ITSELF = 0b01, 0b10  # bits of what it reads as: the device's capabilities
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One of the two: its object, its signature (LSB first), and what it has done."""
+
+    name: str
+    index: int
+    signature: bytes
+    done: str
+
+    @property
+    def object(self) -> str:
+        return f"0x{self.index:04X}:{ALL}"
+
+
+STORING = Command("store", STORE, b"save", "stored, and it still holds the same values")
+RESTORING = Command(
+    "restore",
+    RESTORE,
+    b"load",
+    "confirmed; its defaults act after its next reset (switch it off and on, or NMT reset node, which is not "
+    "sent from here), until then it holds what it held",
+)
+
+
+class Node(Protocol):
+    """A device's objects, as the drivers give them."""
+
+    def upload(self, index: int, subindex: int) -> "Future[bytes]": ...
+
+    def download(
+        self, index: int, subindex: int, data: bytes, timeout_s: float | None = None
+    ) -> "Future[None]": ...
+
+
+StateOf = Callable[[str], tuple[DriveState | None, str]]  # a drive's state, or why it is not known
+Submit = Callable[[Callable[[], Stored]], "Future[Stored]"]  # a job for the writer's thread
+
+
+class Storage:
+    """What every device of a robot can store."""
+
+    def __init__(
+        self,
+        config: RobotConfig,
+        component: "ComponentModule",
+        parameters: Mapping[str, Parameter],
+        keeping: Keeping,
+        state_of: StateOf,
+        submit: Submit,
+    ) -> None:
+        self.config = config
+        self.tables: dict[str, JointTable | DeviceTable] = {**config.joint, **config.device}
+        self.parameters = parameters
+        self.keeping = keeping
+        self.state_of = state_of
+        self._component = component
+        self._submit = submit
+
+    def run(self, command: Command, who: str, component: str) -> "Future[Stored]":
+        """Do it after every write that was asked for before.
+
+        Raises:
+            RpcError: at once, or as the future's error. device_timeout: nobody knows whether it was done.
+
+        """
+        if component not in self.tables:
+            known = ", ".join(self.tables) or "none"
+            raise refuse(Kind.UNKNOWN_NAME, f"{component!r} is no device that can store; here are: {known}")
+        ready = self._component.when_ready({component, *self.config.drives_of(component)})
+        return then(ready, lambda _none: self._begin(command, who, component))
+
+    def _begin(self, command: Command, who: str, component: str) -> "Future[Stored]":
+        found: Any = self._component.robot.components.get(component)
+        if found is None:
+            why = self._component.absent.get(component, "it is not there")
+            raise refuse(Kind.UNAVAILABLE, f"{component}: {why}", component=component)
+        return self._submit(_Run(self, command, who, component, found.node).do)
+
+
+class _Run:
+    """One command to one device, in the writer's thread."""
+
+    def __init__(self, storage: Storage, command: Command, who: str, component: str, node: Node) -> None:
+        self._storage = storage
+        self._command = command
+        self._who = who
+        self._component = component
+        self._node = node
+        self._sharing = storage.config.sharing(component)
+        self._timeout_s = storage.tables[component].store_timeout_s
+
+    def do(self) -> Stored:
+        command = self._command
+        self._check_trials()
+        self._check_capability()
+        before = self._values() if command is STORING else {}
+        self._check_drives()
+        self._record(command.name, "nothing was sent")
+        try:
+            self._send()
+            self._check_unchanged(before)
+        except RpcError as error:
+            self._record(f"{command.name} FAILED", str(error), result=str(error))
+            raise
+        self._record(f"{command.name} done", command.done, result=command.done)
+        return Stored(self._component, command.done)
+
+    # Before
+
+    def _check_trials(self) -> None:
+        """What is on trial would be made permanent."""
+        for undo in self._storage.keeping.undo.all():
+            name = next((one.parameter for one in undo.changes if one.component in self._sharing), None)
+            if name is not None:
+                by = f"write {undo.write} of {undo.who}"
+                raise self._refusal(
+                    Kind.TRIAL_PENDING, f"{name} is on trial ({by}); confirm or revert that first"
+                )
+
+    def _check_capability(self) -> None:
+        capability = self._capability()
+        if not capability & _ON_COMMAND:
+            why = "it does that by itself, not on command" if capability & _BY_ITSELF else "it cannot"
+            said = f"the device says that {why} ({self._command.object} reads 0x{capability:08X})"
+            raise self._refusal(Kind.NOT_ALLOWED, said)
+
+    def _check_drives(self) -> None:
+        for drive in self._storage.config.drives_of(self._component):
+            state, why = self._storage.state_of(drive)
+            if state is None or state in ENERGISED:
+                said = f"unknown: {why}" if state is None else STATE_WORDS[state]
+                raise self._refusal(
+                    Kind.WRONG_STATE,
+                    f"the state of {drive} is {said}; a device may be deaf while it writes its memory: "
+                    "stop the drives first",
+                )
+
+    # The command
+
+    def _send(self) -> None:
+        command = self._command
+        sent = self._node.download(command.index, ALL, command.signature, self._timeout_s)
+        try:
+            self._result(f"writing {command.signature.decode()!r}", sent, self._timeout_s)
+            self._check_answers()
+        except RpcError as error:
+            if error.kind is not Kind.DEVICE_TIMEOUT:
+                raise
+            said = f"{error}; NOBODY KNOWS whether it did: try again, or compare its values after a reset"
+            raise refuse(error.kind, said, component=self._component, object=command.object) from error
+
+    def _check_answers(self) -> None:
+        """A device that was busy answers again, and still says that it can."""
+        deadline = time.monotonic() + self._timeout_s
+        while True:
+            try:
+                return self._check_capability()
+            except RpcError as error:
+                if error.kind is not Kind.DEVICE_TIMEOUT or time.monotonic() > deadline:
+                    raise
+
+    def _capability(self) -> int:
+        return unsigned(self._result("reading", self._node.upload(self._command.index, ALL)))
+
+    # Afterwards
+
+    def _values(self) -> dict[str, tuple[Number, bytes]]:
+        """What can be changed in the device, as it is now."""
+        found = {}
+        for one in self._storage.parameters.values():
+            usable = one.problem is None and one.lock is None and one.access in READABLE
+            if usable and one.component in self._sharing:
+                data = read(one, self._node)
+                found[one.name] = (one.decode(data), data)
+        return found
+
+    def _check_unchanged(self, before: Mapping[str, tuple[Number, bytes]]) -> None:
+        after = self._values()
+        changed = [
+            f"{name} was {text(value)} and is {text(after[name][0])}"
+            for name, (value, data) in before.items()
+            if after[name][1] != data
+        ]
+        if changed:
+            raise self._refusal(Kind.MISMATCH, f"it was done, but {', '.join(changed)}")
+
+    # Words
+
+    def _record(self, what: str, so: str, **details: str) -> None:
+        """Returns when it is durable; raises `RpcError` where it cannot be recorded, `so` says what then."""
+        keeping = self._storage.keeping
+        try:
+            if keeping.unusable is not None:
+                raise OSError(None, keeping.unusable)
+            keeping.journal.append(self._who, what, component=self._component, **details).result()
+        except OSError as error:
+            said = f"it could not be recorded: {error.strerror or error}; {so}"
+            raise self._refusal(Kind.UNAVAILABLE, said) from error
+
+    def _result(self, doing: str, future: "Future[T]", timeout_s: float = 0.0) -> T:
+        try:
+            return future.result(ANSWER_S + timeout_s)
+        except (DriverError, TimeoutError) as error:
+            kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
+            kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
+            raise refuse(
+                kind,
+                f"{self._component}: {doing} {self._command.object}: {error}",
+                component=self._component,
+                object=self._command.object,
+                abort_code=getattr(error, "abort_code", None),
+            ) from error
+
+    def _refusal(self, kind: Kind, said: str) -> RpcError:
+        command = self._command
+        return refuse(
+            kind,
+            f"{command.name} {self._component}: {said}",
+            component=self._component,
+            object=command.object,
+        )
