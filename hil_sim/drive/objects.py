@@ -91,7 +91,8 @@ _MANUFACTURER = range(0x2000, 0x6000)
 _PRODUCT_CODE = (0x1018, 2)
 _OUR_PRODUCT = 0x4A440001
 
-# What a drive does that has no such object, or says 0 where 0 has no meaning: the values of joint_drive.eds.
+# What a drive does that has no such object, or says 0 where 0 has no meaning: the values of joint_drive.eds,
+# but for 6007h, where it is the standard's.
 _OTHERWISE: dict[Key, int] = {
     POSITION_GAIN: 3000,
     POSITION_DAMPING: 100,

@@ -25,6 +25,11 @@ def state(bench: Bench) -> int:
 
 def enable_in(bench: Bench, mode: int) -> None:
     bench.start()
+    enable_now_in(bench, mode)
+
+
+def enable_now_in(bench: Bench, mode: int) -> None:
+    """The same for a drive that is up."""
     assert bench.write(0x6060, 0, mode, 1) == "ok"
     bench.enable()
     assert bench.read(0x6061, signed=True) == mode
