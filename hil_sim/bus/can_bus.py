@@ -95,6 +95,10 @@ class CanBus:
         """Frames that wait for the bus."""
         return len(self._pending)
 
+    def pending_of(self, sender: object, cob_id: int) -> int:
+        """Those of one sender with one identifier."""
+        return sum(one is sender and frame.cob_id == cob_id for _, _, frame, one in self._pending)
+
     def send(self, frame: Frame, sender: object) -> None:
         """Queue a frame; it goes out when it wins the bus."""
         if all(disturbance.leaves(frame, sender) for disturbance in self.disturbances):

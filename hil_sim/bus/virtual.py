@@ -14,7 +14,7 @@ class VirtualBridge:
 
     def __init__(self, bus: CanBus, channel: str) -> None:
         self._bus = bus
-        self._outside = can.Bus(interface="virtual", channel=channel)
+        self._outside = can.Bus(interface="virtual", channel=channel, preserve_timestamps=True)
         self._polling = bus.clock.every(_POLL_NS, self._poll)
         bus.attach(self, self._receive, self._receive_error)
 

@@ -4,13 +4,14 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hil_sim.bus.can_bus import CanBus, Disturbance, Frame
+from hil_sim.bus.can_bus import Disturbance, Frame
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS
 from hil_sim.faults.fault import Fault, Form, Number, Site, Target
-from hil_sim.faults.frames import disturbed_by
+from hil_sim.faults.frames import disturbed_by, disturbing
 from hil_sim.node.node import Node
 
 _LOAD_TICK_NS = MILLISECOND_NS
+_ROOM = 4  # frames of one identifier that a node's controller holds until the bus is free
 
 
 class _Loss(Disturbance):
@@ -41,35 +42,40 @@ class _Cut(Disturbance):
         return isinstance(sender, Node) and isinstance(receiver, Node)
 
 
-class _Load:
-    """A participant that fills the bus up to a share of its time, whatever the others leave of it."""
+class _Load(Disturbance):
+    """A participant that fills the bus up to a share of its time, whatever the others leave of it.
 
-    def __init__(self, bus: CanBus, share: float, cob_id: int) -> None:
-        self._bus = bus
-        self._share = share
-        self._frame = Frame(cob_id, bytes(8))
-        self._frame_ns = self._frame.bits() * SECOND_NS / bus.bitrate
-        self._began_ns, self._busy_ns = bus.clock.now_ns, bus.busy_ns
-        self._sent = 0
-        self._own = 0
+    Meanwhile the others' controllers hold as many frames as they have room for and lose the rest.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self._bus = site.robot.bus
+        self._share = site.number("percent") / 100.0
+        self._frame = Frame(site.whole("cob_id"), bytes(8))
+        self._frame_ns = self._frame.bits() * SECOND_NS / self._bus.bitrate
+        self._began_ns, self._busy_ns = self._bus.clock.now_ns, self._bus.busy_ns
+
+    def leaves(self, frame: Frame, sender: object, /) -> bool:
+        return sender is self or self._bus.pending_of(sender, frame.cob_id) < _ROOM
 
     def fill(self) -> None:
-        """Send what is missing until the next tick, with what waits anyway counted."""
+        """Send what is missing until the next tick."""
         bus = self._bus
-        end_ns = bus.clock.now_ns - self._began_ns + _LOAD_TICK_NS
-        missing_ns = self._share * end_ns - (bus.busy_ns - self._busy_ns) - bus.pending * self._frame_ns
+        wanted_ns = self._share * (bus.clock.now_ns - self._began_ns + _LOAD_TICK_NS)
+        waiting_ns = bus.pending_of(self, self._frame.cob_id) * self._frame_ns
+        missing_ns = wanted_ns - (bus.busy_ns - self._busy_ns) - waiting_ns
         for _ in range(math.ceil(missing_ns / self._frame_ns)):
             bus.send(self._frame, self)
 
 
 @contextmanager
 def _load(site: Site) -> Iterator[None]:
-    bus = site.robot.bus
-    load = _Load(bus, site.number("percent") / 100.0, site.whole("cob_id"))
-    filling = bus.clock.every(_LOAD_TICK_NS, load.fill)
-    yield
+    load = _Load(site)
+    filling = site.robot.clock.every(_LOAD_TICK_NS, load.fill)
+    with disturbing(site, load):
+        yield
     filling.cancel()
-    bus.withdraw(load)
+    site.robot.bus.withdraw(load)
 
 
 FAULTS = {

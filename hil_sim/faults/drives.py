@@ -99,7 +99,7 @@ FAULTS = {
     "encoder_stuck": Fault(
         Target.DRIVE,
         _encoder_stuck,
-        "6064h stays the same to the count while 6062h moves on, until EMCY 8611h and fault.",
+        "6064h stays the same to the count while 6062h moves on; beyond 6065h and 6066h EMCY 8611h, fault.",
     ),
     "gear_slip": Fault(
         Target.DRIVE,
@@ -111,7 +111,7 @@ FAULTS = {
     "following_error": Fault(
         Target.DRIVE,
         _friction,
-        "The joint is all but jammed: 60F4h and torque grow, statusword bit 13, then EMCY 8611h and fault.",
+        "The joint is all but jammed: 60F4h and torque grow, then bit 13, after 6066h EMCY 8611h and fault.",
         {"factor": Number(60.0, 1.0, 1000.0, "", "how many times its friction")},
     ),
 }
