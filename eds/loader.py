@@ -39,7 +39,7 @@ def load_file(path: Path, node_id: int) -> Description:
     """See `eds.load`."""
     if not 1 <= node_id <= 127:
         raise EdsError(f"{path}: node id {node_id} is outside 1–127")
-    ini = read_ini(_read_text(path))
+    ini = read_ini(read_text(path))
     sections, file_node_id = repair(ini)
     if not any(len(name) == 4 for name in sections):
         raise EdsError(f"{path}: there is no object section like [1000]; this is no EDS or DCF file")
@@ -65,7 +65,8 @@ def load_file(path: Path, node_id: int) -> Description:
     )
 
 
-def _read_text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """The file's text, in UTF-8 or as Windows writes it; raises `EdsError` where it cannot be read."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
