@@ -1,16 +1,20 @@
 """The whole machine without its doors: clock, bus, drives, gait controller, insoles, IMU and the wearer."""
 
+import math
+import random
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 
 import eds
 from hil_sim import controller
 from hil_sim.bus.can_bus import CanBus
-from hil_sim.clock import MILLISECOND_NS, Clock
+from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock, Event
 from hil_sim.controller import GaitController
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
-from hil_sim.gait.activity import Activity
 from hil_sim.gait.posture import STANDING
+from hil_sim.gait.subject import subject
+from hil_sim.gait.timetable import Entry, timetable
 from hil_sim.gait.wearer import Wearer
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 
@@ -28,23 +32,42 @@ class Scenario(StrEnum):
     WALK = "walk"
     STAND = "stand"
     SIT = "sit"
-
-
-_ACTIVITIES = {Scenario.WALK: Activity.WALK, Scenario.STAND: Activity.STAND, Scenario.SIT: Activity.SIT}
+    SIT_TO_STAND = "sit_to_stand"
+    STAIRS_UP = "stairs_up"
+    STAIRS_DOWN = "stairs_down"
+    RAMP_UP = "ramp_up"
+    RAMP_DOWN = "ramp_down"
+    TURN_LEFT = "turn_left"
+    TURN_RIGHT = "turn_right"
+    STUMBLE = "stumble"
+    FALL = "fall"
+    DAY = "day"
 
 
 class Exoskeleton:
-    """A robot and its wearer in simulated time; the same scenario and seed give the same frames and bytes."""
+    """A robot and its wearer in simulated time; the same arguments give the same frames and bytes.
+
+    The wearer is the subject of number `person`. What is in `measured` is called after each cycle of the
+    sensors.
+    """
 
     def __init__(
-        self, scenario: Scenario = Scenario.WALK, seed: int = 0, sensors: SensorChoice | None = None
+        self,
+        scenario: Scenario = Scenario.WALK,
+        seed: int = 0,
+        sensors: SensorChoice | None = None,
+        person: int = 0,
     ) -> None:
+        self.seed = seed
+        self.measured: list[Callable[[], None]] = []
         self.clock = Clock()
         self.bus = CanBus(self.clock)
         self.drives = {name: self._drive(name, node_id) for name, node_id in JOINTS.items()}
-        self.controller = self._controller(scenario)
+        self.controller = self._controller(person)
         self.wearer = Wearer(self.controller.generator)
         self.sensors = SensorSuite(sensors or SensorChoice(), self.clock, self.bus, seed)
+        self._entries = timetable(scenario, seed)
+        self._next_entry: Event | None = None
 
     def power_on(self) -> None:
         """Switch everything on: the nodes boot, the sensors send."""
@@ -52,15 +75,33 @@ class Exoskeleton:
             drive.power_on()
         self.controller.power_on(100 * MILLISECOND_NS)
         self.clock.every(PERIOD_NS, self._measure)
+        self._go_on()
+
+    def follow(self, entries: Iterable[Entry]) -> None:
+        """Do from now on what this timetable says, instead of the scenario."""
+        if self._next_entry is not None:
+            self._next_entry.cancel()
+        self._entries = iter(entries)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Want what the timetable says next; the controller comes back to it after a reset."""
+        entry = next(self._entries, None)
+        if entry is None:
+            return
+        self.controller.go(entry.activity, entry.pace)
+        self.controller.dictionary[controller.ACTIVITY].default = int(entry.activity)
+        if math.isfinite(entry.seconds):
+            self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
     def _drive(self, name: str, node_id: int) -> JointDrive:
         description = eds.load(eds.locate(DRIVE_EDS, None), node_id)
         start = getattr(STANDING, name.partition("_")[2])
         return JointDrive(self.clock, self.bus, name, node_id, description, Joint(JointConstants(), start))
 
-    def _controller(self, scenario: Scenario) -> GaitController:
+    def _controller(self, person: int) -> GaitController:
         description = eds.load(eds.locate(CONTROLLER_EDS, None), CONTROLLER_NODE)
-        node = GaitController(
+        return GaitController(
             self.clock,
             self.bus,
             CONTROLLER,
@@ -68,14 +109,16 @@ class Exoskeleton:
             description,
             tuple(JOINTS.values()),
             next(iter(self.drives.values())).counts_per_radian,
+            subject(person),
+            random.Random(f"{self.seed} gait"),
         )
-        activity = node.dictionary[controller.ACTIVITY]
-        activity.value = activity.default = int(_ACTIVITIES[scenario])
-        return node
 
     def _measure(self) -> None:
         """One cycle of the sensors, and of what the wearer does to the joints."""
         now_s = self.clock.now_s
         for drive, load in zip(self.drives.values(), self.wearer.joint_loads(now_s), strict=True):
+            drive.advance()
             drive.joint.load = load
         self.sensors.measure(*self.wearer.feet(now_s), self.wearer.trunk())
+        for watch in self.measured:
+            watch()

@@ -17,6 +17,7 @@ from hil_sim.loop import Loop
 from hil_sim.operator import Operator
 from hil_sim.sensors.serial_port import SerialPort
 from hil_sim.sensors.suite import SensorChoice
+from hil_sim.truth import TruthFile
 
 
 class SimulatedRobot:
@@ -26,8 +27,9 @@ class SimulatedRobot:
             bus = can.Bus(interface="virtual", channel="bench")
 
     With `virtual_channel` the bus is reached in the same process, otherwise through the hub on `port`.
-    `speed` is simulated over real time, `None` as fast as it goes. `faults` and `operator` belong to the
-    thread that runs it; others use the control socket in the folder.
+    `speed` is simulated over real time, `None` as fast as it goes. The wearer is subject `person`; the ground
+    truth is written to `truth`. `faults` and `operator` belong to the thread that runs it; others use the
+    control socket in the folder.
 
     Raises `hil_sim.errors.SimulatorError` where the folder or the port is taken.
     """
@@ -41,8 +43,10 @@ class SimulatedRobot:
         speed: float | None = 1.0,
         epoch_s: float = 0.0,
         sensors: SensorChoice | None = None,
+        person: int = 0,
+        truth: Path | None = None,
     ) -> None:
-        self.exoskeleton = Exoskeleton(scenario, seed, sensors)
+        self.exoskeleton = Exoskeleton(scenario, seed, sensors, person)
         self.folder = Folder(folder)
         self.faults = Faults(self.exoskeleton, self.folder.path, seed)
         self.operator = Operator(self.exoskeleton, self.faults)
@@ -51,6 +55,7 @@ class SimulatedRobot:
         self._virtual_channel = virtual_channel
         self._speed = speed
         self._epoch_s = epoch_s
+        self._truth = truth
         self._thread: threading.Thread | None = None
         self._closing = ExitStack()
         self._loop: Loop | None = None
@@ -77,6 +82,8 @@ class SimulatedRobot:
             closing.callback(loop.close)
             self._open_bus(loop, closing)
             self._open_sensors(closing)
+            if self._truth is not None:
+                closing.callback(TruthFile(self._truth, self.exoskeleton).close)
             closing.callback(ControlSocket(loop, self.folder.path, self.operator.obey).close)
             closing.callback(self.faults.clear)
             self.exoskeleton.power_on()

@@ -38,8 +38,21 @@ scenarios
   walk             stands up straight, then walks; three seconds after the start it walks evenly
   stand            stands
   sit              sits down from standing, and stays seated
+  sit_to_stand     sits down and gets up, again and again
+  stairs_up, stairs_down, ramp_up, ramp_down, turn_left, turn_right
+                   the same for these
+  stumble          walks, and stumbles every ten seconds
+  fall             walks, falls, lies, gets up, again and again
+  day              rounds of everything, each in another order; the seed says which
   The gait follows the controller's objects while it runs: 2001h step length (mm), 2002h cycle time (ms),
-  2003h toe height (mm), 2004h trunk angle (0.001 rad), 2005h activity (0 stand, 1 walk, 2 sit).
+  2003h toe height (mm), 2004h trunk angle (0.001 rad), 2005h activity (0 stand, 1 walk, 2 sit, 3 stairs up,
+  4 stairs down, 5 ramp up, 6 ramp down, 7 turn left, 8 turn right, 9 stumble, 10 fall).
+
+the wearer
+  --subject N is a person with a body and habits of their own, always the same for the same N; 0 is nominal,
+  and one in four has an impaired leg. --truth writes what is really so, as JSON lines: simulated and real
+  time, label, phase of each leg, events, joints, forces under the feet, trunk. The first line names columns
+  and units.
 
 the drives
   Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
@@ -100,8 +113,12 @@ def _parser() -> argparse.ArgumentParser:
         "--seed",
         type=int,
         metavar="S",
-        help="of noise and losses; same seed, same bytes (default: 0)",
+        help="of noise, losses and strides; same seed, same bytes (default: 0)",
     )
+    parser.add_argument(
+        "--subject", type=int, default=0, metavar="N", help="who wears the robot (default: 0, nominal)"
+    )
+    parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth there")
     return parser
 
 
@@ -121,6 +138,8 @@ def main(argv: list[str]) -> int:
         speed=arguments.speed,
         epoch_s=time.time(),
         sensors=SensorChoice(arguments.imu, arguments.insole),
+        person=arguments.subject,
+        truth=arguments.truth,
     )
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -257,6 +257,6 @@ def test_setpoints_never_jump_when_parameters_do(robot: Robot) -> None:
 def test_the_scenarios_end_in_their_postures() -> None:
     for scenario, hip, knee in ((Scenario.STAND, 0.12, 0.14), (Scenario.SIT, 1.53, 1.57)):
         robot = Robot(scenario)
-        robot.run(6.0)
+        robot.run(4.5)
         assert robot.exo.drives["left_hip"].joint.position == pytest.approx(hip, abs=0.05)
         assert robot.exo.drives["right_knee"].joint.position == pytest.approx(knee, abs=0.05)
