@@ -104,7 +104,7 @@ def _check_activity(request: Request) -> None:
 
 
 def _check_controller(request: Request) -> None:
-    if request["controller"] not in _CONTROLLER_COMMANDS:
+    if request["controller"] not in list(_CONTROLLER_COMMANDS):
         raise RequestRefused(
             f"controller = {request['controller']!r} is no command: {', '.join(_CONTROLLER_COMMANDS)}"
         )
