@@ -44,8 +44,10 @@ class Joint:
         return self.position + self.slipped
 
     def slip(self, radians: float) -> None:
-        """The gear jumps teeth: the motor is ahead of the joint by so much more (rad at the joint)."""
-        self.slipped += radians
+        """The gear jumps teeth: the joint falls back behind the motor by so much (rad), up to its stop."""
+        motor, constants = self.motor_position, self.constants
+        self.position = min(max(self.position - radians, constants.low_stop), constants.high_stop)
+        self.slipped = motor - self.position
 
     @property
     def at_low_switch(self) -> bool:

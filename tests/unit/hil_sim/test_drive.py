@@ -1,31 +1,17 @@
 """A joint drive seen from the bus: states, modes, limits, stops, faults."""
 
-import math
-
 import pytest
 
 from tests.unit.hil_sim.bench import NODE, Bench
-
-COUNTS_PER_RADIAN = 409_600 / math.tau
-NEW_SETPOINT, IMMEDIATE, RELATIVE = 0x10, 0x20, 0x40
-
-
-def state(bench: Bench) -> int:
-    word = bench.read(0x6041)
-    return word & 0x4F if word & 0x4F in (0x00, 0x40, 0x0F, 0x08) else word & 0x6F
-
-
-def profile_position(bench: Bench) -> None:
-    bench.start()
-    assert bench.write(0x6060, 0, 1, 1) == "ok"
-    bench.enable()
-    assert bench.read(0x6061) == 1
-
-
-def move_to(bench: Bench, target: int, bits: int = 0) -> None:
-    assert bench.write(0x607A, 0, target, 4) == "ok"
-    bench.controlword(0x0F | NEW_SETPOINT | bits)
-    bench.controlword(0x0F)
+from tests.unit.hil_sim.driving import (
+    COUNTS_PER_RADIAN,
+    IMMEDIATE,
+    POSITION,
+    RELATIVE,
+    enable_in,
+    move_to,
+    state,
+)
 
 
 def test_the_way_up_is_one_transition_at_a_time(bench: Bench) -> None:
@@ -47,7 +33,7 @@ def test_enabling_does_not_move_the_joint() -> None:
 
 
 def test_profile_position_arrives_with_the_profile_velocity(bench: Bench) -> None:
-    profile_position(bench)
+    enable_in(bench, POSITION)
     bench.write(0x6081, 0, 20_000, 4)
     move_to(bench, 30_000)
     bench.run(700)
@@ -59,14 +45,14 @@ def test_profile_position_arrives_with_the_profile_velocity(bench: Bench) -> Non
 
 
 def test_a_new_set_point_is_acknowledged_until_its_bit_falls(bench: Bench) -> None:
-    profile_position(bench)
+    enable_in(bench, POSITION)
     bench.write(0x607A, 0, 10_000, 4)
     assert bench.controlword(0x1F) & 0x1000
     assert not bench.controlword(0x0F) & 0x1000
 
 
 def test_a_second_set_point_waits_for_the_first_unless_it_is_to_change_at_once(bench: Bench) -> None:
-    profile_position(bench)
+    enable_in(bench, POSITION)
     move_to(bench, 20_000)
     move_to(bench, -10_000)
     assert bench.read(0x6041) & 0x1000
@@ -82,7 +68,7 @@ def test_a_second_set_point_waits_for_the_first_unless_it_is_to_change_at_once(b
 
 
 def test_relative_moves_and_software_limits(bench: Bench) -> None:
-    profile_position(bench)
+    enable_in(bench, POSITION)
     move_to(bench, 5_000)
     bench.run(1000)
     move_to(bench, 5_000, RELATIVE)
@@ -95,35 +81,8 @@ def test_relative_moves_and_software_limits(bench: Bench) -> None:
     assert bench.read(0x6064, signed=True) == pytest.approx(12_000, abs=100)
 
 
-def test_halt_slows_down_and_stays_enabled(bench: Bench) -> None:
-    profile_position(bench)
-    move_to(bench, 100_000)
-    bench.run(500)
-    bench.controlword(0x010F)
-    bench.run(1000)
-    assert state(bench) == 0x27
-    assert bench.read(0x606C, signed=True) == pytest.approx(0, abs=50)
-    assert bench.read(0x6064, signed=True) < 60_000
-
-
-@pytest.mark.parametrize(("option", "end"), [(0, 0x40), (1, 0x40), (2, 0x40), (5, 0x07), (6, 0x07)])
-def test_quick_stop_ends_where_its_option_says(bench: Bench, option: int, end: int) -> None:
-    profile_position(bench)
-    assert bench.write(0x605A, 0, option, 2) == "ok"
-    move_to(bench, 100_000)
-    bench.run(700)
-    bench.controlword(0x02)
-    if option:
-        assert state(bench) == 0x07
-    bench.run(1500)
-    assert state(bench) == end
-    assert bench.read(0x606C, signed=True) == pytest.approx(0, abs=50)
-    bench.controlword(0x0F)
-    assert state(bench) == (0x27 if end == 0x07 else 0x40)
-
-
 def test_a_low_torque_limit_lags_and_then_faults_on_following_error(bench: Bench) -> None:
-    profile_position(bench)
+    enable_in(bench, POSITION)
     assert bench.write(0x6072, 0, 50, 2) == "ok"  # 2 N·m, less than the friction
     move_to(bench, 60_000)
     bench.run(500)
@@ -164,17 +123,6 @@ def test_without_power_a_heavy_load_moves_the_joint_and_a_light_one_does_not(ben
     bench.joint.load = 25.0
     bench.run(1000)
     assert bench.joint.position < -0.5
-
-
-@pytest.mark.parametrize(("option", "end"), [(0, 0x27), (1, 0x08), (2, 0x40), (3, 0x40)])
-def test_nmt_stop_does_what_the_abort_connection_option_says(bench: Bench, option: int, end: int) -> None:
-    bench.start()
-    bench.enable()
-    assert bench.write(0x6007, 0, option, 2) == "ok"
-    bench.send(0x000, f"02 {NODE:02X}")
-    bench.run(100)
-    bench.send(0x000, f"80 {NODE:02X}")
-    assert state(bench) == end
 
 
 def test_cyclic_position_reaches_each_target_within_the_interpolation_time(bench: Bench) -> None:

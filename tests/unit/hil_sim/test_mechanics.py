@@ -102,12 +102,15 @@ def test_unpowered_the_gear_holds_more_than_it_takes_to_keep_it_moving() -> None
     assert one.velocity < -0.2
 
 
-def test_a_slip_moves_the_motor_and_leaves_the_joint() -> None:
+def test_a_slip_moves_the_joint_and_leaves_the_motor() -> None:
     one = joint(0.3)
     one.slip(0.05)
     one.slip(-0.02)
-    assert one.position == 0.3
-    assert one.motor_position == pytest.approx(0.33)
+    assert one.position == pytest.approx(0.27)
+    assert one.motor_position == pytest.approx(0.3)
+    one.slip(5.0)
+    assert one.position == CONSTANTS.low_stop
+    assert one.motor_position == pytest.approx(0.3)
 
 
 def test_the_winding_warms_fast_and_the_housing_slowly() -> None:
