@@ -40,7 +40,7 @@ class TrunkImu:
         if self._last is None or not self._faults.frozen:
             rate = angular_rate(self._before or trunk, trunk, dt)
             self._last = Motion(
-                angles=_angles(trunk),
+                angles=(trunk.roll, trunk.pitch, math.remainder(trunk.yaw, math.tau)),
                 orientation=quaternion(trunk),
                 acceleration=self._noisy(specific_force(trunk), _NOISE_ACCELERATION),
                 rate=self._noisy(rate, _NOISE_RATE),

@@ -47,11 +47,11 @@ def test_the_robot_follows_a_timetable_of_anybodys() -> None:
     robot = Exoskeleton()
     robot.power_on()
     robot.follow(
-        [Entry(Activity.STAND, 2.0), Entry(Activity.SIT, 4.0), Entry(Activity.WALK, math.inf, (0.5, 1.2))]
+        [Entry(Activity.STAND, 1.0), Entry(Activity.SIT, 3.0), Entry(Activity.WALK, math.inf, (0.5, 1.2))]
     )
     seen = []
     robot.measured.append(lambda: seen.append(robot.controller.generator.label))
-    robot.clock.run_until(12_000_000_000)
+    robot.clock.run_until(8_000_000_000)
     assert list(dict.fromkeys(seen)) == [
         Label.STAND,
         Label.STAND_TO_SIT,
@@ -68,7 +68,7 @@ def test_a_robot_whose_controller_was_reset_goes_on_with_its_scenario() -> None:
     robot.clock.run_until(1_000_000_000)
     robot.controller.power_off()
     robot.controller.power_on()
-    robot.clock.run_until(6_000_000_000)
+    robot.clock.run_until(4_000_000_000)
     assert robot.controller.controller_state is ControllerState.RUNNING
     assert robot.controller.generator.label is Label.STAIRS_UP
 

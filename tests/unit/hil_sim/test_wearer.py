@@ -1,5 +1,6 @@
 """What ground and trunk feel: force curves against measured ones, Newton, centre of pressure."""
 
+import random
 import statistics
 from itertools import pairwise
 
@@ -11,6 +12,9 @@ from hil_sim.gait.ground import level_humps, outward, vertical_grf
 from hil_sim.gait.subject import WearerSettings
 from hil_sim.gait.walk import Shape, stance_share
 from hil_sim.gait.wearer import GRAVITY
+from hil_sim.sensors.faults import InsoleFaults
+from hil_sim.sensors.insole_cobs import CELLS
+from hil_sim.sensors.sole import Sole
 from tests.unit.hil_sim.moving import DT, USUAL, Moment, Moving, stride_of
 
 STANCE = [index / 100 for index in range(101)]
@@ -144,6 +148,23 @@ def test_the_centre_of_pressure_stays_within_the_foot(gait: Activity) -> None:
         for foot in moment.feet:
             assert 0.0 < foot.cop_x < 0.24
             assert abs(foot.cop_y) < 0.02
+
+
+def test_the_cells_carry_the_feet_and_load_from_the_heel_to_the_toes() -> None:
+    sole = Sole(CELLS, False, InsoleFaults(), random.Random(0))
+    heel, toes = (
+        [n for n, cell in enumerate(CELLS) if low < cell.x < high] for low, high in ((0, 0.06), (0.2, 0.3))
+    )
+    for moment in stride_of(Activity.WALK):
+        foot, stance = moment.feet[0], moment.phases[0] / stance_share(USUAL.speed)
+        pascal = sole.pressures(foot)
+        forces = [pressure * cell.area for pressure, cell in zip(pascal, CELLS, strict=True)]
+        assert sum(forces) == pytest.approx(foot.force)
+        assert max(pascal) < 600e3
+        if 0.05 < stance < 0.2:
+            assert sum(forces[n] for n in heel) > 5.0 * sum(forces[n] for n in toes)
+        if 0.85 < stance < 0.98:
+            assert sum(forces[n] for n in toes) > 5.0 * sum(forces[n] for n in heel)
 
 
 def test_feet_alternate_with_the_double_support_of_the_speed() -> None:
