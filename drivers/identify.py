@@ -8,11 +8,14 @@ from typing import Any
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.insole import layout as layouts
 from drivers.insole.formats import parser_maker
+from drivers.insole.frame import InsoleFrame
+from drivers.insole.layout import FEET, Foot
 from drivers.parsing import Parser
 
 FEWEST_FRAMES = 3
 FEWEST_SHARE = 0.5  # of the bytes
-NUMBERS_LINE = re.compile(rb"[ \t]*[^,;\t\r\n]{0,24}([,;\t][ ]*-?[0-9.eE+-]*){2,}\r?")
+NUMBER_OR_FOOT = rb"[ ]*(-?[0-9.eE+-]*|[LRlr]|left|right|Left|Right|LEFT|RIGHT)"
+NUMBERS_LINE = re.compile(rb"[ \t]*[^,;\t\r\n]{0,24}([,;\t]" + NUMBER_OR_FOOT + rb"){2,}\r?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +27,7 @@ class Match:
     frames: int
     share: float  # of the bytes, 0 to 1
     cells: int | None = None  # of an insole
+    feet: tuple[Foot, ...] = ()  # that an insole's frames name
 
 
 def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
@@ -36,6 +40,8 @@ def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
         layout = layouts.load(name)
         if layout.frame is not None:
             yield "insole-frame", name, parser_maker("insole-frame", layout)
+        if layout.csv is not None:
+            yield "insole-csv", name, parser_maker("insole-csv", layout)
 
 
 def matches(data: bytes) -> list[Match]:
@@ -60,8 +66,11 @@ def _try(data: bytes, name: str, layout: str | None, make_parser: Callable[[], P
     share = 1.0 - max(0, dropped - longest) / max(1, whole)
     if len(frames) < FEWEST_FRAMES or share < FEWEST_SHARE:
         return None
-    cells = len(frames[-1].cells) if hasattr(frames[-1], "cells") else None
-    return Match(name, layout, len(frames), share, cells)
+    if not isinstance(frames[-1], InsoleFrame):
+        return Match(name, layout, len(frames), share)
+    named = {frame.foot for frame in frames}
+    feet = tuple(foot for foot in FEET if foot in named)
+    return Match(name, layout, len(frames), share, len(frames[-1].cells), feet)
 
 
 def _number_lines(data: bytes) -> Match | None:

@@ -38,7 +38,10 @@ class Parser(Protocol[F]):
         ...
 
     def finish(self) -> list[F]:
-        """The frames that only the end of the stream completes; what remains is dropped."""
+        """The frames that only the end of the stream completes; what remains is dropped.
+
+        What is fed next is another stream: the device may count anew.
+        """
         ...
 
 
@@ -88,7 +91,11 @@ class FrameScanner(Generic[F]):
         self._buffer.clear()
         self._candidates.clear()
         self._begin = self._searched = self.frame_end = 0
+        self._restart()
         return []
+
+    def _restart(self) -> None:
+        """Another stream begins."""
 
     def _length(self, buffer: bytearray, start: int) -> int:
         """Length of the frame that begins at `start`, or UNKNOWN, or IMPOSSIBLE."""
@@ -160,6 +167,10 @@ class Sequence:
         self._counters = counters
         self._modulus = modulus
         self._gaps = gaps  # a time has none: only its order tells anything
+        self.restart()
+
+    def restart(self) -> None:
+        """Another stream begins: any number may come first."""
         self._newest: int | None = None
         self._late = 0
         self._late_run = 0
@@ -211,7 +222,12 @@ class DelimitedParser(Generic[F]):
 
     def finish(self) -> list[F]:
         """End of the stream: what remains is a frame whose delimiter is missing, or nothing."""
-        return self.feed(self.delimiter) if self._buffer else []
+        frames = self.feed(self.delimiter) if self._buffer else []
+        self._restart()
+        return frames
+
+    def _restart(self) -> None:
+        """Another stream begins."""
 
     def _decode(self, raw: bytes) -> list[F] | None:
         """The frames in `raw`, none for a comment; `None`, with the reason counted, where it is not valid."""

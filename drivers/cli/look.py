@@ -85,17 +85,12 @@ def listen(port: str, baudrates: tuple[int, ...]) -> Iterator[Heard]:
 
 
 def table(port: str, baudrate: int, match: Match) -> str:
-    """The table of the robot's file that wires the sensor."""
-    imu = match.format_name in IMU_FORMATS
-    lines = [
-        "[imu.trunk]" if imu else "[insole.left_insole]  # and the same for right_insole",
-        f'port = "{port}"',
-        f"baudrate = {baudrate}",
-        f'format = "{match.format_name}"',
-    ]
-    if not imu:
-        lines.append(f'layout = "{_layout(match)}"')
-    return "\n".join(lines) + "\n"
+    """What of the robot's file wires the sensor: a table, or one for each foot."""
+    keys = f'port = "{port}"\nbaudrate = {baudrate}\nformat = "{match.format_name}"\n'
+    if match.format_name in IMU_FORMATS:
+        return f"[imu.trunk]\n{keys}"
+    keys += f'layout = "{_layout(match)}"\n'
+    return "\n".join(f"[insole.{foot}_insole]\n{keys}" for foot in match.feet or ("left",))
 
 
 def _read(port: str, baudrate: int, seconds: float) -> bytes:

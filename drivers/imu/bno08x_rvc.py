@@ -39,6 +39,9 @@ class Bno08xRvcParser(FrameScanner[ImuFrame]):
         super().__init__()
         self._sequence = Sequence(self.counters, 256)
 
+    def _restart(self) -> None:
+        self._sequence.restart()
+
     def _length(self, buffer: bytearray, start: int) -> int:  # noqa: ARG002 - one length for all
         return LENGTH
 

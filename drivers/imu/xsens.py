@@ -96,6 +96,9 @@ class XsensParser(FrameScanner[ImuFrame]):
         super().__init__()
         self._sequence = Sequence(self.counters, 1 << 16)
 
+    def _restart(self) -> None:
+        self._sequence.restart()
+
     def _length(self, buffer: bytearray, start: int) -> int:
         if len(buffer) < start + 6:
             return (

@@ -45,6 +45,10 @@ class InsoleCobsParser(DelimitedParser[InsoleFrame]):
         super().__init__()
         self._sequences = {foot: Sequence(self.counters, 1 << 16) for foot in ("left", "right")}
 
+    def _restart(self) -> None:
+        for sequence in self._sequences.values():
+            sequence.restart()
+
     def _decode(self, raw: bytes) -> list[InsoleFrame] | None:
         body = cobs_decode(raw)
         if body is None or not SHORTEST <= len(body) <= LONGEST:

@@ -47,6 +47,9 @@ class InsoleCsvParser(DelimitedParser[InsoleFrame]):
         self._order = Order(self.counters, description.sequence_modulus, description.sequence_of_each_foot)
         self._columns = find_columns(description, description.columns or ())
 
+    def _restart(self) -> None:
+        self._order.restart()
+
     def _decode(self, raw: bytes) -> list[InsoleFrame] | None:
         try:
             line = raw.decode("utf-8").strip("\r\ufeff")

@@ -11,7 +11,7 @@ from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
 from drivers.insole.formats import CLOCKS, parser_maker
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import Foot, Layout
+from drivers.insole.layout import FEET, Foot, Layout
 from drivers.insole.load import Stance, load_of
 from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
@@ -19,7 +19,6 @@ from drivers.latest import Latest
 from drivers.line import Line
 from drivers.samples import Channel, Quality, State
 
-FEET: tuple[Foot, ...] = ("left", "right")
 CONTACT = {0: "in the air", 1: "on the ground"}
 
 

@@ -66,6 +66,9 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         self._tail = self._checksum_size + len(self._terminator)
         self._order = Order(self.counters, _sequence_modulus(description), each_foot=True)
 
+    def _restart(self) -> None:
+        self._order.restart()
+
     def _length(self, buffer: bytearray, start: int) -> int:
         """Header, fields (some of which may count later ones), checksum, terminator."""
         at = start + len(self.sync)

@@ -15,6 +15,7 @@ from drivers.insole.calibration import Calibration
 from drivers.insole.description import CsvDescription, FrameDescription
 
 Foot = Literal["left", "right"]
+FEET: tuple[Foot, ...] = ("left", "right")
 Cell = tuple[float, float, float]
 
 SHIPPED = resources.files("drivers.insole") / "layouts"

@@ -16,6 +16,11 @@ class Order:
         self._sequences: dict[Foot | None, Sequence] = {}
         self._times: dict[Foot | None, Sequence] = {}
 
+    def restart(self) -> None:
+        """Another stream begins."""
+        self._sequences.clear()
+        self._times.clear()
+
     def is_late(self, foot: Foot | None, sequence: int | None, ticks: int | None) -> bool:
         """Whether the frame is a repetition or older than one before it; counts what it shows."""
         if sequence is not None:

@@ -21,6 +21,19 @@ def test_described_frame_names_its_layout_and_cells() -> None:
     assert (match.format_name, match.layout, match.cells) == ("insole-frame", "insole-35", 10)
 
 
+def test_described_lines_name_their_layout_cells_and_foot() -> None:
+    match = recognise(b"".join(b"%d;%d;R;0;1;2;3;4;5;6;7;8\r\n" % (10 * n, n) for n in range(20)))
+    assert match is not None
+    assert (match.format_name, match.layout, match.cells) == ("insole-csv", "insole-8", 8)
+    assert match.feet == ("right",)
+
+
+def test_lines_of_numbers_with_a_foot_are_lines_of_an_insole_that_nobody_has_described() -> None:
+    match = recognise(b"".join(b"%d,left,1.5,2.5\n" % n for n in range(20)))
+    assert match is not None
+    assert (match.format_name, match.layout) == ("insole-csv", None)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_noise_is_no_format(seed: int) -> None:
     assert recognise(random.Random(seed).randbytes(4000)) is None
