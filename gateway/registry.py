@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from gateway import wire
 from gateway.config import RobotConfig
-from gateway.futures import done
+from gateway.futures import done, failed
 from gateway.loop import Loop, Timer
 
 if TYPE_CHECKING:
@@ -108,6 +108,8 @@ class Registry:
     def use(self, name: str, user: Hashable | None) -> "Future[Module]":
         """The running module; `user` keeps it (and what it needs) until `leave`. No user: it lingers only."""
         slot = self._slots[name]
+        if self._closing is not None:
+            return failed(wire.refuse(wire.Kind.UNAVAILABLE, "the gateway is ending"))
         if user is None:
             slot.linger_until_ns = self._linger_from_now_ns()
         else:
@@ -181,7 +183,7 @@ class Registry:
         needs = {other: self._slots[other].module for other in slot.spec.needs}
 
         def keep(on: bool) -> None:
-            if on:
+            if on and self._closing is None:
                 slot.users.add(slot)
             else:
                 self.leave(slot)

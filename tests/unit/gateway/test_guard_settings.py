@@ -1,0 +1,143 @@
+"""The guard's table: whatever cannot work is refused, in words, with the table and the key."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.config import ConfigError, RobotConfig
+from gateway.guard.settings import Action, Blind, HeatRule, LevelRule
+from tests.unit.gateway.harness import ROBOT, config
+
+IMU = '[imu.trunk]\nport = "/dev/null-imu"\nbaudrate = 115200\nformat = "witmotion"\naxes = ["x", "y", "z"]\n'
+OWN_NODE = ('channel = "unused"', 'channel = "unused"\nnode_id = 100')
+
+
+def guarded(folder: Path, text: str, robot: str = ROBOT) -> RobotConfig:
+    return config(folder, text + robot + IMU)
+
+
+def rule(text: str) -> str:
+    return "\n".join(["[guard.rule.one]", *text.split(", ")]) + "\n"
+
+
+def test_without_the_table_there_is_no_guard(tmp_path: Path) -> None:
+    assert config(tmp_path).guard is None
+
+
+def test_rules_are_read_by_what_they_watch(tmp_path: Path) -> None:
+    text = """
+[guard]
+[guard.rule.knee_hot]
+watch = "i2t"
+on = ["*_knee"]
+rated = 5
+time_constant_s = 20
+actions = ["quick_stop", "alarm"]
+blind = "act"
+[guard.rule.falling]
+watch = "tilt"
+above = 0.6
+"""
+    guard = guarded(tmp_path, text).guard
+    assert guard is not None
+    hot, falling = guard.rule["knee_hot"], guard.rule["falling"]
+    assert isinstance(hot, HeatRule)
+    assert (hot.on, hot.above, hot.blind) == (("*_knee",), 1.0, Blind.ACT)
+    assert hot.actions == (Action.QUICK_STOP, Action.ALARM)
+    assert isinstance(falling, LevelRule)
+    assert (falling.on, falling.actions, falling.blind) == (None, (Action.ALARM,), Blind.ALARM)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("guard = 5\n", ("[guard] is a table",)),
+        ("[guard]\nrule = 5\n", ("each of its rules", "[guard.rule.NAME]")),
+        ("[guard]\n", ("neither heartbeat_ms nor", "watch nothing")),
+        ("[guard]\nheart_ms = 5\n", ("'heart_ms'", "did you mean 'heartbeat_ms'")),
+        ("[guard]\nheartbeat_ms = 9\n", ("[guard] heartbeat_ms", ">= 10")),
+        ("[guard]\nheartbeat_ms = 20001\n", ("[guard] heartbeat_ms", "<= 20000")),
+        ("[guard]\nheartbeat_ms = 100\n", ("heartbeat_ms", "[can.main] lacks node_id")),
+        (rule("above = 5"), ("[guard.rule.one] watch", "say what it watches", "joint_limit")),
+        (rule('watch = "currant", above = 5'), ("[guard.rule.one] watch", "current")),
+        (rule("watch = [1], above = 5"), ("[guard.rule.one] watch",)),
+        ("[guard.rule]\none = 5\n", ("[guard.rule.one]",)),
+        ('[guard.rule."a b"]\nwatch = "emcy"\n', ("[guard.rule.a b]", "a name is a letter")),
+        ('[guard.rule.alarms]\nwatch = "emcy"\n', ("'alarms' is taken by the guard itself",)),
+        (rule('watch = "current"'), ("[guard.rule.one] lacks the key 'above'",)),
+        (rule('watch = "current", above = "5"'), ("[guard.rule.one] above", "expected `float`")),
+        (rule('watch = "current", above = 0'), ("[guard.rule.one] above", "> 0")),
+        (rule('watch = "current", above = inf'), ("[guard.rule.one] above: inf is no finite number",)),
+        (rule('watch = "current", above = nan'), ("[guard.rule.one] above",)),
+        (rule('watch = "current", above = 5, for_s = -1'), ("[guard.rule.one] for_s", ">= 0")),
+        (rule('watch = "current", above = 5, clear_s = 0'), ("[guard.rule.one] clear_s", "> 0")),
+        (rule('watch = "current", above = 5, hysteresis = 5'), ("hysteresis", "never be over")),
+        (rule('watch = "current", above = 5, min = 1'), ("unknown key 'min'", "above")),
+        (rule('watch = "joint_limit"'), ("lacks min, max or both",)),
+        (rule('watch = "joint_limit", min = 1, max = 1'), ("min", "nothing lies between")),
+        (rule('watch = "joint_limit", min = 1, max = 2, hysteresis = 0.5'), ("nothing lies between",)),
+        (rule('watch = "joint_limit", min = -inf'), ("min: -inf is no finite number",)),
+        (rule('watch = "i2t", rated = 5'), ("lacks the key 'time_constant_s'",)),
+        (rule('watch = "i2t", rated = 5, time_constant_s = 1, of = "power"'), ("of",)),
+        (rule('watch = "i2t", rated = 5, time_constant_s = 1, hysteresis = 1'), ("never be over",)),
+        (rule('watch = "emcy", codes = []'), ("[guard.rule.one] codes",)),
+        (rule('watch = "emcy", codes = ["2310"]'), ("[guard.rule.one] codes",)),
+        (rule('watch = "emcy", codes = ["0x23100"]'), ("[guard.rule.one] codes",)),
+        (rule('watch = "emcy", codes = ["0x00"]'), ("codes: 0x00 says that an error is over",)),
+        (rule('watch = "emcy", actions = []'), ("[guard.rule.one] actions",)),
+        (rule('watch = "emcy", actions = ["stop"]'), ("[guard.rule.one] actions", "stop")),
+        (rule('watch = "emcy", blind = "ignore"'), ("[guard.rule.one] blind", "ignore")),
+        (rule('watch = "emcy", on = []'), ("[guard.rule.one] on",)),
+        (rule('watch = "emcy", on = ["left_nee"]'), ("on: 'left_nee' is no joint or device", "left_knee")),
+        (rule('watch = "tilt", above = 1, on = ["left_knee"]'), ("'left_knee' is no imu", "trunk")),
+        (rule('watch = "node_lost", silent_s = 0'), ("[guard.rule.one] silent_s", "> 0")),
+        (IMU.replace("trunk", "guard").replace("-imu", "-2"), ("'guard' is taken by the gateway itself",)),
+    ],
+)
+def test_what_cannot_work_is_refused(tmp_path: Path, text: str, words: tuple[str, ...]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        guarded(tmp_path, text)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_rule_for_what_the_robot_does_not_have_is_refused(tmp_path: Path) -> None:
+    robot = ROBOT.replace('[insole.left_insole]\nport = "/dev/null-left"\n', "")
+    with pytest.raises(ConfigError, match="insole_stale watches each insole, and this robot has none"):
+        guarded(tmp_path, rule('watch = "insole_stale"'), robot)
+
+
+def test_a_bus_has_one_heartbeat_of_ours(tmp_path: Path) -> None:
+    robot = ROBOT.replace(*OWN_NODE)
+    assert guarded(tmp_path, "[guard]\nheartbeat_ms = 100\n", robot).guard is not None
+    both = robot.replace("node_id = 100", "node_id = 100\nheartbeat_s = 0.5")
+    with pytest.raises(ConfigError, match=r"\[can.main\] heartbeat_s: the guard's heartbeat_ms"):
+        guarded(tmp_path, "[guard]\nheartbeat_ms = 100\n", both)
+
+
+def test_nobody_to_arm_is_refused(tmp_path: Path) -> None:
+    robot = '[robot]\nname = "x"\n[can.main]\ninterface = "virtual"\nchannel = "unused"\n'
+    with pytest.raises(ConfigError, match="there is no joint whose drive could be armed"):
+        guarded(tmp_path, "[guard]\nheartbeat_ms = 100\n", robot)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('watch = "current", above = 5, for_s = 0.5', "above 5 A for 0.5 s"),
+        ('watch = "joint_limit", min = -0.1', "below -0.1 rad"),
+        ('watch = "joint_limit", min = -0.1, max = 2, for_s = 1', "below -0.1 rad or above 2 rad for 1 s"),
+        (
+            'watch = "i2t", of = "torque", rated = 40, time_constant_s = 8',
+            "mean of (torque / 40 N·m)² over 8 s above 1",
+        ),
+        ('watch = "node_lost"', "silent"),
+        ('watch = "insole_stale", silent_s = 0.2', "silent for 0.2 s"),
+        ('watch = "emcy"', "any EMCY"),
+        ('watch = "emcy", codes = ["0x2"; "0x43"]', "EMCY 0x2, 0x43"),
+    ],
+)
+def test_a_rule_says_what_makes_it_trip(tmp_path: Path, text: str, words: str) -> None:
+    guard = guarded(tmp_path, rule(text).replace(";", ",")).guard
+    assert guard is not None
+    assert guard.rule["one"].words == words
