@@ -152,17 +152,15 @@ class JointDrive(Node):
         return self._modes[self._mode_number]
 
     def _write_mode(self, value: Value) -> None:
-        if value == _NO_MODE_CHANGE:
+        if value in (_NO_MODE_CHANGE, self._mode_number):
             return
         if not self._offers(int(value)):
             raise SdoAbort(AbortCode.INVALID_VALUE)
-        mode = ModeNumber(int(value))
-        if mode is not self._mode_number:
-            self._mode_number = mode
-            self._following.late_s = 0.0
-            if self.power.follows:
-                self.servo.stop(Ramp.SLOW_DOWN)
-                self._mode.enter()
+        self._mode_number = ModeNumber(int(value))
+        self._following.late_s = 0.0
+        if self.power.follows:
+            self.servo.stop(Ramp.SLOW_DOWN)
+            self._mode.enter()
 
     def _offers(self, mode: int) -> bool:
         return mode in tuple(ModeNumber) and bool(self.objects.positive(od.SUPPORTED_MODES) >> mode - 1 & 1)

@@ -58,24 +58,18 @@ class Joint:
         return self.position >= self.constants.high_stop - self.constants.limit_switch
 
     def step(self, torque: float) -> None:
-        """Move on by `STEP_S` under the motor's `torque` (N·m at the joint)."""
-        constants = self.constants
-        self._turn(torque, constants.coulomb_friction + (1.0 - constants.gear_efficiency) * abs(torque))
+        """Move on by `STEP_S` under the motor's `torque` (N·m at the joint).
 
-    def coast(self) -> None:
-        """Move on by `STEP_S` without power: what stands still is held by the gear."""
+        Friction is taken implicitly: it stops a motion, it never turns one round, whatever the step.
+        """
         constants = self.constants
-        self._turn(0.0, constants.coulomb_friction if self.velocity else constants.holding_friction)
-
-    def _turn(self, torque: float, friction: float) -> None:
-        """Friction is taken implicitly: it stops a motion, it never turns one round, whatever the step."""
-        constants = self.constants
+        position, factor = self.position, self.friction_factor
         push = torque - self.load
-        if not constants.low_stop <= self.position <= constants.high_stop:
+        if not constants.low_stop <= position <= constants.high_stop:
             push += self._stop_torque()
-        factor = self.friction_factor
         share = STEP_S / (constants.inertia + self.rotor_inertia)
         velocity = (self.velocity + push * share) / (1.0 + constants.viscous_friction * factor * share)
+        friction = constants.coulomb_friction + (1.0 - constants.gear_efficiency) * abs(torque)
         drag = friction * factor * share
         if velocity > drag:
             velocity -= drag
@@ -84,7 +78,13 @@ class Joint:
         else:
             velocity = 0.0
         self.velocity = velocity
-        self.position += velocity * STEP_S
+        self.position = position + velocity * STEP_S
+
+    def coast(self) -> None:
+        """Move on by `STEP_S` without power: what stands still is held by the gear."""
+        holding = self.constants.holding_friction * self.friction_factor
+        if self.velocity or abs(self.load) > holding:
+            self.step(0.0)
 
     def _stop_torque(self) -> float:
         """A stop pushes back and never pulls."""

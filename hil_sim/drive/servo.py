@@ -127,13 +127,15 @@ class Servo:
         gains = settings.gains[self.control]
         stiffness, damping, reach = gains.stiffness, gains.damping, gains.reach
         gain, growth, windup = settings.current_gain, gains.integral * STEP_S, gains.integral_limit
-        lead, offsets, reference, motion = gains.feed_forward, self.offsets, self.reference, self.motion
+        lead, reference, motion = gains.feed_forward, self.reference, self.motion
+        more_velocity, more_torque = self.offsets.velocity, self.offsets.torque
         lowest, highest = self.limits()
         # What the supply leaves after the back EMF falls with the speed; a speed limit acts like less supply.
         droop = settings.torque_per_volt * settings.back_emf
         top_speed = min(settings.top_speed, supply_v / settings.back_emf)
-        joint, read, origin = self.joint, self.encoder.read, self.origin
-        turning = 0.0 if self.encoder.stuck else 1.0
+        joint = self.joint
+        turning = 0.0 if self.encoder.stuck else 1.0  # whether the encoder shows what moves
+        shift = self.position - turning * joint.position
         blend = STEP_S / (STEP_S + settings.velocity_filter_s)
         actual, demand, integral, seen = self.torque, self.demand, self._integral, self._seen_velocity
         wanted = demand
@@ -143,20 +145,22 @@ class Servo:
             motion.step(reference, STEP_S)
             speed = joint.velocity
             seen += blend * (turning * speed - seen)
-            position = read(joint.motor_position) + origin
-            error = reference.position - position
-            if abs(error) > reach:
+            error = reference.position - turning * joint.position - shift
+            if not -reach <= error <= reach:
+                reference.position -= error - math.copysign(reach, error)
                 error = math.copysign(reach, error)
-                reference.position = position + error
             wanted = (
                 stiffness * error
-                + damping * (lead * reference.velocity + offsets.velocity - seen)
+                + damping * (lead * reference.velocity + more_velocity - seen)
                 + integral
                 + reference.torque
-                + offsets.torque
+                + more_torque
             )
-            top, bottom = droop * (top_speed - speed), -droop * (top_speed + speed)
-            demand = min(max(wanted, lowest, bottom), highest, top)
+            demand = wanted
+            if wanted > 0.0:
+                demand = max(min(wanted, highest, droop * (top_speed - speed)), lowest)
+            elif wanted < 0.0:
+                demand = min(max(wanted, lowest, -droop * (top_speed + speed)), highest)
             if growth and demand == wanted:
                 integral = min(max(integral + growth * error, -windup), windup)
         self.torque, self.demand, self._integral, self._seen_velocity = actual, demand, integral, seen
