@@ -9,6 +9,7 @@ from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.injector import Faults, check_fault, find
 from hil_sim.gait.activity import Activity
+from hil_sim.gait.timetable import Entry
 
 Request = Mapping[str, Any]
 Answer = dict[str, Any]
@@ -49,8 +50,7 @@ class Operator:
         return {"cleared": [asdict(active) for active in self._faults.clear(name, request.get("on"))]}
 
     def _activity(self, request: Request) -> Answer:
-        activity = Activity[request["activity"].upper()]
-        self._robot.controller.dictionary[controller.ACTIVITY].value = int(activity)
+        self._robot.follow([Entry(Activity[request["activity"].upper()])])
         return {"activity": request["activity"]}
 
     def _controller(self, request: Request) -> Answer:

@@ -95,7 +95,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; made if needed"
     )
-    parser.add_argument("--scenario", choices=[str(scenario) for scenario in Scenario], help="default: walk")
+    parser.add_argument(
+        "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
+    )
     parser.add_argument("--imu", choices=IMUS, default=SensorChoice().imu, help="default: %(default)s")
     parser.add_argument(
         "--insole", choices=INSOLES, default=SensorChoice().insole, help="default: %(default)s"
@@ -112,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seed",
         type=int,
+        default=0,
         metavar="S",
         help="of noise, losses and strides; same seed, same bytes (default: 0)",
     )
@@ -122,19 +125,35 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
+    """What is asked for; where a script is named, its `[robot]` stands for the options that are not given."""
+    parser = _parser()
+    arguments = parser.parse_args(argv)
+    if arguments.script is None:
+        return arguments, Script()
+    script = load(arguments.script)
+    parser.set_defaults(
+        scenario=script.scenario,
+        seed=script.seed,
+        subject=script.subject,
+        imu=script.sensors.imu,
+        insole=script.sensors.insole,
+    )
+    return parser.parse_args(argv), script
+
+
 def main(argv: list[str]) -> int:
     """Run the simulator; returns the exit code."""
     if argv[:1] == ["run"]:
         return run.main(argv[1:])
     try:
-        arguments = _parser().parse_args(argv)
+        arguments, script = _parse(argv)
     except SystemExit as leave:
         return 2 if leave.code else 0
-    script = Script() if arguments.script is None else load(arguments.script)
     robot = SimulatedRobot(
         arguments.dir,
-        script.activity if arguments.scenario is None else Scenario(arguments.scenario),
-        script.seed if arguments.seed is None else arguments.seed,
+        Scenario(arguments.scenario),
+        arguments.seed,
         speed=arguments.speed,
         epoch_s=time.time(),
         sensors=SensorChoice(arguments.imu, arguments.insole),

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 Seen = float | str | None  # a number, a word, or nothing
 
+_TOLD = 4  # changes that a line of the result tells
+
 
 class Track(Enum):
     """What is observed over time; the value is what a scenario calls it."""
@@ -113,16 +115,20 @@ class Expectation:
 
 
 def _story(series: Sequence[tuple[float, Seen]]) -> str:
-    """What was seen, in words: each new word with its time, or the range of numbers."""
+    """What was seen, in words: the range of numbers, or each new word with its time."""
     numbers = [value for _, value in series if isinstance(value, float)]
+    span = f"from {series[0][0]:.2f} to {series[-1][0]:.2f} s"
     if len(numbers) == len(series) > 1:
-        return f"{min(numbers):.4g} to {max(numbers):.4g} from {series[0][0]:.2f} to {series[-1][0]:.2f} s"
+        return f"{min(numbers):.4g} to {max(numbers):.4g} {span}"
     changes = list(_changes(series))
-    told = [f"{_say(value)} at {time_s:.2f} s" for time_s, value in changes[:4]]
-    return ", then ".join(told) + (f", and {len(changes) - 4} more changes" if len(changes) > 4 else "")
+    if len(changes) == 1 < len(series):
+        return f"{_say(changes[0][1])} {span}"
+    told = ", then ".join(f"{_say(value)} at {time_s:.2f} s" for time_s, value in changes[:_TOLD])
+    return told + (f", and {len(changes) - _TOLD} more changes" if len(changes) > _TOLD else "")
 
 
 def _changes(series: Sequence[tuple[float, Seen]]) -> Iterator[tuple[float, Seen]]:
+    """Each value that differs from the one before; of numbers in a row the first."""
     before: object = series
     for time_s, value in series:
         if value != before and not (isinstance(value, float) and isinstance(before, float)):

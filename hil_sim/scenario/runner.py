@@ -59,7 +59,15 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
         SimulatorError: it could not be run.
 
     """
-    robot = SimulatedRobot(folder, script.activity, script.seed, speed=speed, epoch_s=time.time())
+    robot = SimulatedRobot(
+        folder,
+        script.scenario,
+        script.seed,
+        speed=speed,
+        epoch_s=time.time(),
+        sensors=script.sensors,
+        person=script.subject,
+    )
     with ExitStack() as stack:
         robot.open()
         stack.callback(robot.close)

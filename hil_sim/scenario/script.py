@@ -8,16 +8,17 @@ title = "A node falls silent and comes back"
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from hil_sim import operator
 from hil_sim.errors import SimulatorError
-from hil_sim.exoskeleton import Scenario as Start
+from hil_sim.exoskeleton import Scenario
 from hil_sim.scenario import expect_table
 from hil_sim.scenario.expectation import Expectation, When
 from hil_sim.scenario.table import ScenarioError, Table
+from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
 _AFTER_S = 1.0  # how long a scenario goes on after the last time that it names
 # What a gateway is asked for: the line's key → method of the wire and the name of the parameter.
@@ -43,9 +44,11 @@ class Script:
     """A scenario, checked as far as a file can be."""
 
     title: str = ""
-    activity: Start = Start.WALK
-    seed: int = 0
+    scenario: Scenario = Scenario.WALK
     seconds: float = 0.0
+    seed: int = 0
+    subject: int = 0
+    sensors: SensorChoice = field(default_factory=SensorChoice)
     lines: tuple[Line, ...] = ()
     expectations: tuple[Expectation, ...] = ()
 
@@ -61,15 +64,20 @@ def load(file: Path) -> Script:
     top = Table(str(file), values)
     top.only(("title", "robot", "at", "expect"))
     robot = Table(f"{file} [robot]", values.get("robot", {}))
-    robot.only(("activity", "seed", "seconds"))
+    robot.only(("scenario", "seconds", "seed", "subject", "imu", "insole"))
     lines = tuple(_line(table) for table in _tables(top, "at"))
     expectations = tuple(one for table in _tables(top, "expect") for one in expect_table.read(table))
     least_s = _AFTER_S + max([0.0, *(line.time_s for line in lines), *map(_known_by, expectations)])
     return Script(
         title=top.text("title", file.stem),
-        activity=_activity(robot),
-        seed=robot.whole("seed", 0),
+        scenario=Scenario(robot.choice("scenario", list(Scenario), Scenario.WALK)),
         seconds=_duration(robot, least_s),
+        seed=robot.whole("seed", 0),
+        subject=robot.whole("subject", 0),
+        sensors=SensorChoice(
+            robot.choice("imu", IMUS, SensorChoice().imu),
+            robot.choice("insole", INSOLES, SensorChoice().insole),
+        ),
         lines=lines,
         expectations=expectations,
     )
@@ -106,13 +114,6 @@ def _check_gateway_line(table: Table, key: str) -> None:
 def _known_by(expectation: Expectation) -> float:
     timing = expectation.timing
     return timing.begin_s if timing.when is When.AT else timing.end_s
-
-
-def _activity(robot: Table) -> Start:
-    name = robot.text("activity", "walk")
-    if name not in list(Start):
-        raise robot.fail(f"activity = {name!r} is no beginning; allowed are {', '.join(Start)}")
-    return Start(name)
 
 
 def _duration(robot: Table, least_s: float) -> float:

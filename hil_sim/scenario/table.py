@@ -58,6 +58,12 @@ class Table:
             raise self.fail(f"{key} = {value!r} must be a text")
         return value
 
+    def choice(self, key: str, allowed: Collection[str], default: str) -> str:
+        value = self.text(key, default)
+        if value not in allowed:
+            raise self.fail(f"{key} = {value!r} is not possible; allowed are {', '.join(allowed)}")
+        return value
+
     def number(self, key: str) -> float:
         value = self.values[key]
         if not _is_number(value):

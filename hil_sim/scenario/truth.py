@@ -5,8 +5,13 @@ from hil_sim.scenario.expectation import Seen
 
 
 def truth(robot: Exoskeleton) -> dict[str, Seen]:
-    """Where each joint really is (rad, rad/s, N·m, °C), each drive's state and the controller's in words."""
-    found: dict[str, Seen] = {"gait.state": robot.controller.controller_state.name.lower()}
+    """Where each joint really is (rad, rad/s, N·m, °C), what each foot carries (N), and states in words."""
+    found: dict[str, Seen] = {
+        "wearer.activity": str(robot.controller.generator.label),
+        "gait.state": robot.controller.controller_state.name.lower(),
+    }
+    for side, foot in zip(("left", "right"), robot.wearer.feet(robot.clock.now_s), strict=True):
+        found[f"{side}_foot.force"] = foot.force
     for name, drive in robot.drives.items():
         found[f"{name}.position"] = drive.joint.position
         found[f"{name}.velocity"] = drive.joint.velocity
