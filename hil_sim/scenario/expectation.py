@@ -104,7 +104,8 @@ class Expectation:
         return next((verdict for verdict in verdicts if not verdict.ok), verdicts[-1])
 
     def _judge_one(self, name: str, moments: Sequence[Moment]) -> Verdict:
-        series = [(one.time_s, one.values[name]) for one in self.timing.choose(moments) if name in one.values]
+        chosen = self.timing.choose([moment for moment in moments if name in moment.values])
+        series = [(moment.time_s, moment.values[name]) for moment in chosen]
         if not series:
             return Verdict(False, self.words, f"nothing was seen of {name} then")
         right = [(time_s, value) for time_s, value in series if self.condition.holds(value)]
