@@ -157,6 +157,7 @@ class Homing(Mode):
             self._state = _State.FAILED
             return
         self._state = _State.SEARCHING
+        self.servo.hold()
         self._left = list(METHODS[method])
         self._next(self.servo.position)
 

@@ -56,6 +56,7 @@ class ProfilePosition(Mode):
             self.servo.motion = profile
 
     def resume(self) -> None:
+        self.servo.hold()
         if self._now is not None:
             self.servo.motion = self._now
 

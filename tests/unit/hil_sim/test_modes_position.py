@@ -104,6 +104,20 @@ def test_halt_keeps_the_set_point_and_its_end_goes_on_with_it(bench: Bench) -> N
     assert position(bench) == pytest.approx(80_000, abs=500)
 
 
+def test_after_a_halt_on_the_current_limit_the_position_loop_is_closed_again(bench: Bench) -> None:
+    enable_in(bench, POSITION)
+    bench.write(0x605D, 0, 3, 2)
+    move_to(bench, 80_000)
+    bench.run(400)
+    bench.controlword(ENABLE | HALT)
+    bench.run(200)
+    bench.controlword(ENABLE)
+    until(bench, lambda: has(bench, REACHED))
+    bench.joint.load = 20.0
+    bench.run(2000)
+    assert position(bench) == pytest.approx(80_000 - 350, abs=60)  # (20 − 3) / 1.05 N·m by 3000 N·m/rad
+
+
 def test_the_target_is_reached_when_the_joint_has_dwelt_in_the_window(bench: Bench) -> None:
     enable_in(bench, POSITION)
     bench.write(0x6068, 0, 300, 2)
