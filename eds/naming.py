@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from canopen.objectdictionary import ODVariable
 
 _IN_BRACKETS = re.compile(r"\([^)]*\)")
+_LAST_BRACKETS = re.compile(r"\(([^)]*)\)\s*$")
 _NO_NAME = re.compile(r"[^a-z0-9]+")
 
 
@@ -15,6 +16,12 @@ def identifier(text: str) -> str:
     """`Profile velocity (counts/s)` → `profile_velocity`; empty where no letter or digit is left."""
     plain = unicodedata.normalize("NFKD", _IN_BRACKETS.sub("", text)).encode("ascii", "ignore").decode()
     return _NO_NAME.sub("_", plain.lower()).strip("_")
+
+
+def remark(text: str) -> str:
+    """What a name ends with in brackets, where files tell the unit: `Profile velocity (counts/s)`."""
+    found = _LAST_BRACKETS.search(text)
+    return found[1].strip() if found else ""
 
 
 def object_name(variable: "ODVariable") -> str:

@@ -31,6 +31,11 @@ def scaled(number: Number, scale: float) -> Number:
     return float(Decimal(repr(number)) * Decimal(repr(scale)))
 
 
+def too_far(before: Number, after: Number, most: float) -> bool:
+    """Whether a change is larger than the largest step; one of exactly that size, in binary, is not."""
+    return abs(after - before) > most * (1 + 1e-9)
+
+
 def text(value: Number) -> str:
     """A value with every digit that a person needs to tell it from another one."""
     return str(value) if isinstance(value, int) else f"{value:.10g}"

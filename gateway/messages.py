@@ -144,7 +144,7 @@ class ComponentInfo(Struct, frozen=True):
     kind: str
     state: str
     problem: str | None = None
-    device: dict[str, str | int] | UnsetType = UNSET  # what its EDS says
+    device: dict[str, str | int] | UnsetType = UNSET  # what its EDS says, where it is on which bus
 
 
 class ChannelInfo(Struct, frozen=True):
@@ -179,7 +179,6 @@ class ParameterInfo(Struct, frozen=True):
     read_only: str | None = None
     type: str = ""
     scale: float = 1.0
-    title: str = ""  # as the EDS calls it
 
 
 class TrialInfo(Struct, frozen=True):

@@ -2,6 +2,7 @@
 
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
@@ -37,9 +38,9 @@ def _chapters(robot: Description) -> Iterator[str]:
     if robot.parameters:
         yield table(
             ("PARAMETER", "UNIT", "RANGE", "LARGEST STEP", "ACCESS", "OBJECT", "PROBLEM"),
-            [_parameter(parameter) for parameter in robot.parameters],
+            [_parameter(parameter) for parameter in robot.parameters if parameter.read_only is None],
             right=(3,),
-        )
+        ) + "".join(_read_only(robot.parameters))
     yield _stop(robot)
 
 
@@ -70,6 +71,13 @@ def _parameter(info: ParameterInfo) -> tuple[str, ...]:
     bounds = f"{exact(info.min)} … {exact(info.max)}"
     step = exact(info.max_step)
     return (info.name, info.unit, bounds, step, info.access, info.object, info.problem or "")
+
+
+def _read_only(parameters: list[ParameterInfo]) -> Iterator[str]:
+    """How many more there are to be read."""
+    more = Counter(parameter.component for parameter in parameters if parameter.read_only is not None)
+    for component, count in more.items():
+        yield f"{component}: {count} more, read-only (gwrms get '{component}.*')\n"
 
 
 def _stop(robot: Description) -> str:

@@ -2,13 +2,12 @@
 
 import argparse
 import datetime
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from gateway import config
-from gateway.cli.reach import parser, reach
+from gateway.cli.reach import choose, parser, reach
 from gateway.cli.text import say, say_json, table, warn
 from gateway.records.chain import Broken
 from gateway.records.folder import RecordsFolder
@@ -25,12 +24,7 @@ USAGE = "usage: gwrms journal tail [-n N] | gwrms journal verify PATH     (--hel
 
 def main(argv: list[str]) -> int:
     """Run `gwrms journal`."""
-    command = COMMANDS.get(argv[0]) if argv else None
-    if command is None:
-        asked = argv[:1] in (["-h"], ["--help"])
-        (sys.stdout if asked else sys.stderr).write(USAGE)
-        return 0 if asked else 2
-    return command(argv[1:])
+    return choose(argv, COMMANDS, USAGE)
 
 
 def tail(argv: list[str]) -> int:

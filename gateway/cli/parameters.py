@@ -1,14 +1,21 @@
 """`gwrms get` and `gwrms set`: parameters, as the devices hold them."""
 
 import argparse
+import contextlib
 import math
 
 from gateway.cli.reach import check_names, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.trial import wait_for_decision
-from gateway.messages import Description, Written
+from gateway.coding import Number
+from gateway.messages import Description, ParameterInfo, ParameterValue, Written
 
 LONGEST_TRIAL_S = 300.0
+
+GET_EPILOG = """examples:
+  gwrms get 'gait.*'
+  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not
+  gwrms get left_knee.0x6072:0       by its address in the device"""
 
 SET_EPILOG = """All changes happen or none: they are checked first, written, read back from the devices, and
 taken back if one fails. Somebody else may be the one writer; then nothing is changed and it is said.
@@ -23,21 +30,31 @@ examples:
 
 def get(argv: list[str]) -> int:
     """Run `gwrms get`."""
-    made = parser("get", "Read parameters from the devices, now.", "example:\n  gwrms get 'gait.*'")
-    made.add_argument("names", metavar="GLOB", nargs="*", help="names or globs (default: all)")
+    made = parser("get", "Read parameters from the devices, now.", GET_EPILOG)
+    made.add_argument(
+        "names",
+        metavar="GLOB",
+        nargs="*",
+        help="names, addresses or globs (default: all that can be changed)",
+    )
     arguments = made.parse_args(argv)
     with reach(arguments, "get") as robot:
-        check_names("parameter", arguments.names, parameter_names(robot.describe()))
+        description = robot.describe()
+        check_names("parameter", arguments.names, parameter_names(description))
         values = robot.read(*arguments.names).values
     if arguments.json:
         say_json({"values": values})
     else:
-        rows = [
-            (name, exact(held.value), held.unit, f"{exact(held.min)} … {exact(held.max)}", held.problem or "")
-            for name, held in values.items()
-        ]
-        say(table(("PARAMETER", "VALUE", "UNIT", "RANGE", "PROBLEM"), rows, right=(1,)))
+        infos = {info.name: info for info in description.parameters}
+        rows = [_held_row(infos[name], held) for name, held in values.items()]
+        say(table(("PARAMETER", "VALUE", "UNIT", "RANGE", ""), rows, right=(1,)))
     return 1 if any(held.value is None for held in values.values()) else 0
+
+
+def _held_row(info: ParameterInfo, held: ParameterValue) -> tuple[str, ...]:
+    read_only = f"read-only: {info.read_only}" if info.read_only else ""
+    bounds = f"{exact(held.min)} … {exact(held.max)}"
+    return info.name, exact(held.value), held.unit, bounds, held.problem or read_only
 
 
 def set_(argv: list[str]) -> int:
@@ -49,7 +66,7 @@ def set_(argv: list[str]) -> int:
     made.add_argument(
         "--trial",
         metavar="S",
-        type=_trial_s,
+        type=trial_s,
         help="try it for S seconds (at most 300); exit status 0 if kept",
     )
     arguments = made.parse_args(argv)
@@ -60,21 +77,23 @@ def set_(argv: list[str]) -> int:
         description = robot.describe()
         check_names("parameter", changes, parameter_names(description))
         if arguments.trial is None:
-            _say_written(robot.write(changes), description, json=arguments.json)
+            say_written(robot.write(changes), description, json=arguments.json)
             return 0
         with robot.trial(changes, arguments.trial) as written:
-            _say_written(written, description, json=arguments.json)
+            say_written(written, description, json=arguments.json)
             return wait_for_decision(robot, written, json=arguments.json)
 
 
-def _say_written(written: Written, description: Description, *, json: bool) -> None:
+def say_written(written: Written, description: Description, *, json: bool) -> None:
+    """What a write came to."""
     if json:
         say_json(written)
     else:
         say(_written_text(written, description))
 
 
-def _trial_s(text: str) -> float:
+def trial_s(text: str) -> float:
+    """A time for a trial, as an argument."""
     try:
         seconds = float(text)
     except ValueError:
@@ -84,12 +103,17 @@ def _trial_s(text: str) -> float:
     return seconds
 
 
-def _change(text: str) -> tuple[str, float]:
+def _number(text: str) -> Number:
+    """A whole number as such, so that none of its digits is lost; no number is NaN."""
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
+    return math.nan
+
+
+def _change(text: str) -> tuple[str, Number]:
     name, equals, number = text.partition("=")
-    try:
-        value = float(number)
-    except ValueError:
-        value = math.nan
+    value = _number(number)
     if not name or not equals or not math.isfinite(value):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not NAME=VALUE with a number, as in gait.step_length=0.42"

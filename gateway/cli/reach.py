@@ -2,9 +2,10 @@
 
 import argparse
 import fnmatch
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from gateway.cli.text import did_you_mean, warn
+from gateway.cli.text import did_you_mean, say, warn
 from gateway.client import Address, BadAddress, ClientError, ConnectionState, LinkSettings, Robot
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
 from gateway.messages import Description
@@ -12,6 +13,10 @@ from gateway.messages import Description
 
 class UnknownName(ClientError):
     """A channel or parameter that the robot does not have."""
+
+
+class NobodyToAsk(Exception):
+    """A question before a change, and no terminal."""
 
 
 def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser:
@@ -69,12 +74,39 @@ def check_names(what: str, asked: Iterable[str], known: Sequence[str]) -> None:
             )
 
 
+def choose(argv: list[str], commands: Mapping[str, Callable[[list[str]], int]], usage: str) -> int:
+    """Run one of several commands under one name; without one, say which there are."""
+    command = commands.get(argv[0]) if argv else None
+    if command is None:
+        asked = argv[:1] in (["-h"], ["--help"])
+        (sys.stdout if asked else sys.stderr).write(usage)
+        return 0 if asked else 2
+    return command(argv[1:])
+
+
+def ask(question: str, *, yes: bool) -> bool:
+    """Whether a person says yes; `yes` where `--yes` said it already.
+
+    Raises:
+        NobodyToAsk: there is no terminal.
+
+    """
+    if yes:
+        return True
+    if not sys.stdin.isatty():
+        raise NobodyToAsk("there is no terminal to ask on, and nothing was sent; say --yes to go on")
+    say(f"{question} [y/N] ")
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
 def channel_names(description: Description) -> list[str]:
     return [channel.name for channel in description.channels]
 
 
 def parameter_names(description: Description) -> list[str]:
-    return [parameter.name for parameter in description.parameters]
+    """Every name and address, as in `left_knee.0x6072:0`, that means a parameter."""
+    parameters = description.parameters
+    return [one.name for one in parameters] + [f"{one.component}.{one.object}" for one in parameters]
 
 
 def _address(text: str) -> Address:

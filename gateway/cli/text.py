@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
+from gateway.coding import text as digits
 from gateway.messages import ChannelInfo
 
 NONE = "–"
@@ -57,7 +58,7 @@ def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
 
 def exact(value: float | None) -> str:
     """A parameter's value, with every digit that it has."""
-    return NONE if value is None else f"{value:.10g}"
+    return NONE if value is None else digits(value)
 
 
 def percent(value: float | None) -> str:

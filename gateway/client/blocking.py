@@ -21,6 +21,7 @@ from gateway.messages import (
     Reverted,
     Snapshot,
     Stopped,
+    Stored,
     Written,
 )
 
@@ -146,6 +147,29 @@ class Robot:
     def revert(self, write: int) -> Reverted:
         """Take back what is on trial; raises `RemoteError` where it has ended, or could not be taken back."""
         return self._wait(self._client.revert(write))
+
+    def store(self, component: str) -> Stored:
+        """Take the lease, make a device keep its parameters over a reset (1010h), give the lease back.
+
+        Raises:
+            RemoteError: refused, and why; with `device_timeout` nobody knows whether it stored.
+
+        """
+
+        async def store() -> Stored:
+            async with self._client.writing():
+                return await self._client.store(component)
+
+        return self._wait(store())
+
+    def restore(self, component: str) -> Stored:
+        """The same for its defaults (1011h), which act after its next reset; raises as `store`."""
+
+        async def restore() -> Stored:
+            async with self._client.writing():
+                return await self._client.restore(component)
+
+        return self._wait(restore())
 
     def journal(self, count: int = 20) -> JournalEntries:
         """The newest entries of the robot's journal, oldest first."""

@@ -10,6 +10,7 @@ from gateway.client.link import Link, LinkSettings, OnState
 from gateway.client.subscription import Subscription
 from gateway.messages import (
     AcquireParams,
+    ComponentParams,
     Confirmed,
     Description,
     Done,
@@ -28,6 +29,7 @@ from gateway.messages import (
     SnapshotParams,
     StopParams,
     Stopped,
+    Stored,
     StreamStartParams,
     TailParams,
     WriteNumberParams,
@@ -35,6 +37,7 @@ from gateway.messages import (
 )
 
 WRITE_TIMEOUT_S = 30.0  # a transaction over several drives, verified and perhaps rolled back
+STORE_TIMEOUT_S = 120.0  # devices write their memory, and are compared before and after
 STOP_TIMEOUT_S = 5.0
 LEASE_MARGIN_S = 30.0
 LONGEST_LEASE_S = 300.0
@@ -158,6 +161,19 @@ class Client:
         """
         async with self.writing(min(trial_s + LEASE_MARGIN_S, LONGEST_LEASE_S)):
             yield await self.write(changes, trial_s)  # giving back the lease takes back what is on trial
+
+    async def store(self, component: str) -> Stored:
+        """Make a device keep its parameters over a reset (1010h). Needs the lease.
+
+        Raises:
+            RemoteError: refused, and why; with `device_timeout` nobody knows whether it stored.
+
+        """
+        return await self.link.call("parameter.store", ComponentParams(component), Stored, STORE_TIMEOUT_S)
+
+    async def restore(self, component: str) -> Stored:
+        """Make a device take its defaults at its next reset (1011h). Needs the lease; raises as `store`."""
+        return await self.link.call("parameter.restore", ComponentParams(component), Stored, STORE_TIMEOUT_S)
 
     async def journal(self, count: int = 20) -> JournalEntries:
         """The newest entries of the robot's journal, oldest first."""

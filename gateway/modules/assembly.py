@@ -98,13 +98,19 @@ def _imu(robot: Robot, path: Path, name: str, settings: MountedSettings) -> Call
     return build
 
 
-def facts(description: eds.Description) -> Mapping[str, str | int]:
-    """What `robot.describe` tells of a device's EDS."""
+def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
+    """What `robot.describe` tells of a device: what its EDS says, and where it is."""
+    tables: dict[str, Any] = {**config.joint, **config.device, **config.imu}
+    bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {
         "eds": description.path.name,
         "vendor": description.vendor,
         "product": description.product,
+        "bus": bus,
+        "node_id": tables[name].node_id,
     }
+    if bitrate is not None:
+        found["bitrate"] = bitrate
     warnings = [f"{one.where}: {one.text}" for one in description.findings if one.severity == "warning"]
     if warnings:
         found["warnings"] = "; ".join(warnings)

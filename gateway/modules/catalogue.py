@@ -86,7 +86,6 @@ def described(
         max((limit for limit in (low, eds_low) if limit is not None), default=None),
         min((limit for limit in (high, eds_high) if limit is not None), default=None),
         description.has(STORE, 1),
-        title=variable.qualname,
     )
 
 

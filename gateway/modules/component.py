@@ -139,7 +139,7 @@ class ComponentModule:
         for name, kind in kinds.items():
             quality = self.quality(name, now_ns)
             description = self.robot.descriptions.get(name)
-            device = UNSET if description is None else dict(facts(description))
+            device = UNSET if description is None else dict(facts(self._context.config, name, description))
             problem = quality["problem"]
             found.append(
                 ComponentInfo(

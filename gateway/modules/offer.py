@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from eds import Description
 from eds.datatypes import DATA_TYPES
-from eds.naming import object_name
+from eds.naming import object_name, remark
 from eds.report import pdo_rows
 from gateway.coding import NUMBERS
 from gateway.config import (
@@ -39,6 +39,15 @@ _COMMANDS = (  # CiA 402-2: what the master of a drive tells it while it moves
     0x60C1,  # interpolation data record
     0x60FE,  # digital outputs
     0x60FF,  # target velocity
+)
+_STOPPING = (  # CiA 402-2: what a drive does when it is stopped, or nobody speaks to it any more
+    0x6007,  # abort connection option code
+    0x605A,  # quick stop option code
+    0x605B,  # shutdown option code
+    0x605C,  # disable operation option code
+    0x605D,  # halt option code
+    0x605E,  # fault reaction option code
+    0x6085,  # quick stop deceleration
 )
 
 
@@ -123,7 +132,7 @@ class _Offer:
         return Parameter(
             f"{self._component}.{name}",
             self._component,
-            ParameterSettings(object=address),
+            ParameterSettings(object=address, unit=remark(variable.name)),
             variable.index,
             variable.subindex,
             variable.data_type or 0,
@@ -133,7 +142,6 @@ class _Offer:
             self._store,
             lock=self._lock(variable, name, address),
             table=self._where,
-            title=variable.qualname,
         )
 
     def _lock(self, variable: "ODVariable", name: str, address: str) -> Lock | None:
@@ -147,6 +155,8 @@ class _Offer:
             return None
         if index in _COMMANDS or (variable.index, variable.subindex) in self._mapped:
             return Lock.COMMANDED
+        if index in _STOPPING:
+            return Lock.STOPPING
         return None if matches(name, release) else Lock.UNRELEASED
 
     def _unmatched(self, variables: list["ODVariable"], names: list[str]) -> Iterator[Parameter]:

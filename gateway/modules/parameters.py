@@ -23,6 +23,7 @@ class Lock(Enum):
 
     UNRELEASED = "not released"
     COMMANDED = "commanded"
+    STOPPING = "stopping"
     COMMUNICATION = "communication"
     STORAGE = "storage"
     CONTROLWORD = "controlword"
@@ -31,6 +32,8 @@ class Lock(Enum):
 _REMEDIES = {
     Lock.UNRELEASED: 'add "{name}" to release in {table} of the robot\'s file',
     Lock.COMMANDED: "who leads the bus writes it; to change it all the same, add its whole name "
+    '"{name}" to release in {table} of the robot\'s file: a glob does not reach it',
+    Lock.STOPPING: "it decides how the drive stops; to change it all the same, add its whole name "
     '"{name}" to release in {table} of the robot\'s file: a glob does not reach it',
     Lock.COMMUNICATION: "from 1000h to 1FFFh is how the bus works, which belongs to who leads it; release "
     "does not reach it, only a [parameter] table of its own",
@@ -44,7 +47,7 @@ _LIMITS = (("min", operator.lt, "below the minimum"), ("max", operator.gt, "abov
 class Parameter:
     """One parameter, resolved against its device's EDS. `problem` says why it cannot be used.
 
-    `table` is where the robot's file describes its device; `title` is the object's name in the EDS.
+    `table` is where the robot's file describes its device.
     """
 
     name: str
@@ -60,7 +63,6 @@ class Parameter:
     problem: str | None = None
     lock: Lock | None = None
     table: str = ""
-    title: str = ""
 
     @property
     def object(self) -> str:
@@ -100,7 +102,6 @@ class Parameter:
             read_only=self.read_only,
             type="" if known is None else known.name,
             scale=settings.scale,
-            title=self.title,
         )
 
     def refusal(self, kind: Kind, text: str, limit: float | None = None) -> RpcError:

@@ -131,6 +131,7 @@ class _Run:
         self._record(command.name, "nothing was sent")
         try:
             self._send()
+            self._check_answers()
             self._check_unchanged(before)
         except RpcError as error:
             self._record(f"{command.name} FAILED", str(error), result=str(error))
@@ -145,10 +146,9 @@ class _Run:
         for undo in self._storage.keeping.undo.all():
             name = next((one.parameter for one in undo.changes if one.component in self._sharing), None)
             if name is not None:
-                by = f"write {undo.write} of {undo.who}"
-                raise self._refusal(
-                    Kind.TRIAL_PENDING, f"{name} is on trial ({by}); confirm or revert that first"
-                )
+                how = "on trial; confirm or revert" if undo.trial else "still being taken back; wait for"
+                said = f"{name} is {how} that first (write {undo.write} of {undo.who})"
+                raise self._refusal(Kind.TRIAL_PENDING, said)
 
     def _check_capability(self) -> None:
         capability = self._capability()
@@ -174,26 +174,26 @@ class _Run:
         command = self._command
         sent = self._node.download(command.index, ALL, command.signature, self._timeout_s)
         try:
-            self._result(f"writing {command.signature.decode()!r}", sent, self._timeout_s)
-            self._check_answers()
+            self._result(sent, self._timeout_s)
         except RpcError as error:
-            if error.kind is not Kind.DEVICE_TIMEOUT:
+            if error.kind is Kind.DEVICE_ABORT:
                 raise
             said = f"{error}; NOBODY KNOWS whether it did: try again, or compare its values after a reset"
             raise refuse(error.kind, said, component=self._component, object=command.object) from error
 
     def _check_answers(self) -> None:
-        """A device that was busy answers again, and still says that it can."""
+        """A device that is busy afterwards answers again, and still says that it can."""
         deadline = time.monotonic() + self._timeout_s
         while True:
             try:
                 return self._check_capability()
             except RpcError as error:
                 if error.kind is not Kind.DEVICE_TIMEOUT or time.monotonic() > deadline:
-                    raise
+                    said = f"the device confirmed, but then: {error}"
+                    raise refuse(error.kind, said, component=self._component) from error
 
     def _capability(self) -> int:
-        return unsigned(self._result("reading", self._node.upload(self._command.index, ALL)))
+        return unsigned(self._result(self._node.upload(self._command.index, ALL)))
 
     # Afterwards
 
@@ -208,7 +208,7 @@ class _Run:
         return found
 
     def _check_unchanged(self, before: Mapping[str, tuple[Number, bytes]]) -> None:
-        after = self._values()
+        after = self._values() if before else {}
         changed = [
             f"{name} was {text(value)} and is {text(after[name][0])}"
             for name, (value, data) in before.items()
@@ -230,25 +230,21 @@ class _Run:
             said = f"it could not be recorded: {error.strerror or error}; {so}"
             raise self._refusal(Kind.UNAVAILABLE, said) from error
 
-    def _result(self, doing: str, future: "Future[T]", timeout_s: float = 0.0) -> T:
+    def _result(self, future: "Future[T]", timeout_s: float = 0.0) -> T:
         try:
             return future.result(ANSWER_S + timeout_s)
         except (DriverError, TimeoutError) as error:
             kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
             kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
-            raise refuse(
-                kind,
-                f"{self._component}: {doing} {self._command.object}: {error}",
-                component=self._component,
-                object=self._command.object,
-                abort_code=getattr(error, "abort_code", None),
-            ) from error
+            abort_code = getattr(error, "abort_code", None)
+            raise self._refusal(kind, str(error) or "no answer", abort_code) from error
 
-    def _refusal(self, kind: Kind, said: str) -> RpcError:
+    def _refusal(self, kind: Kind, said: str, abort_code: int | None = None) -> RpcError:
         command = self._command
         return refuse(
             kind,
             f"{command.name} {self._component}: {said}",
             component=self._component,
             object=command.object,
+            abort_code=abort_code,
         )

@@ -20,6 +20,7 @@ from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.quick_stop import STATUSWORD
 from drivers.joint.settings import JointSettings
 from drivers.samples import State
+from gateway.coding import too_far
 from gateway.config import RobotConfig
 from gateway.futures import back, done, failed, gather, then
 from gateway.loop import Loop
@@ -216,9 +217,9 @@ class Tuning:
     def _check(self, change: Change, current: float) -> None:
         """In the writer's thread: the step, and the states of the drives that the parameter may move."""
         parameter = change.parameter
-        step, most = abs(parameter.decode(change.data) - current), parameter.settings.max_step
-        if most is not None and step > most * (1 + 1e-9):  # a step of exactly the limit, in binary
-            unit = parameter.settings.unit
+        new, most = parameter.decode(change.data), parameter.settings.max_step
+        if most is not None and too_far(current, new, most):
+            unit, step = parameter.settings.unit, abs(new - current)
             text = f"from {current:g} {unit} it may change by {most:g} {unit} at once, not by {step:g}"
             raise parameter.refusal(Kind.OUT_OF_LIMIT, text, most)
         allowed = allowed_states(parameter)

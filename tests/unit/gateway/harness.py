@@ -1,6 +1,7 @@
 """A daemon in a thread, a blocking client that knows nothing of ours, and components from the manual."""
 
 import contextlib
+import functools
 import json
 import socket
 import threading
@@ -317,6 +318,12 @@ def config(folder: Path, text: str = ROBOT) -> RobotConfig:
     return load(path)
 
 
+@functools.cache
+def _description(file: str) -> eds.Description:
+    """Loading one takes longer than most tests, and nobody changes it."""
+    return eds.load(eds.locate(file, None), 1)
+
+
 class Bench:
     """The robot of `ROBOT` made of fakes."""
 
@@ -347,5 +354,5 @@ class Bench:
 
     def assemble(self, config: RobotConfig) -> Robot:
         self.assembled += 1
-        descriptions = {name: eds.load(eds.locate(file, None), 1) for name, file in self.files.items()}
+        descriptions = {name: _description(file) for name, file in self.files.items()}
         return Robot({}, dict(self.components), descriptions, dict(self.absent))

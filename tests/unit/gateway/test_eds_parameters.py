@@ -78,7 +78,7 @@ def test_a_sub_object_is_named_behind_its_object(tmp_path: Path) -> None:
     known = catalogue(tmp_path)
     assert known["knee.software_position_limit_min_position_limit"].object == "0x607D:1"
     assert known["knee.interpolation_time_period_value"].object == "0x60C2:1"
-    assert known["knee.max_torque"].title == "Max torque (0.001 of rated torque)"
+    assert known["knee.max_torque"].settings.unit == "0.001 of rated torque"
 
 
 SAME_NAMES = """\
@@ -141,6 +141,10 @@ def test_a_table_of_the_robots_file_stands_in_for_what_the_eds_offers(tmp_path: 
         ("0x607A:0", '["target_position"]', None),
         ("0x607A:0", '["0x607A:0"]', None),
         ("0x6060:0", '["modes_*"]', Lock.COMMANDED),
+        ("0x605A:0", '["*"]', Lock.STOPPING),
+        ("0x605A:0", '["quick_stop_option_code"]', None),
+        ("0x6007:0", '["*"]', Lock.STOPPING),
+        ("0x6085:0", '["quick_*"]', Lock.STOPPING),
         ("0x60C1:1", '["*"]', Lock.COMMANDED),
         ("0x1017:0", '["*", "producer_heartbeat_time", "0x1017:0"]', Lock.COMMUNICATION),
         ("0x1801:1", '["*"]', Lock.COMMUNICATION),
@@ -238,7 +242,7 @@ def test_read_only_until_released_and_the_refusal_says_how(
         assert written["after"] == {"left_knee.profile_velocity": 70000}
         error = client.refused("parameter.write", changes={"left_knee.quick_stop_deceleration": 20000})
         assert (error.kind, error.data["object"]) == ("read_only", "0x6085:0")
-        assert 'add "quick_stop_deceleration" to release in [joint.left_knee]' in str(error)
+        assert 'its whole name "quick_stop_deceleration" to release in [joint.left_knee]' in str(error)
         error = client.refused("parameter.write", changes={"left_knee.0x6040:0": 15})
         assert (error.kind, "enables drives" in str(error)) == ("read_only", True)
         error = client.refused("parameter.write", changes={"left_knee.producer_heartbeat_time": 0})

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import DeviceAbort, DeviceTimeout
+from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import RobotConfig
 from tests.unit.gateway.harness import (
     DISABLED,
@@ -174,7 +174,8 @@ def test_what_is_on_trial_is_never_made_permanent(resting: Bench, writer: Client
     for method in ("parameter.store", "parameter.restore"):
         error = writer.refused(method, component="left_knee")
         assert error.kind == "trial_pending"
-        assert f"left_knee.max_torque is on trial (write {trial['write']}" in str(error)
+        assert "left_knee.max_torque is on trial; confirm or revert that first" in str(error)
+        assert f"(write {trial['write']} of" in str(error)
     assert writer.call("parameter.store", component="right_knee")["component"] == "right_knee"
     writer.call("parameter.confirm", write=trial["write"])
     assert writer.call("parameter.store", component="left_knee")["component"] == "left_knee"
@@ -212,13 +213,19 @@ def test_without_a_journal_nothing_is_stored(resting: Bench, tmp_path: Path) -> 
 # What goes wrong
 
 
-def test_no_answer_means_that_nobody_knows(resting: Bench, writer: Client) -> None:
+@pytest.mark.parametrize(
+    ("error_", "kind"),
+    [(DeviceTimeout("no answer within 10 s"), "device_timeout"), (Unavailable("bus off"), "unavailable")],
+)
+def test_no_answer_means_that_nobody_knows(
+    resting: Bench, writer: Client, error_: Exception, kind: str
+) -> None:
     def fail(index: int, data: bytes) -> None:
-        raise DeviceTimeout("no answer within 10 s")
+        raise error_
 
     resting.left.node.before_download = fail
     error = writer.refused("parameter.store", component="left_knee")
-    assert (error.kind, error.data["component"]) == ("device_timeout", "left_knee")
+    assert (error.kind, error.data["component"]) == (kind, "left_knee")
     assert "NOBODY KNOWS whether it did" in str(error)
     begin, end = journal(writer)
     assert (begin["what"], end["what"]) == ("store", "store FAILED")
@@ -254,7 +261,8 @@ def test_a_device_that_stays_deaf_after_storing_is_an_error(resting: Bench, tmp_
     impatient = ROBOT.replace("node_id = 2\n", "node_id = 2\nstore_timeout_s = 0.05\n")
     with serving(config(tmp_path, impatient)) as address, Client(address) as client:
         client.call("control.acquire", ttl_s=60)
-        assert client.refused("parameter.store", component="left_knee").kind == "device_timeout"
+        error = client.refused("parameter.store", component="left_knee")
+        assert (error.kind, "the device confirmed, but then" in str(error)) == ("device_timeout", True)
 
 
 # Who shares a node

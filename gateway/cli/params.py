@@ -1,0 +1,219 @@
+"""`gwrms params`: a robot's parameters saved as a file, compared with one, and set to one."""
+
+import argparse
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from gateway.cli import params_dcf, params_toml
+from gateway.cli.parameters import say_written, trial_s
+from gateway.cli.params_diff import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
+from gateway.cli.params_file import FileProblem, Format, Scope
+from gateway.cli.reach import ask, check_names, choose, parameter_names, parser, reach
+from gateway.cli.text import exact, say, say_json, table, warn
+from gateway.cli.trial import wait_for_decision
+from gateway.client import Robot
+from gateway.coding import Number
+from gateway.messages import ParameterValue, ParameterWriteParams
+from gateway.records import durable
+from gateway.wire import LINE_LIMIT, encode_request
+
+USAGE = """\
+usage: gwrms params save FILE [GLOB ...]
+       gwrms params compare FILE
+       gwrms params apply FILE
+A .toml file holds parameters of a whole robot, a .dcf file (CiA 306) all of one device.
+--help after any of them says more.
+"""
+
+SAVE_EPILOG = """A .toml file holds what can be changed, by name, in the units of the robot's file.
+A .dcf file is made from the device's EDS and holds all that the device lets write, but for its commands.
+Exit status 1 where a device did not tell a value: the file is written without it.
+
+examples:
+  gwrms params save monday.toml
+  gwrms params save gait.toml 'gait.*'
+  gwrms params save left_knee.dcf --component left_knee --eds my_drive.eds"""
+
+COMPARE_EPILOG = """Values are the same when the device would store the same bytes for both.
+Exit status 0: the robot holds all that the file says; what the file does not name does not count.
+
+example:
+  gwrms params compare monday.toml"""
+
+APPLY_EPILOG = """Shows what is different, asks, and writes it all or not at all, read back. Where something
+in the file cannot be brought about, nothing is written.
+
+examples:
+  gwrms params apply monday.toml
+  gwrms params apply monday.toml --trial 60
+  gwrms params apply left_knee.dcf --component right_knee --skip"""
+
+_FORMATS = {
+    ".toml": Format(params_toml.chosen, params_toml.write, params_toml.read),
+    ".dcf": Format(params_dcf.chosen, params_dcf.write, params_dcf.read),
+}
+_AT_ONCE = 16  # parameters asked in one request: a device that stops answering costs no more than these
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms params`."""
+    return choose(argv, {"save": save, "compare": compare_, "apply": apply}, USAGE)
+
+
+def save(argv: list[str]) -> int:
+    """Run `gwrms params save`."""
+    made = _parser("save", "Save parameters as the devices hold them now.", SAVE_EPILOG)
+    made.add_argument("globs", metavar="GLOB", nargs="*", help="names or globs of what to save")
+    made.add_argument("--eds", type=Path, metavar="EDS", help="the device's file, to make a DCF from")
+    made.add_argument("--overwrite", action="store_true", help="where the file is there already")
+    arguments = made.parse_args(argv)
+    file: Path = arguments.file
+    kind = _format(file)
+    if file.exists() and not arguments.overwrite:
+        raise FileProblem(f"{file} is there already; say --overwrite, or give another name")
+    with reach(arguments, "params") as robot:
+        scope = Scope(robot.describe(), arguments.component, arguments.eds)
+        check_names("parameter", arguments.globs, parameter_names(scope.robot))
+        held = _read(robot, [info.name for info in kind.chosen(scope, arguments.globs)])
+    values = {name: one.value for name, one in held.items() if one.value is not None}
+    if not values:
+        raise FileProblem(f"{file}: there is nothing to save; gwrms get shows what can be read")
+    durable.write(file, kind.write(file, scope, values))
+    problems = {name: one.problem or "not known" for name, one in held.items() if one.value is None}
+    _say_saved(file, len(values), problems, json=arguments.json)
+    return 1 if problems else 0
+
+
+def compare_(argv: list[str]) -> int:
+    """Run `gwrms params compare`."""
+    made = _parser("compare", "What a file says beside what the robot holds.", COMPARE_EPILOG)
+    arguments = made.parse_args(argv)
+    with reach(arguments, "params") as robot:
+        rows = _rows(robot, Scope(robot.describe(), arguments.component), arguments.file)
+    same = all(row.verdict not in UNLIKE for row in rows)
+    if arguments.json:
+        say_json({"same": same, "rows": rows})
+    else:
+        say(_table(rows) + _summary(rows))
+    return 0 if same else 1
+
+
+def apply(argv: list[str]) -> int:
+    """Run `gwrms params apply`."""
+    made = _parser("apply", "Bring a robot's parameters to what a file says, all or none.", APPLY_EPILOG)
+    made.add_argument("--yes", action="store_true", help="do not ask")
+    made.add_argument("--skip", action="store_true", help="leave out what cannot be changed at all")
+    made.add_argument(
+        "--trial", metavar="S", type=trial_s, help="try it for S seconds (at most 300); exit status 0 if kept"
+    )
+    arguments = made.parse_args(argv)
+    with reach(arguments, "params") as robot:
+        scope = Scope(robot.describe(), arguments.component)
+        rows = _rows(robot, scope, arguments.file)
+        _say_unlike(rows, json=arguments.json)
+        changes = _changes(rows, arguments.file, skip=arguments.skip)
+        if not changes:
+            return 0
+        if not ask(f"Write {_counted(len(changes), 'parameter')}?", yes=arguments.yes):
+            return 1
+        if arguments.trial is None:
+            say_written(robot.write(changes), scope.robot, json=arguments.json)
+            return 0
+        with robot.trial(changes, arguments.trial) as written:
+            say_written(written, scope.robot, json=arguments.json)
+            return wait_for_decision(robot, written, json=arguments.json)
+
+
+def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
+    made = parser(f"params {command}", what, epilog)
+    made.add_argument("file", metavar="FILE", type=Path, help="a .toml or .dcf file")
+    made.add_argument("--component", metavar="NAME", help="one joint or device, such as left_knee")
+    return made
+
+
+def _format(file: Path) -> Format:
+    found = _FORMATS.get(file.suffix.lower())
+    if found is None:
+        raise FileProblem(f"{file}: give a name that ends in {' or '.join(_FORMATS)}")
+    return found
+
+
+def _read(robot: Robot, names: Sequence[str]) -> dict[str, ParameterValue]:
+    """As the devices hold them now, a few at a time."""
+    held: dict[str, ParameterValue] = {}
+    for start in range(0, len(names), _AT_ONCE):
+        held |= robot.read(*names[start : start + _AT_ONCE]).values
+    return held
+
+
+def _rows(robot: Robot, scope: Scope, file: Path) -> list[Row]:
+    saved = _format(file).read(file, scope)
+    for remark in saved.remarks:
+        warn("params", f"{file}: {remark}")
+    infos = {info.name: info for info in scope.robot.parameters}
+    asked = [infos[name] for name in saved.values if name in infos] + left_out(saved.values, infos.values())
+    held = _read(robot, [info.name for info in asked if info.problem is None])
+    return compare(saved.values, infos, held)
+
+
+def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number]:
+    """What is to be written; raises `FileProblem` where the file cannot be brought about."""
+    found = Counter(row.verdict for row in rows)
+    refused = sum(found[verdict] for verdict in REFUSED)
+    if refused:
+        raise FileProblem(f"{file}: nothing was sent, the robot would refuse {_counted(refused, 'value')}")
+    fixed = sum(found[verdict] for verdict in CANNOT_CHANGE)
+    if fixed and not skip:
+        raise FileProblem(
+            f"{file}: nothing was sent, {_counted(fixed, 'value')} cannot be changed; --skip leaves them out"
+        )
+    changes = {
+        row.name: row.file for row in rows if row.verdict is Verdict.DIFFERENT and row.file is not None
+    }
+    size = len(encode_request(0, "parameter.write", ParameterWriteParams(changes))) if changes else 0
+    if size > LINE_LIMIT:
+        raise FileProblem(
+            f"{file}: nothing was sent, {_counted(len(changes), 'change')} are too many for one request "
+            f"({size / 1024:.0f} of {LINE_LIMIT // 1024} KiB): divide the file"
+        )
+    return changes
+
+
+# What is printed
+
+
+def _say_saved(file: Path, count: int, problems: Mapping[str, str], *, json: bool) -> None:
+    for name, problem in problems.items():
+        warn("params", f"{name} is not in {file}: {problem}")
+    if json:
+        say_json({"file": str(file), "saved": count, "problems": problems})
+    else:
+        say(f"{file}: {_counted(count, 'parameter')}\n")
+
+
+def _say_unlike(rows: Sequence[Row], *, json: bool) -> None:
+    unlike = [row for row in rows if row.verdict in UNLIKE]
+    if json:
+        say_json({"rows": unlike})
+    elif unlike:
+        say(_table(unlike) + _summary(rows))
+    else:
+        say("the robot holds all that the file says\n")
+
+
+def _table(rows: Iterable[Row]) -> str:
+    lines = [
+        (row.name, exact(row.robot), exact(row.file), row.unit, f"{row.verdict}{row.why and f': {row.why}'}")
+        for row in rows
+    ]
+    return table(("PARAMETER", "ROBOT", "FILE", "UNIT", ""), lines, right=(1, 2))
+
+
+def _summary(rows: Iterable[Row]) -> str:
+    found = Counter(row.verdict for row in rows)
+    return ", ".join(f"{found[verdict]} {verdict}" for verdict in Verdict if found[verdict]) + "\n"
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
