@@ -119,6 +119,6 @@ class Exoskeleton:
         for drive, load in zip(self.drives.values(), self.wearer.joint_loads(now_s), strict=True):
             drive.advance()
             drive.joint.load = load
-        self.sensors.measure(*self.wearer.feet(now_s), self.wearer.trunk())
+        self.sensors.measure(*self.wearer.feet(now_s), self.wearer.trunk(now_s))
         for watch in self.measured:
             watch()

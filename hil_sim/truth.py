@@ -81,7 +81,8 @@ class TruthFile:
 
     def _record(self) -> None:
         robot, generator = self._robot, self._robot.controller.generator
-        feet, trunk = robot.wearer.feet(robot.clock.now_s), robot.wearer.trunk()
+        now_s = robot.clock.now_s
+        feet, trunk = robot.wearer.feet(now_s), robot.wearer.trunk(now_s)
         joints = [drive.joint for drive in robot.drives.values()]
         numbers = [
             *self._phases(),

@@ -72,12 +72,12 @@ class Stumble:
     @property
     def acceleration(self) -> float:
         """Of the trunk, forward (m/s²): the trip brakes, the recovery pushes on by as much."""
-        return -4.0 * self._bump(0.0, 0.08, 0.20) + 2.0 * self._bump(0.45, 0.60, 0.85)
+        return -8.0 * self._bump(0.0, 0.06, 0.15) + 3.0 * self._bump(0.45, 0.60, 0.85)
 
     @property
     def load(self) -> float:
         """What the feet's load is multiplied with: the body drops a little, then is caught."""
-        return 1.0 - 0.25 * self._bump(0.10, 0.25, 0.40) + 0.25 * self._bump(0.40, 0.55, 0.70)
+        return 1.0 - 0.35 * self._bump(0.10, 0.25, 0.40) + 0.70 * self._bump(0.40, 0.46, 0.55)
 
 
 class FallState(Enum):

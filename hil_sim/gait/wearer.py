@@ -17,10 +17,13 @@ from hil_sim.gait.ground import outward, shear, vertical_grf
 GRAVITY = 9.80665
 
 _SIDEWAYS = 0.06  # how far (in its height) the trunk is beside the foot that it stands on
-# Quiet standing: frequencies (Hz), share of the load that goes from foot to foot, way of the pressure (m).
+# Sway: frequencies (Hz); in standing the share of the load that goes from foot to foot and the way of the
+# pressure (m); the trunk's pitch and roll (rad), which sways on a seat too.
 _SWAY_HZ = (0.13, 0.31, 0.57)
 _SWAY_LOAD = (0.015, 0.010, 0.004)
 _SWAY_COP = (0.005, 0.003, 0.001)
+_SWAY_PITCH = (0.006, 0.004, 0.002)
+_SWAY_ROLL = (-0.004, 0.003, 0.001)
 # The trunk in walking (rad): roll and yaw once a stride, pitch twice.
 _ROLL, _PITCH, _YAW = 0.04, 0.025, 0.07
 _IMPAIRED_LOAD = 0.1  # share of its load that a fully impaired leg gives to the other
@@ -129,14 +132,15 @@ class Wearer:
 
     # -- trunk ------------------------------------------------------------------------------------------
 
-    def trunk(self) -> Trunk:
-        """Attitude, and the acceleration that the forces give."""
+    def trunk(self, now_s: float) -> Trunk:
+        """Attitude at `now_s` (s, for the sway), and the acceleration that the forces give."""
         generator = self._generator
-        upright = 1.0 - generator.fall.share
-        moving, angle = generator.walking * upright * generator.wearer.sway, math.tau * generator.phase
+        upright = (1.0 - generator.fall.share) * generator.wearer.sway
+        moving, angle = generator.walking * upright, math.tau * generator.phase
+        swaying, aside = (upright * _sway(amounts, now_s) for amounts in (_SWAY_PITCH, _SWAY_ROLL))
         return Trunk(
-            roll=moving * _ROLL * math.sin(angle) + generator.fall.roll,
-            pitch=generator.trunk + moving * _PITCH * math.sin(2.0 * angle),
+            roll=moving * _ROLL * math.sin(angle) + generator.fall.roll + aside,
+            pitch=generator.trunk + moving * _PITCH * math.sin(2.0 * angle) + swaying,
             yaw=generator.heading + moving * _YAW * math.cos(angle),
             acceleration=self._acceleration(),
         )

@@ -56,7 +56,7 @@ class Moving:
             generator.legs(),
             (generator.leg_phase(0), generator.leg_phase(1)),
             wearer.feet(self.time_s),
-            wearer.trunk(),
+            wearer.trunk(self.time_s),
             wearer.support(),
         )
 

@@ -108,7 +108,7 @@ class Robot:
         left, right = self.wearer.feet(self.now_s)
         self.senders[0].tell(self._left(left, right), now_ns)
         self.senders[1].tell(self.soles[1].measure(right, left, self.step_s), now_ns)
-        motion = self.sensor.measure(self.wearer.trunk(), self.step_s)
+        motion = self.sensor.measure(self.wearer.trunk(self.now_s), self.step_s)
         self.imu_sender.tell(self.fault.motion(motion, self.now_s), now_ns)
 
     def _left(self, own: Foot, other: Foot) -> Pressures:
