@@ -1,5 +1,6 @@
 """The motion of the wearer from moment to moment: what is being done, and smooth ways to what is wanted."""
 
+import math
 import random
 
 from hil_sim.gait import posture
@@ -16,6 +17,7 @@ from hil_sim.gait.walk import Shape, lifted, stance_share, swing
 _WALK_RAMP_S = 1.5
 _SIT_RAMP_S = 2.5
 _CHANGE_S = 1.2  # from one gait to another
+_TURN_SWING = 0.4  # how much quicker one turns when both feet change
 _LAG_S = 0.2  # a changed parameter is taken over in about three of these
 
 _FALLEN = {FallState.FALLING: Label.FALL, FallState.LYING: Label.LYING, FallState.RISING: Label.GET_UP}
@@ -33,6 +35,7 @@ class Generator:
     ) -> None:
         self.wearer = wearer
         self.heading = 0.0  # yaw of the way (rad, to the left); goes on over full turns
+        self.moment = 0  # another number after each step
         self._source = source
         self.reset(shape)
 
@@ -73,6 +76,7 @@ class Generator:
         parts = ((self._from, 1.0 - share), (self._to, share))
         self.gaits = tuple((GAITS[gait], part) for gait, part in parts if part > 0.0)  # each with its share
         self._legs: tuple[Leg, Leg] | None = None
+        self.moment += 1
 
     def _notice(self, activity: Activity) -> None:
         """A stumble or fall that is newly wanted happens at the next occasion, once."""
@@ -179,7 +183,8 @@ class Generator:
     def yaw_rate(self) -> float:
         """Of the way (rad/s, to the left); a turn is made step by step."""
         turn = sum(share * gait.turn for gait, share in self.gaits)
-        return turn * self.walking * (1.0 - self.fall.share) / self.shape.cycle_time
+        with_steps = 1.0 + _TURN_SWING * math.cos(2.0 * math.tau * self.phase)
+        return turn * with_steps * self.walking * (1.0 - self.fall.share) / self.shape.cycle_time
 
     @property
     def trunk(self) -> float:
@@ -191,13 +196,13 @@ class Generator:
         return upright + self.fall.share * (LYING_PITCH - upright)
 
     @property
-    def height_acceleration(self) -> float:
-        """Of the trunk (m/s², up) by what the posture does; the gait's comes from its steps."""
-        rate = self._sit.rate
-        sitting = (
-            posture.height_acceleration(self.seating, rate, self.wearer.leg_length) if rate != 0.0 else 0.0
+    def acceleration(self) -> tuple[float, float]:
+        """Of the trunk, forward and up (m/s²), but for what the gait's own forces give."""
+        forward, up = posture.acceleration(self.seating, self._sit.rate, self.wearer.leg_length)
+        return (
+            forward + self.stumble.acceleration + self.fall.acceleration,
+            up + self.fall.height_acceleration,
         )
-        return sitting + self.fall.height_acceleration
 
     # -- the legs ----------------------------------------------------------------------------------------
 

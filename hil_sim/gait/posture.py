@@ -13,6 +13,7 @@ SEAT_SHARE = 0.82  # of the body weight, on somebody who sits
 
 _LEAN = 0.55  # rad, how far the trunk comes forward between sitting and standing
 _TRUNK = 0.30  # m, from the hips to the trunk's centre of mass
+_STEP = 0.002  # of seating, for its derivatives
 
 
 def bent(seating: float) -> float:
@@ -30,17 +31,24 @@ def lean(seating: float) -> float:
     return _LEAN * bump(seating, 0.05, 0.62, 1.0)
 
 
-def height(seating: float, leg_length: float) -> float:
-    """Height of the trunk's centre of mass over the ankles (m): thigh, shank and the leaning trunk."""
+def place(seating: float, leg_length: float) -> tuple[float, float]:
+    """Where the trunk's centre of mass is, before and above the ankles (m): thigh, shank, leaning trunk."""
     leg = mix(STANDING, SITTING, bent(seating))
-    thigh, shank = leg.hip, leg.hip - leg.knee
-    return 0.5 * leg_length * (math.cos(thigh) + math.cos(shank)) + _TRUNK * math.cos(lean(seating))
-
-
-def height_acceleration(seating: float, rate: float, leg_length: float) -> float:
-    """Second derivative of `height` (m/s²) where `seating` changes evenly by `rate` (1/s)."""
-    step = 0.002
-    before, now, after = (
-        height(min(max(seating + shift, 0.0), 1.0), leg_length) for shift in (-step, 0.0, step)
+    thigh, shank, trunk = leg.hip, leg.hip - leg.knee, lean(seating)
+    return (
+        _TRUNK * math.sin(trunk) - 0.5 * leg_length * (math.sin(thigh) + math.sin(shank)),
+        _TRUNK * math.cos(trunk) + 0.5 * leg_length * (math.cos(thigh) + math.cos(shank)),
     )
-    return (before - 2.0 * now + after) / (step * step) * rate * rate
+
+
+def acceleration(seating: float, rate: float, leg_length: float) -> tuple[float, float]:
+    """Second derivative of `place` (m/s²) where `seating` changes evenly by `rate` (1/s)."""
+    if rate == 0.0:
+        return 0.0, 0.0
+    before, now, after = (
+        place(min(max(seating + shift, 0.0), 1.0), leg_length) for shift in (-_STEP, 0.0, _STEP)
+    )
+    forward, up = (
+        (a - 2.0 * b + c) * (rate / _STEP) ** 2 for a, b, c in zip(before, now, after, strict=True)
+    )
+    return forward, up

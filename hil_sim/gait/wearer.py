@@ -73,6 +73,7 @@ class Wearer:
         self._generator = generator
         self.mass = generator.wearer.mass
         self.weight = self.mass * GRAVITY
+        self._moment, self._both = -1, (_STANDING, _STANDING)
 
     # -- forces -----------------------------------------------------------------------------------------
 
@@ -97,14 +98,18 @@ class Wearer:
 
     def _carried(self) -> float:
         """Weight and what the posture's acceleration adds (N)."""
-        return self.mass * (GRAVITY + self._generator.height_acceleration)
+        return self.mass * (GRAVITY + self._generator.acceleration[1])
 
     def _support(self) -> float:
         generator = self._generator
         return max(posture.on_seat(generator.seating), generator.fall.on_ground)
 
     def _contacts(self) -> tuple[_Contact, _Contact]:
-        return self._contact(LEFT), self._contact(RIGHT)
+        """Both feet; worked out once for each moment of the generator."""
+        moment = self._generator.moment
+        if moment != self._moment:
+            self._moment, self._both = moment, (self._contact(LEFT), self._contact(RIGHT))
+        return self._both
 
     def _contact(self, side: int) -> _Contact:
         generator, outside = self._generator, 1.0 - 2.0 * side
@@ -151,7 +156,7 @@ class Wearer:
         contacts, support = self._contacts(), self._support()
         loads = [contact.load for contact in contacts]
         push = (1.0 - support) * sum(contact.shear for contact in contacts)
-        forward = GRAVITY * push + generator.stumble.acceleration + generator.fall.acceleration
+        forward = GRAVITY * push + generator.acceleration[0]
         aside = -GRAVITY * _SIDEWAYS * generator.walking * (1.0 - support) * (loads[LEFT] - loads[RIGHT])
         up = self._carried() / self.mass * ((1.0 - support) * sum(loads) + support) - GRAVITY
         cos, sin = math.cos(generator.heading), math.sin(generator.heading)

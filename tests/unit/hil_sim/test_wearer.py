@@ -9,7 +9,7 @@ import pytest
 from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.gaits import GAITS
 from hil_sim.gait.ground import level_humps, outward, vertical_grf
-from hil_sim.gait.subject import WearerSettings
+from hil_sim.gait.subject import NOMINAL_LEG_LENGTH, WearerSettings
 from hil_sim.gait.walk import Shape, stance_share
 from hil_sim.gait.wearer import GRAVITY
 from hil_sim.sensors.faults import InsoleFaults
@@ -91,17 +91,19 @@ def test_newton_holds_in_everything_that_is_no_gait() -> None:
 def test_the_acceleration_of_sitting_down_and_getting_up_takes_the_trunk_to_the_seat_and_back() -> None:
     moving = Moving()
 
-    def drop(activity: Activity) -> float:
-        height = speed = 0.0
+    def way(activity: Activity, axis: int) -> float:
+        place = speed = 0.0
         for moment in moving.do(activity, 3.0):
-            speed += moment.trunk.acceleration[2] * DT
-            height += speed * DT
+            speed += moment.trunk.acceleration[axis] * DT
+            place += speed * DT
         assert speed == pytest.approx(0.0, abs=0.01)
-        return height
+        return place
 
-    down = drop(Activity.SIT)
-    assert down == pytest.approx(-0.36, abs=0.04)  # a thigh of 0.40 m from upright to nearly level
-    assert drop(Activity.STAND) == pytest.approx(-down, abs=0.02)
+    thigh = NOMINAL_LEG_LENGTH / 2.0  # from upright to nearly level
+    assert way(Activity.SIT, axis=2) == pytest.approx(-0.9 * thigh, abs=0.04)
+    assert way(Activity.STAND, axis=2) == pytest.approx(0.9 * thigh, abs=0.04)
+    assert way(Activity.SIT, axis=0) == pytest.approx(-0.9 * thigh, abs=0.04)
+    assert way(Activity.STAND, axis=0) == pytest.approx(0.9 * thigh, abs=0.04)
 
 
 def test_getting_up_loads_the_feet_with_more_than_the_body() -> None:
