@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from drivers.bus.bus_state import BusState, bus_state
 from drivers.bus.frames import ERROR, FrameHandler, Transport
-from drivers.bus.master import NMT_COMMAND, NMT_START, MasterCycles
+from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.opening import open_transport
 from drivers.bus.settings import CanSettings, Role
 from drivers.bus.switching import FastSwitching
@@ -147,6 +147,13 @@ class CanBus:
         """
         if self.role is Role.MASTER:
             self.send(NMT_COMMAND, bytes([NMT_START, node_id]))
+
+    def stop_node(self, node_id: int) -> None:
+        """Stop a node (NMT), in either role: only ever to stop a drive. It answers no SDO then.
+
+        Raises `Unavailable`.
+        """
+        self.send(NMT_COMMAND, bytes([NMT_STOP, node_id]))
 
     def _set_handlers(self, can_id: int, handlers: tuple[FrameHandler, ...]) -> None:
         self._subscribers[can_id] = handlers

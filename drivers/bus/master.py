@@ -7,7 +7,7 @@ from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.settings import CanSettings
 
 NMT_COMMAND, SYNC = 0x000, 0x080
-NMT_START = 0x01
+NMT_START, NMT_STOP = 0x01, 0x02
 
 
 class MasterCycles(Cycles):

@@ -108,13 +108,11 @@ class Node(BusUser):
         """Write an object, once: `DeviceTimeout` means that nobody knows whether the device took it."""
         return self.worker.submit(lambda sdo: sdo.download(index, subindex, data, timeout_s))
 
-    def urgent_download(self, index: int, subindex: int, data: bytes) -> Future[None]:
-        """Write ahead of everything queued; ends our own transfer in flight."""
-        return self.worker.submit(lambda sdo: sdo.download(index, subindex, data), urgent=True)
-
-    def run(self, job: Callable[[SdoChannel], T], *, urgent: bool = False) -> Future[T]:
-        """Do several transfers in a row, nothing in between."""
-        return self.worker.submit(job, urgent=urgent)
+    def run(
+        self, job: Callable[[SdoChannel], T], *, urgent: bool = False, ahead: bytes | None = None
+    ) -> Future[T]:
+        """Do several transfers in a row, nothing in between; see `SdoWorker.submit`."""
+        return self.worker.submit(job, urgent=urgent, ahead=ahead)
 
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with the node now, in words with what to check; `None` when nothing is."""
@@ -212,6 +210,7 @@ class Node(BusUser):
 
     def _come_up(self, sdo: SdoChannel) -> None:
         sdo.upload(0x1000, 0, attempts=1, timeout_s=min(self._retry_s, self._times.sdo_timeout_s))
+        sdo.written.clear()
         self.findings = (*self._settings_findings(), *self._identity_findings(sdo))
         period_ms = self._optional(sdo, 0x1017, 0)
         self.life.expect_every(period_ms / 1000 if period_ms else self._guard_s)

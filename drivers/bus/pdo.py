@@ -11,8 +11,8 @@ from eds import Description
 TPDO_PARAMETER, TPDO_MAPPING = 0x1800, 0x1A00
 MAX_TPDOS = 512
 USUAL_TPDOS = 4  # tried where the EDS names none
-_NOT_VALID = 0x8000_0000
-_EXTENDED = 0x2000_0000
+NOT_VALID = 0x8000_0000  # in a COB-ID
+EXTENDED_ID = 0x2000_0000
 _MAX_ENTRIES = 64
 _MULTIPLEXED = (0xFE, 0xFF)  # MPDO: the number of entries says so
 
@@ -80,9 +80,9 @@ def read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | 
         cob_id = unsigned(sdo.upload(parameter, 1))
     except DeviceAbort:
         return None  # the EDS knows it, this device does not
-    enabled = not cob_id & _NOT_VALID
+    enabled = not cob_id & NOT_VALID
     transmission_type = unsigned(sdo.upload(parameter, 2)[:1])
-    extended = bool(cob_id & _EXTENDED)
+    extended = bool(cob_id & EXTENDED_ID)
     return Tpdo(
         number=number + 1,
         cob_id=cob_id & (0x1FFF_FFFF if extended else 0x7FF),
@@ -90,7 +90,7 @@ def read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | 
         enabled=enabled,
         transmission_type=transmission_type,
         event_timer_s=_event_timer_s(sdo, description, parameter) if transmission_type >= 254 else 0,
-        objects=_read_mapping(sdo, mapping) if enabled else (),
+        objects=read_mapping(sdo, mapping) if enabled else (),
     )
 
 
@@ -103,7 +103,8 @@ def _event_timer_s(sdo: SdoChannel, description: Description, parameter: int) ->
         return 0
 
 
-def _read_mapping(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...]:
+def read_mapping(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...]:
+    """The objects of a PDO, by the index of its mapping parameter; raises `DriverError`."""
     count = unsigned(sdo.upload(mapping, 0)[:1])
     if count in _MULTIPLEXED:
         return ()

@@ -17,6 +17,7 @@ _HEADER = struct.Struct("<BHB")
 _ABORT = 0x80
 _TOGGLE = 0x10
 _SEGMENT = 7
+_EXPEDITED = 4  # bytes that fit into the first request
 
 INVALID_COMMAND = 0x0504_0001
 OUT_OF_MEMORY = 0x0504_0005
@@ -75,13 +76,17 @@ def _upload_segments(index: int, subindex: int) -> Upload:
         toggle ^= _TOGGLE
 
 
+def expedited(index: int, subindex: int, data: bytes) -> bytes:
+    """The one request that writes an object of up to four bytes."""
+    return _HEADER.pack(0x23 | (_EXPEDITED - len(data)) << 2, index, subindex) + data.ljust(_EXPEDITED, b"\0")
+
+
 def download(index: int, subindex: int, data: bytes) -> Download:
     """Write an object: done when the device has confirmed the last byte."""
     if not data:
         raise ValueError(f"0x{index:04X}:{subindex:02X}: nothing to write")
-    if len(data) <= 4:
-        header = _HEADER.pack(0x23 | (4 - len(data)) << 2, index, subindex)
-        yield from _ask(header + data.ljust(4, b"\0"), index, subindex, 0x60)
+    if len(data) <= _EXPEDITED:
+        yield from _ask(expedited(index, subindex, data), index, subindex, 0x60)
         return
     header = _HEADER.pack(0x21, index, subindex)
     yield from _ask(header + struct.pack("<I", len(data)), index, subindex, 0x60)

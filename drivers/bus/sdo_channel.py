@@ -3,6 +3,7 @@
 A read that stays unanswered is repeated; a write never is, because the device may have taken it.
 """
 
+import contextlib
 import queue
 import threading
 import time
@@ -12,7 +13,7 @@ from typing import TypeVar
 
 from drivers.bus import sdo
 from drivers.bus.aborts import abort_text
-from drivers.errors import DeviceAbort, DeviceTimeout
+from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 
 T = TypeVar("T")
 
@@ -45,19 +46,37 @@ class SdoChannel:
         self.label = label
         self.timeout_s = timeout_s
         self.counters = SdoCounters()
+        self.written: dict[
+            tuple[int, int], bytes
+        ] = {}  # what each object was sent last, since the node came up
         self._send = send
         self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._interrupted = threading.Event()
+        self._sending = threading.Lock()  # so that nothing goes out behind what interrupted it
+        self._in_flight: tuple[int, int] | None = None  # the object that a transfer is about
+        self._ahead: bytes | None = None  # a request that went out before the job that waits for its answer
 
     def on_response(self, _stamp_ns: int, data: bytes) -> None:
         """A frame with the identifier of this channel's responses; called in the bus's thread."""
         if len(data) == 8:
             self._inbox.put(data)
 
-    def interrupt(self) -> None:
-        """End the transfer in flight, and refuse further ones until `resume`."""
-        self._interrupted.set()
-        self._inbox.put(None)
+    def interrupt(self, ahead: bytes | None = None) -> None:
+        """End the transfer in flight, refuse further ones until `resume`, and send a request `ahead`.
+
+        The job that comes next finds that request sent when it makes it, and waits for the answer.
+        """
+        with self._sending:
+            self._interrupted.set()
+            self._inbox.put(None)
+            self._ahead = None
+            with contextlib.suppress(Unavailable):  # whoever waits for an answer is told
+                if self._in_flight is not None:
+                    self._send(sdo.abort_request(*self._in_flight, sdo.GENERAL_ERROR))
+                if ahead is not None:
+                    self._send(ahead)
+                    self._ahead = ahead
+            self._in_flight = None
 
     def resume(self) -> None:
         """Allow transfers again."""
@@ -81,6 +100,7 @@ class SdoChannel:
         self._check_interrupted()
         what = f"{self.label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
         unknown = "whether the device took it is not known, read it back"
+        self.written[index, subindex] = data
         try:
             wait_s = timeout_s or self.timeout_s
             self._transfer(sdo.download(index, subindex, data), index, subindex, what, wait_s)
@@ -93,37 +113,50 @@ class SdoChannel:
         self, steps: Generator[bytes | None, bytes, T], index: int, subindex: int, what: str, timeout_s: float
     ) -> T:
         self._check_interrupted()
-        self._forget_stale()
+        if self._ahead is None:
+            self._forget_stale()
         self.counters.transfers += 1
         try:
-            return self._run(steps, timeout_s)
+            return self._run(steps, (index, subindex), timeout_s)
         except sdo.SdoAborted as error:
             self.counters.aborts += 1
             raise DeviceAbort(f"{what}: refused, {abort_text(error.abort_code)}", error.abort_code) from error
         except sdo.SdoProtocolError as error:
-            self._send(sdo.abort_request(index, subindex, error.abort_code))
+            self._abort(index, subindex, error.abort_code)
             raise SdoProtocolBroken(f"{what}: the device {error}, against the SDO protocol") from error
         except queue.Empty as error:
             self.counters.timeouts += 1
-            self._send(sdo.abort_request(index, subindex, sdo.TIMED_OUT))
+            self._abort(index, subindex, sdo.TIMED_OUT)
             raise DeviceTimeout(f"{what}: no answer within {timeout_s:g} s") from error
-        except Interrupted:
-            self._send(sdo.abort_request(index, subindex, sdo.GENERAL_ERROR))
-            raise
+        finally:
+            self._in_flight = None
 
-    def _run(self, steps: Generator[bytes | None, bytes, T], timeout_s: float) -> T:
+    def _run(self, steps: Generator[bytes | None, bytes, T], about: tuple[int, int], timeout_s: float) -> T:
         try:
             request = next(steps)
             while True:
                 if request is None:
                     self.counters.stale += 1
                 else:
-                    self._send(request)
+                    self._ask(request, about)
                     deadline = time.monotonic() + timeout_s
                 request = steps.send(self._response(deadline))
         except StopIteration as done:
             result: T = done.value
             return result
+
+    def _ask(self, request: bytes, about: tuple[int, int]) -> None:
+        with self._sending:
+            self._check_interrupted()
+            self._in_flight = about
+            if request != self._ahead:
+                self._send(request)
+            self._ahead = None
+
+    def _abort(self, index: int, subindex: int, abort_code: int) -> None:
+        with self._sending:
+            if not self._interrupted.is_set():  # else it was sent, and something else is in flight
+                self._send(sdo.abort_request(index, subindex, abort_code))
 
     def _response(self, deadline: float) -> bytes:
         """The next response; raises `queue.Empty` at the deadline and `Interrupted`."""

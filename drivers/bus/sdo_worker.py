@@ -70,16 +70,20 @@ class SdoWorker:
             self._thread.join()
             self._thread = None
 
-    def submit(self, job: Job[T], *, urgent: bool = False) -> Future[T]:
-        """Do `job` when its turn comes; the future's callbacks run in the worker's thread."""
+    def submit(self, job: Job[T], *, urgent: bool = False, ahead: bytes | None = None) -> Future[T]:
+        """Do `job` when its turn comes; the future's callbacks run in the worker's thread.
+
+        `ahead` is the first request of an urgent job: it is sent now, by the caller's thread, if no other
+        urgent job has the channel.
+        """
         task = _Task(0 if urgent else 1, next(self._numbers), job)
         with self._changed:
             if not self._open:
                 task.future.set_exception(self._closed())
                 return task.future
+            if urgent and not self._has_urgent():
+                self.channel.interrupt(ahead)
             heapq.heappush(self._tasks, task)
-            if urgent and self._running is not None and self._running.priority > 0:
-                self.channel.interrupt()
             self._changed.notify()
         return task.future
 
@@ -96,6 +100,10 @@ class SdoWorker:
                     self._repeated.remove(repeated)
 
         return end
+
+    def _has_urgent(self) -> bool:
+        waiting = bool(self._tasks) and self._tasks[0].priority == 0
+        return waiting or (self._running is not None and self._running.priority == 0)
 
     def _closed(self) -> Unavailable:
         return Unavailable(f"{self.channel.label}: its bus is not open, nothing can be asked of it")

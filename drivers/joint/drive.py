@@ -7,7 +7,6 @@ on quick stop. What no TPDO brings is polled by SDO.
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 
@@ -23,8 +22,8 @@ from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
 from drivers.joint.plan import Plan, Source, make_plan
-from drivers.joint.quantities import AXIS_OFFSET, POSITION, STATUSWORD, channels, quantities
-from drivers.joint.quick_stop import StopOutcome, quick_stop
+from drivers.joint.power import PowerDrive
+from drivers.joint.quantities import POSITION, STATUSWORD, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
 from drivers.joint.remap import disable, free_tpdo, remap
 from drivers.joint.settings import JointSettings
@@ -35,16 +34,15 @@ from eds import Description
 _IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
 
-class JointDrive:
-    """One joint by its name in the robot's file. Reads, and stops; it can never enable the drive."""
+class JointDrive(PowerDrive):
+    """One joint by its name in the robot's file."""
 
     kind = Kind.JOINT
 
     def __init__(self, name: str, settings: JointSettings, bus: CanBus, description: Description) -> None:
         """Raises `EdsError` where the file describes no such axis, `SettingsError` on a contradiction."""
+        super().__init__(shared_node(bus, settings.node_id, description, settings), settings)
         self.name = name
-        self.settings = settings
-        self.node = shared_node(bus, settings.node_id, description, settings)
         self._quantities = quantities(description, settings.axis)
         self.channels: tuple[Channel, ...] = channels(name, self._quantities)
         self.latest = Latest(name, self.channels, settings.stale_after_s)
@@ -76,16 +74,6 @@ class JointDrive:
             self._started = False
         self.node.detach(self)
         self.forget()
-
-    def quick_stop(self) -> Future[StopOutcome]:
-        """Ask the drive for a quick stop, ahead of everything else that is asked of its node.
-
-        The future's result says what the statusword confirmed within `stop_timeout_s`. Where the joint was
-        not started it fails with `Unavailable`.
-        """
-        return self.node.run(
-            lambda sdo: quick_stop(sdo, self._offset, self.settings.stop_timeout_s), urgent=True
-        )
 
     def quality(self, now_ns: int) -> Quality:
         """How far the joint's position can be trusted now, and what is wrong in words."""
@@ -120,6 +108,7 @@ class JointDrive:
             reading = read_drive(sdo, self._description, self.settings.axis)
             plan = make_plan(self.settings, self._quantities, reading)
             plan = replace(plan, notes=(told, *plan.notes))
+        self.read_stop_channel(sdo)
         with self._lock:
             self.forget()
             if self._started:
@@ -146,10 +135,6 @@ class JointDrive:
             return f"configure_pdos: {error}"
 
     # How values come.
-
-    @property
-    def _offset(self) -> int:
-        return self.settings.axis * AXIS_OFFSET
 
     def _install(self, plan: Plan) -> None:
         bus = self.node.bus

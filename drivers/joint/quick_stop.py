@@ -1,25 +1,23 @@
-"""Quick stop of one axis by SDO: asks for it, and answers only what the statusword confirms.
+"""Stops one axis by SDO: asks for it, and answers only what the statusword confirms.
 
-The controlword for quick stop is 0002h (enable voltage 1, quick stop 0, all else 0). It is sent without
-asking for the state first, because in no state can it enable the drive or reset a fault (CiA 402-2,
-transition events): from operation enabled it leads to quick stop active (transition 11), from switched on
-and ready to switch on to switch on disabled (10, 7); in every other state, and in an unknown one, it asks
-for nothing.
+A stop is asked for without knowing the state, because in no state can its controlwords enable the drive or
+reset a fault (`commands.py`). As long as the statusword does not say that the axis stops, it is asked again.
 """
 
 import time
+from collections.abc import Collection
 from enum import StrEnum
 
-from drivers.bus.sdo_channel import SdoChannel
-from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
-from drivers.joint.cia402 import DriveState, drive_state
-
-CONTROLWORD, STATUSWORD = 0x6040, 0x6041
-QUICK_STOP = (0x0002).to_bytes(2, "little")
+from drivers.joint.axis import Axis
+from drivers.joint.cia402 import DriveState
+from drivers.joint.commands import Controlword
 
 CONFIRMING_READS = 2  # another master may enable the drive again between two of its cycles
 READ_PERIOD_S = 0.01
+FIRST_PATIENCE_S = (
+    0.05  # for an answer before it is asked again; twice as long each time, up to the channel's
+)
 
 
 class StopOutcome(StrEnum):
@@ -30,43 +28,57 @@ class StopOutcome(StrEnum):
     UNREACHABLE = "unreachable"  # it does not answer
 
 
-# States in which the drive is braking or not driving, and cannot move on its own.
-STOPPED_STATES = frozenset({DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})
+class Stopping:
+    """One stop of one axis: `ask`, then `confirm`; neither raises for what the device does.
 
-
-def quick_stop(sdo: SdoChannel, axis_offset: int, timeout_s: float) -> StopOutcome:
-    """Stop the axis whose objects lie `axis_offset` above the first one's; never raises for the device.
-
-    As long as the statusword does not say that it stops, it is asked again.
+    Both are jobs of their own, so that the axes that share a node are all asked before one is waited for.
     """
-    deadline = time.monotonic() + timeout_s
-    answered = False
-    confirmed = 0
-    while time.monotonic() < deadline and confirmed < CONFIRMING_READS:
+
+    def __init__(
+        self, controlword: Controlword, confirmed_by: Collection[DriveState], timeout_s: float
+    ) -> None:
+        self._controlword = controlword
+        self._confirmed_by = confirmed_by
+        self._deadline = time.monotonic() + timeout_s
+        self._patience_s = FIRST_PATIENCE_S
+        self._answered = False
+        self._reads = 0
+
+    def ask(self, axis: Axis) -> None:
+        """Send the controlword; a refusal is an answer too, and the statusword may say why it need not."""
         try:
-            if not confirmed:
-                answered |= _ask(sdo, axis_offset)
-            statusword = unsigned(sdo.upload(STATUSWORD + axis_offset, 0, attempts=1)[:2])
-            answered = True
-            confirmed = confirmed + 1 if drive_state(statusword) in STOPPED_STATES else 0
+            axis.command(self._controlword, self._take_patience(axis))
+            self._answered = True
         except DeviceAbort:
-            answered = True
-        except DeviceTimeout:
-            confirmed = 0
-        except Unavailable:
-            break
-        time.sleep(min(READ_PERIOD_S, max(0.0, deadline - time.monotonic())))
-    if confirmed >= CONFIRMING_READS:
-        return StopOutcome.CONFIRMED
-    return StopOutcome.UNCONFIRMED if answered else StopOutcome.UNREACHABLE
+            self._answered = True
+        except (DeviceTimeout, Unavailable):
+            return
 
+    def confirm(self, axis: Axis) -> StopOutcome:
+        """What the statusword says until the time is over."""
+        while self._reads < CONFIRMING_READS and time.monotonic() < self._deadline:
+            try:
+                self._look(axis)
+            except DeviceAbort:
+                self._answered = True
+            except DeviceTimeout:
+                self._reads = 0
+            except Unavailable:
+                break
+            if not self._reads:
+                self.ask(axis)
+            time.sleep(min(READ_PERIOD_S, max(0.0, self._deadline - time.monotonic())))
+        if self._reads >= CONFIRMING_READS:
+            return StopOutcome.CONFIRMED
+        return StopOutcome.UNCONFIRMED if self._answered else StopOutcome.UNREACHABLE
 
-def _ask(sdo: SdoChannel, axis_offset: int) -> bool:
-    """Send the controlword; a refusal is an answer too, and the statusword may say why it need not stop."""
-    try:
-        sdo.download(CONTROLWORD + axis_offset, 0, QUICK_STOP)
-    except DeviceAbort:
-        return True
-    except DeviceTimeout:
-        return False
-    return True
+    def _look(self, axis: Axis) -> None:
+        state = axis.state(self._take_patience(axis))
+        self._answered = True
+        self._reads = self._reads + 1 if state in self._confirmed_by else 0
+
+    def _take_patience(self, axis: Axis) -> float:
+        patience_s = min(self._patience_s, axis.sdo.timeout_s)
+        if not self._answered:
+            self._patience_s *= 2
+        return patience_s

@@ -16,8 +16,8 @@ from drivers.bus.settings import DeviceSettings
 from drivers.bus.values import unsigned
 from drivers.errors import DriverError
 from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
+from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
-from drivers.joint.quick_stop import STATUSWORD
 from drivers.joint.settings import JointSettings
 from drivers.samples import State
 from gateway.coding import too_far

@@ -54,7 +54,7 @@ def test_reading_and_writing_an_object(bus: CanBus, channel: str, describe: Desc
         gait.start()
         assert gait.node.upload(0x2001, 0).result(WAIT_S) == b"\x90\x01"  # no more than an UNSIGNED16 has
         gait.node.download(0x2001, 0, b"\xa4\x01").result(WAIT_S)
-        gait.node.urgent_download(0x2001, 0, b"\xa5\x01").result(WAIT_S)
+        gait.node.run(lambda sdo: sdo.download(0x2001, 0, b"\xa5\x01"), urgent=True).result(WAIT_S)
         assert fake.writes == [(0x2001, 0, b"\xa4\x01"), (0x2001, 0, b"\xa5\x01")]
         gait.stop()
         with pytest.raises(Unavailable, match=r"gait.*not open|not open"):

@@ -4,9 +4,18 @@ import pytest
 
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.errors import Unavailable
-from drivers.joint.quick_stop import CONTROLWORD, STATUSWORD, StopOutcome, quick_stop
+from drivers.joint.axis import Axis
+from drivers.joint.commands import CONTROLWORD, STATUSWORD, STOPPED_STATES, Controlword
+from drivers.joint.quick_stop import StopOutcome, Stopping
 
 TIMEOUT_S = 0.3
+
+
+def quick_stop(channel: SdoChannel, axis_offset: int, timeout_s: float) -> StopOutcome:
+    stopping, axis = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, timeout_s), Axis(channel, axis_offset)
+    stopping.ask(axis)
+    return stopping.confirm(axis)
+
 
 # State machine of a drive (CiA 402-2): what controlword 0002h makes of each state, by statusword.
 AFTER_QUICK_STOP = {

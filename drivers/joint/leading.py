@@ -1,0 +1,136 @@
+"""Leads one axis from state to state: down to SWITCH ON DISABLED, or up, one transition at a time.
+
+Each step is taken from the state that the statusword says, and counts only when it says the next one. A stop
+ends either way: nothing is sent any more, and nothing is tried again.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from drivers.bus.sdo_channel import Interrupted
+from drivers.errors import DeviceTimeout, DriverError, Unavailable
+from drivers.joint.axis import Axis
+from drivers.joint.cia402 import DriveState
+from drivers.joint.commands import WAY_DOWN, WAY_UP
+from drivers.joint.setpoint import hold_still
+
+LOOK_S = 0.01  # between two looks at the statusword
+AGAIN_S = 0.5  # before a step down that had no effect is tried again
+STANDS_S, STANDS_COUNTS_SHARE = (
+    0.05,
+    1e-4,
+)  # an axis that moves less than this share of a turn meanwhile stands
+OVERTAKEN = "a stop came in between"
+_WAY_UP_STATES = (*WAY_UP, DriveState.OPERATION_ENABLED)
+
+
+@dataclass(frozen=True, slots=True)
+class Led:
+    """Where an axis was led: the state that its statusword said last, and why not further."""
+
+    state: DriveState | None
+    problem: str | None = None
+    mode: int | None = None  # of operation (6061h), where it was enabled
+
+
+@dataclass(frozen=True, slots=True)
+class Errand:
+    """What a way up or down needs to know; `wanted` turns false when a stop has overtaken it."""
+
+    wanted: Callable[[], bool]
+    timeout_s: float
+    counts_per_turn: float  # of the joint
+
+
+def lead_down(axis: Axis, errand: Errand) -> Led:
+    """To SWITCH ON DISABLED from any state; an axis that drives or brakes comes to rest before."""
+    return _Descent(axis, errand).run()
+
+
+def step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:
+    """From `origin` to the state that follows it; an axis that is further up already is left as it is."""
+    try:
+        return _step_up(axis, errand, origin)
+    except Interrupted:
+        return Led(None, OVERTAKEN)
+    except DriverError as error:
+        return Led(None, str(error) if errand.wanted() else OVERTAKEN)
+
+
+class _Descent:
+    """One way down; looks again and again until it has arrived, its time is over, or it is not wanted."""
+
+    def __init__(self, axis: Axis, errand: Errand) -> None:
+        self._axis = axis
+        self._errand = errand
+        self._led = Led(None, "it does not answer")
+        self._tried: DriveState | None = None
+        self._again_s = 0.0
+
+    def run(self) -> Led:
+        deadline = time.monotonic() + self._errand.timeout_s
+        while time.monotonic() < deadline and self._led.problem is not None:
+            if not self._errand.wanted():
+                return replace(self._led, problem=OVERTAKEN)
+            try:
+                self._look()
+            except DeviceTimeout:
+                self._led = Led(None, "it does not answer")
+            except Unavailable as error:
+                return Led(None, str(error))
+            except DriverError as error:
+                self._led = replace(self._led, problem=str(error))
+            time.sleep(LOOK_S)
+        return self._led
+
+    def _look(self) -> None:
+        state = self._axis.state()
+        if state is DriveState.SWITCH_ON_DISABLED:
+            self._led = Led(state)
+            return
+        words = "no state of CiA 402" if state is None else state.words
+        self._led = Led(state, f"it stays in {words}")
+        if state is not None and self._is_due(state):
+            self._tried, self._again_s = state, time.monotonic() + AGAIN_S
+            for controlword in WAY_DOWN.get(state, ()):
+                self._axis.command(controlword)
+
+    def _is_due(self, state: DriveState) -> bool:
+        """Not again too soon; and an axis that brakes is not let go limp."""
+        if state is self._tried and time.monotonic() < self._again_s:
+            return False
+        return state is not DriveState.QUICK_STOP_ACTIVE or self._stands()
+
+    def _stands(self) -> bool:
+        before = self._axis.position()
+        time.sleep(STANDS_S)
+        return abs(self._axis.position() - before) <= STANDS_COUNTS_SHARE * self._errand.counts_per_turn
+
+
+def _step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:
+    controlword, target = WAY_UP[origin]
+    state = axis.state()
+    if state in _WAY_UP_STATES[_WAY_UP_STATES.index(target) :]:
+        return Led(state)
+    mode = None
+    if state is origin and target is DriveState.OPERATION_ENABLED:
+        mode = hold_still(axis)
+        state = axis.state()
+    if state is not origin:
+        return Led(state, f"it is not in {origin.words}; reset it first")
+    if not errand.wanted():
+        return Led(state, OVERTAKEN)
+    axis.command(controlword)
+    return replace(_await(axis, errand, origin, target), mode=mode)
+
+
+def _await(axis: Axis, errand: Errand, origin: DriveState, target: DriveState) -> Led:
+    deadline = time.monotonic() + errand.timeout_s
+    state = axis.state()
+    while state is origin and time.monotonic() < deadline and errand.wanted():
+        time.sleep(LOOK_S)
+        state = axis.state()
+    if state is target:
+        return Led(state)
+    return Led(state, f"it did not go from {origin.words} to {target.words}")

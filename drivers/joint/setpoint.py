@@ -1,0 +1,46 @@
+"""Gives a drive the setpoint that moves nothing in the mode it is in (CiA 402-2: 607Ah, 60FFh, 6071h, …)."""
+
+from collections.abc import Mapping
+
+from drivers.errors import DriverError, Mismatch
+from drivers.joint.axis import POSITION_ACTUAL, Axis
+from drivers.joint.cia402 import MODES, option_text
+
+MODE_DISPLAY = 0x6061
+_WHERE_IT_IS, _ZERO = True, False
+
+# Modes of operation with the object of their setpoint: index, subindex, bytes, and what moves nothing there.
+SETPOINTS: Mapping[int, tuple[int, int, int, bool]] = {
+    1: (0x607A, 0, 4, _WHERE_IT_IS),  # profile position: target position
+    2: (0x6042, 0, 2, _ZERO),  # velocity: vl target velocity
+    3: (0x60FF, 0, 4, _ZERO),  # profile velocity: target velocity
+    4: (0x6071, 0, 2, _ZERO),  # profile torque: target torque
+    7: (0x60C1, 1, 4, _WHERE_IT_IS),  # interpolated position: first set-point
+    8: (0x607A, 0, 4, _WHERE_IT_IS),  # cyclic synchronous position
+    9: (0x60FF, 0, 4, _ZERO),  # cyclic synchronous velocity
+    10: (0x6071, 0, 2, _ZERO),  # cyclic synchronous torque
+}
+
+
+def hold_still(axis: Axis) -> int:
+    """Write it, read it back, and return the mode (6061h).
+
+    Raises `DriverError` where the mode has no setpoint that is known to move nothing, or the drive does not
+    confirm it: it must not be enabled then.
+    """
+    mode = int.from_bytes(axis.read(MODE_DISPLAY, 1), "little", signed=True)
+    if mode not in SETPOINTS:
+        raise DriverError(
+            f"{axis.sdo.label}: nobody knows what it would do in its mode of operation "
+            f"({option_text(MODES, mode)}, 6061h is {mode}); set another one in 6060h"
+        )
+    index, subindex, size, where_it_is = SETPOINTS[mode]
+    value = axis.read(POSITION_ACTUAL, size) if where_it_is else bytes(size)
+    axis.write(index, value, subindex)
+    held = axis.read(index, size, subindex)
+    if held != value:
+        raise Mismatch(
+            f"{axis.sdo.label}: 0x{index + axis.offset:04X}:{subindex:02X} holds {held.hex(' ')} after "
+            f"{value.hex(' ')} was written, so its setpoint would move it"
+        )
+    return mode
