@@ -82,7 +82,7 @@ def described(
         index,
         subindex,
         variable.data_type or 0,
-        (variable.access_type or "").lower(),
+        variable.access_type.lower(),
         max((limit for limit in (low, eds_low) if limit is not None), default=None),
         min((limit for limit in (high, eds_high) if limit is not None), default=None),
         description.has(STORE, 1),
