@@ -9,10 +9,10 @@ import random
 
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus
-from hil_sim.clock import MILLISECOND_NS, Clock, Repeating
+from hil_sim.clock import MILLISECOND_NS, Clock
 from hil_sim.controller import objects
 from hil_sim.controller.drives import ENABLE_OPERATION, QUICK_STOP, Seen, first
-from hil_sim.controller.objects import COMMANDING, CYCLE_PERIOD, ControllerState
+from hil_sim.controller.objects import COMMANDING, ControllerState
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.generator import Generator
 from hil_sim.gait.profiles import smooth
@@ -20,9 +20,9 @@ from hil_sim.gait.subject import NOMINAL, WearerSettings
 from hil_sim.gait.walk import Shape
 from hil_sim.node.dictionary import Value
 from hil_sim.node.nmt import NMT_COB_ID, NmtService, NmtState
-from hil_sim.node.node import SYNC, Node
+from hil_sim.node.node import Node
+from hil_sim.node.sync import CYCLE_PERIOD
 
-_SYNC_PRODUCER = 1 << 30
 _CYCLIC_SYNCHRONOUS_POSITION = 8
 _ENABLING_NS = 5000 * MILLISECOND_NS
 _TAKE_OVER_S = 1.0  # how long the way from where the joints are to the motion takes
@@ -54,7 +54,6 @@ class GaitController(Node):
         self._since_ns = 0
         self._offsets = [0.0] * len(joints)
         self._taken_over_s = 0.0
-        self._sync_timer: Repeating | None = None
         self.generator = Generator(self._shape(), wearer, source)
         self._bind()
 
@@ -65,7 +64,6 @@ class GaitController(Node):
         dictionary[objects.HOLDER].source = lambda: self._holder
         dictionary[objects.COMMAND].source = lambda: int(self.controller_state in COMMANDING)
         dictionary[objects.COMMAND].on_write = self._command
-        dictionary[CYCLE_PERIOD].on_write = lambda period_us: self._start_sync(int(period_us))
         for number, seen in enumerate(self._drives, 1):
             dictionary[objects.STATUSWORDS, number].on_write = seen.take
 
@@ -89,13 +87,11 @@ class GaitController(Node):
     def _on_reset(self) -> None:
         self.controller_state = ControllerState.IDLE
         self._holder = 0
-        self._stop_sync()
         self.generator.reset(self._shape())
 
     def _on_booted(self) -> None:
         self.send(NMT_COB_ID, bytes([NmtService.START, 0]))
         self._enter(NmtState.OPERATIONAL)
-        self._start_sync(self.dictionary[CYCLE_PERIOD].number())
         self._go(ControllerState.STARTING)
 
     def _on_heartbeat(self, node_id: int, state: int) -> None:
@@ -112,21 +108,6 @@ class GaitController(Node):
         super()._heartbeat_lost(node_id)
         if self.controller_state in COMMANDING:
             self._hold(node_id)
-
-    def _start_sync(self, period_us: int) -> None:
-        self._stop_sync()
-        if self.dictionary[SYNC].number() & _SYNC_PRODUCER and period_us:
-            self._sync_timer = self.clock.every(period_us * 1000, self._cycle)
-
-    def _stop_sync(self) -> None:
-        if self._sync_timer is not None:
-            self._sync_timer.cancel()
-            self._sync_timer = None
-
-    def _cycle(self) -> None:
-        if self.state is not NmtState.STOPPED:
-            self.send(self.dictionary[SYNC].number() & 0x7FF, b"")
-            self.synchronise()
 
     # -- the controller's own states -----------------------------------------------------------------------
 

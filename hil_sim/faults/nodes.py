@@ -9,9 +9,7 @@ from hil_sim.faults.fault import Fault, FaultRefused, Form, Number, Site, Target
 from hil_sim.faults.frames import disturbed_by, disturbing
 from hil_sim.node.nmt import HEARTBEAT_BASE, NMT_COB_ID, NmtService
 from hil_sim.node.node import BOOT_TIME_NS, Node
-from hil_sim.node.pdo import PDO_COUNT, TPDO_COMMUNICATION
 
-_COB_ID = 0x7FF
 _RECOVERED_FROM_BUS_OFF = 0x8140  # CiA 301 table 26
 _TRANSMIT_ERROR, _BUS_OFF = 8, 256  # ISO 11898-1: the transmit error counter, and where it ends
 
@@ -77,14 +75,7 @@ def _heartbeat_missing(site: Site) -> _Silent:
 
 
 def _tpdo_silent(site: Site) -> _Silent:
-    return _Silent(site.node, tpdo_cob_ids(site.node))
-
-
-def tpdo_cob_ids(node: Node) -> frozenset[int]:
-    """The identifiers on which a device sends PDOs, as its objects 1800h … say now."""
-    first, dictionary = TPDO_COMMUNICATION, node.dictionary
-    indices = dictionary.indices(first, first + PDO_COUNT - 1)
-    return frozenset(dictionary[index, 1].number() & _COB_ID for index in indices)
+    return _Silent(site.node, site.node.tpdo_cob_ids())
 
 
 class _BusOff(Disturbance):

@@ -5,21 +5,9 @@ from hil_sim.clock import MILLISECOND_NS
 from hil_sim.faults.fault import Fault, Form, Number, Site, Target
 from hil_sim.faults.frames import disturbed_by
 from hil_sim.node.nmt import COMMUNICATING
-from hil_sim.node.node import SDO_SERVERS, Node
 
-_COB_ID, _INVALID = 0x7FF, 1 << 31
 _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6  # client command specifiers that begin a write (CiA 301 §7.2.4.3)
 _BLOCK_SUBCOMMAND = 1
-
-
-def sdo_channels(node: Node) -> dict[int, int]:
-    """The device's SDO servers as its objects 1200h … say: request to response identifier."""
-    found = {}
-    for index in node.dictionary.indices(*SDO_SERVERS):
-        request, response = (node.dictionary[index, number].number() for number in (1, 2))
-        if not (request | response) & _INVALID:
-            found[request & _COB_ID] = response & _COB_ID
-    return found
 
 
 class _Answers(Disturbance):
@@ -28,7 +16,7 @@ class _Answers(Disturbance):
     def __init__(self, site: Site) -> None:
         self._site = site
         self._node = site.node
-        self._responses = frozenset(sdo_channels(site.node).values())
+        self._responses = frozenset(site.node.sdo_channels().values())
 
     def leaves(self, frame: Frame, sender: object, /) -> bool:
         return sender is not self._node or frame.cob_id not in self._responses or self._answer(frame)
@@ -60,7 +48,7 @@ class _Abort(Disturbance):
     def __init__(self, site: Site) -> None:
         self._site = site
         self._node = site.node
-        self._channels = sdo_channels(site.node)
+        self._channels = site.node.sdo_channels()
         self._writes = 0
 
     def arrives(self, frame: Frame, _sender: object, receiver: object, /) -> bool:

@@ -1,64 +1,56 @@
 """The living object dictionary of a device: values with their type, access and limits (CiA 301 §7.4)."""
 
-import struct
 from collections.abc import Callable, Iterator
 
 from canopen.objectdictionary import ODVariable
 
 from eds.datatypes import DATA_TYPES
 from eds.description import Description
+from hil_sim.node import coding
 from hil_sim.node.abort import AbortCode, SdoAbort
+from hil_sim.node.coding import Value as Value
 
-Value = int | float | str | bytes
 Key = tuple[int, int]
 
-_REAL_FORMATS = {32: "<f", 64: "<d"}
+_FIRST_OBJECT = 0x20  # below are data types, which only take room in a PDO
 
 
 class Entry:
     """One object: `value`, or what `source` says when the value is made at the moment of reading.
 
-    `on_write` is asked before a new value is taken and may raise `SdoAbort`.
+    `on_write` is asked before a new value is taken and may raise `SdoAbort`; `on_written` is told after.
     """
 
     __slots__ = (
         "access",
-        "bits",
+        "commissioned",
+        "data_type",
         "default",
         "high",
         "key",
-        "kind",
         "low",
         "mappable",
         "on_write",
+        "on_written",
         "source",
         "value",
     )
 
     def __init__(self, variable: ODVariable) -> None:
-        data_type = DATA_TYPES[variable.data_type or 0x07]
         self.key: Key = (variable.index, variable.subindex)
-        self.kind = data_type.kind
-        self.bits = data_type.bits
+        self.data_type = DATA_TYPES[variable.data_type or 0x07]
         self.access = variable.access_type.lower()
         self.mappable = bool(variable.pdo_mappable)
-        self.low = variable.min
-        self.high = variable.max
-        self.default: Value = self._default(variable.default)
-        self.value: Value = self.default
+        self.low, self.high = variable.min, variable.max
+        if self.data_type.kind == "boolean":
+            self.low, self.high = 0, 1
+        given: Value | None = variable.default
+        self.commissioned: Value | None = variable.value  # what a DCF sets the device to
+        self.default: Value = coding.empty(self.data_type) if given is None else given
+        self.value: Value = self.default if self.commissioned is None else self.commissioned
         self.source: Callable[[], Value] | None = None
         self.on_write: Callable[[Value], None] | None = None
-
-    def _default(self, given: Value | None) -> Value:
-        if given is not None:
-            return given
-        empty: dict[str, Value] = {"text": "", "bytes": b"", "real": 0.0}
-        return empty.get(self.kind, 0)
-
-    @property
-    def size(self) -> int | None:
-        """Bytes of a value, `None` where the length varies."""
-        return None if self.bits is None else (self.bits + 7) // 8
+        self.on_written: Callable[[], None] | None = None
 
     @property
     def readable(self) -> bool:
@@ -79,39 +71,12 @@ class Entry:
         return value
 
     def encode(self) -> bytes:
-        """The value as it travels: little-endian, integers saturated to their type."""
-        value = self.get()
-        if isinstance(value, bytes):
-            return value
-        if isinstance(value, str):
-            return value.encode("latin-1", errors="replace")
-        if self.kind == "real":
-            return struct.pack(_REAL_FORMATS[self.bits or 32], value)
-        return self._saturate(int(value)).to_bytes(self.size or 4, "little", signed=self.kind == "signed")
-
-    def _saturate(self, value: int) -> int:
-        bits = self.bits or 32
-        signed = self.kind == "signed"
-        low = -(1 << bits - 1) if signed else 0
-        high = (1 << (bits - 1 if signed else bits)) - 1
-        return min(max(value, low), high)
-
-    def decode(self, data: bytes) -> Value:
-        """A value from the wire; raises `SdoAbort` on the wrong length."""
-        if self.size is not None and len(data) != self.size:
-            raise SdoAbort(AbortCode.TOO_LONG if len(data) > self.size else AbortCode.TOO_SHORT)
-        if self.kind == "text":
-            return data.decode("latin-1")
-        if self.kind == "bytes":
-            return data
-        if self.kind == "real":
-            (value,) = struct.unpack(_REAL_FORMATS[self.bits or 32], data)
-            return float(value)
-        return int.from_bytes(data, "little", signed=self.kind == "signed")
+        """The value as it travels."""
+        return coding.encode(self.data_type, self.get())
 
     def write(self, data: bytes) -> None:
         """Take a value from the wire after every check that a device makes; raises `SdoAbort`."""
-        value = self.decode(data)
+        value = coding.decode(self.data_type, data)
         if not isinstance(value, str | bytes):
             if self.high is not None and value > self.high:
                 raise SdoAbort(AbortCode.TOO_HIGH)
@@ -120,10 +85,12 @@ class Entry:
         if self.on_write is not None:
             self.on_write(value)
         self.value = value
+        if self.on_written is not None:
+            self.on_written()
 
 
 class Dictionary:
-    """All objects of one device."""
+    """All objects of one device; `dummies` are the data types that a PDO may map to take room."""
 
     def __init__(self, description: Description) -> None:
         self._entries: dict[Key, Entry] = {}
@@ -131,6 +98,8 @@ class Dictionary:
             members = [item] if isinstance(item, ODVariable) else item.subindices.values()
             for variable in members:
                 self._entries[variable.index, variable.subindex] = Entry(variable)
+        dummies = [key for key in self._entries if key[0] < _FIRST_OBJECT]
+        self.dummies = {key: self._entries.pop(key).data_type.bits for key in dummies}
         self._indices = frozenset(index for index, _ in self._entries)
 
     def __getitem__(self, key: Key) -> Entry:
@@ -141,6 +110,15 @@ class Dictionary:
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self._entries.values())
+
+    def get(self, key: Key) -> Entry | None:
+        """The entry, `None` where the device has none."""
+        return self._entries.get(key)
+
+    def number(self, key: Key, otherwise: int = 0) -> int:
+        """The integer that an object holds, `otherwise` where the device has no such object."""
+        entry = self._entries.get(key)
+        return otherwise if entry is None else entry.number()
 
     def members(self, index: int) -> list[Entry]:
         """The entries of one object, sub-index 0 first; empty where the device has none."""
@@ -159,6 +137,13 @@ class Dictionary:
             raise SdoAbort(AbortCode.NO_SUCH_SUBINDEX)
         return entry
 
+    def find_writable(self, index: int, subindex: int) -> Entry:
+        """The object of an SDO download; raises `SdoAbort`."""
+        entry = self.find(index, subindex)
+        if not entry.writable:
+            raise SdoAbort(AbortCode.READ_ONLY)
+        return entry
+
     def read(self, index: int, subindex: int) -> bytes:
         """What an SDO upload gives; raises `SdoAbort`."""
         entry = self.find(index, subindex)
@@ -168,7 +153,4 @@ class Dictionary:
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """What an SDO download does; raises `SdoAbort`."""
-        entry = self.find(index, subindex)
-        if not entry.writable:
-            raise SdoAbort(AbortCode.READ_ONLY)
-        entry.write(data)
+        self.find_writable(index, subindex).write(data)

@@ -31,7 +31,12 @@ STATE_AFTER: dict[int, NmtState] = {
     NmtService.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
 }
 
-# 1029h: what an operational device enters on a communication error; 1 changes nothing (CiA 301 §7.5.2.32).
+# 1F80h: a device with neither bit 0 (it leads the network) nor bit 2 (it waits for who does) starts itself.
+STARTUP = (0x1F80, 0)
+LEADS_OR_WAITS = 0b101
+
+# 1029h:1: what an operational device enters on a communication error; 1 changes nothing (CiA 301 §7.5.2.32).
+ERROR_BEHAVIOUR = (0x1029, 1)
 STATE_AFTER_ERROR: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 
 # CiA 301 table 38: SDO, SYNC and EMCY live in PRE-OPERATIONAL and OPERATIONAL, PDOs in OPERATIONAL alone.

@@ -1,28 +1,29 @@
-"""One CANopen device on the simulated bus: boot, NMT, SDO, PDOs, EMCY and heartbeat of CiA 301."""
+"""One CANopen device on the simulated bus: power, NMT, error control, and who gets which frame (CiA 301)."""
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.clock import MILLISECOND_NS, Clock
 from hil_sim.node import nmt, pdo
 from hil_sim.node.dictionary import Dictionary, Key
-from hil_sim.node.emergency import Emergencies
+from hil_sim.node.emergency import ALL_ERRORS, COMMUNICATION_ERRORS, Emergencies
+from hil_sim.node.guarding import Guarding
 from hil_sim.node.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from hil_sim.node.nmt import NmtService, NmtState
+from hil_sim.node.pdos import Pdos
 from hil_sim.node.sdo import SdoServer
+from hil_sim.node.sdo_channel import SdoChannels
 from hil_sim.node.storage import COMMUNICATION, EVERYTHING, Storage
+from hil_sim.node.sync import Sync
 
 BOOT_TIME_NS = 50 * MILLISECOND_NS
-SYNC = (0x1005, 0)
-SDO_SERVERS = (0x1200, 0x127F)
 
-COMMUNICATION_ERROR_BEHAVIOUR = (0x1029, 1)
-EMCY_PDO_TOO_SHORT = 0x8210
-EMCY_HEARTBEAT_LOST = 0x8130
+EMCY_LIFE_SIGN_LOST = 0x8130  # of node guarding, and of a watched heartbeat
+EMCY_SYNC_LENGTH = 0x8240
 
-_INVALID = 1 << 31
-_COB_ID = 0x7FF
+Handler = Callable[[Frame], None]
 
 
 class Node:
@@ -32,26 +33,28 @@ class Node:
         self.clock = clock
         self.name = name
         self.node_id = node_id
-        self.dictionary = Dictionary(description)
+        self.dictionary = dictionary = Dictionary(description)
+        self.storage = Storage(dictionary)
         self.state = NmtState.INITIALISING
         self.powered = False
         self._bus = bus
-        self._emergencies = Emergencies(self.dictionary, self._send_communicating)
-        self._heartbeat = HeartbeatProducer(clock, self.dictionary, self._send_heartbeat)
-        self._consumer = HeartbeatConsumer(clock, self.dictionary, self._heartbeat_lost)
-        self._storage = Storage(self.dictionary)
-        self._tpdos: list[pdo.Tpdo] = []
-        self._rpdos: list[pdo.Rpdo] = []
-        self._handlers: dict[int, Callable[[Frame], None]] = {}
         self._boots = 0
-        pdo.guard_configuration(self.dictionary, self._configure_soon)
-        self._reconfigure_on_write()
+        self._handlers: dict[int, list[Handler]] = {}
+        self._emergencies = Emergencies(clock, dictionary, self.send, self._communicates)
+        self._heartbeat = HeartbeatProducer(clock, dictionary, self._send_heartbeat)
+        self._consumer = HeartbeatConsumer(clock, dictionary, self._heartbeat_lost, self._heartbeat_back)
+        self._guarding = Guarding(clock, dictionary, self._send_state, self._guard_lost, self._guard_back)
+        self._sync = Sync(clock, dictionary, self.send, self._synchronise, self._wrong_sync, self._listen)
+        self._pdos = Pdos(clock, dictionary, self.send, self._rpdo_error, self._listen)
+        self._sdo = SdoChannels(clock, dictionary, node_id, self.send, self._listen)
 
-    # -- power -----------------------------------------------------------------------------------------
+    # -- power and boot --------------------------------------------------------------------------------
 
     def power_on(self, boot_ns: int = BOOT_TIME_NS) -> None:
         """Switch the device on; it says so on the bus when it has booted."""
         self.powered = True
+        self.storage.load()
+        self._emergencies.forget()
         self._bus.attach(self, self._receive)
         self._boot(EVERYTHING, boot_ns)
 
@@ -60,15 +63,15 @@ class Node:
         self.powered = False
         self._boots += 1
         self._bus.detach(self)
-        self._silence()
+        self._fall_silent()
         self.state = NmtState.INITIALISING
         self._on_reset()
 
     def _boot(self, objects: range, boot_ns: int) -> None:
-        self._silence()
         self._enter(NmtState.INITIALISING)
-        self._storage.restore(objects)
-        self._emergencies.reset()
+        self._fall_silent()
+        self.storage.restore(objects)
+        self._emergencies.reset(ALL_ERRORS if objects is EVERYTHING else COMMUNICATION_ERRORS)
         if objects is EVERYTHING:
             self._on_reset()
         self._boots += 1
@@ -76,17 +79,21 @@ class Node:
         self.clock.after(boot_ns, lambda: self._booted() if boot == self._boots else None)
 
     def _booted(self) -> None:
-        self._configure()
+        self._pdos.load()
+        self._listen()
         self._send_heartbeat()
         self._enter(NmtState.PRE_OPERATIONAL)
         self._heartbeat.start()
         self._on_booted()
+        if not self.dictionary.number(nmt.STARTUP, nmt.LEADS_OR_WAITS) & nmt.LEADS_OR_WAITS:
+            self._enter(NmtState.OPERATIONAL)
 
-    def _silence(self) -> None:
+    def _fall_silent(self) -> None:
         self._heartbeat.stop()
         self._consumer.stop()
-        for tpdo in self._tpdos:
-            tpdo.stop()
+        self._guarding.reset()
+        self._stop_communicating()
+        self._pdos.stop()
         self._handlers = {}
 
     # -- what a profile adds ---------------------------------------------------------------------------
@@ -107,38 +114,17 @@ class Node:
         """Another node has booted (`state` 0) or shown its heartbeat."""
 
     def _on_communication_lost(self) -> None:
-        """A watched heartbeat stayed away."""
+        """The bus is gone, or a life sign stayed away; the NMT state is still the one before."""
 
-    # -- the bus ---------------------------------------------------------------------------------------
+    # -- for the profile -------------------------------------------------------------------------------
 
-    def send(self, cob_id: int, data: bytes) -> None:
-        self._bus.send(Frame(cob_id, data), self)
-
-    def _send_communicating(self, cob_id: int, data: bytes) -> None:
-        if self.state in nmt.COMMUNICATING:
-            self.send(cob_id, data)
-
-    def _send_heartbeat(self) -> None:
-        self.send(nmt.HEARTBEAT_BASE + self.node_id, bytes([self.state]))
-
-    def _receive(self, frame: Frame, _sender: object) -> None:
-        handler = self._handlers.get(frame.cob_id)
-        if handler is not None and not frame.extended:
-            handler(frame)
+    def send(self, identifier: int, data: bytes) -> None:
+        if self.powered:  # it may have been switched off by what it is just answering
+            self._bus.send(Frame(identifier, data), self)
 
     def object_changed(self, key: Key) -> None:
         """Tell event-driven PDOs that an object they carry has another value."""
-        if self.state is NmtState.OPERATIONAL:
-            for tpdo in self._tpdos:
-                tpdo.changed(key)
-
-    def bus_off(self) -> None:
-        """The device's CAN controller has left the bus: it acts as 1029h and its profile say."""
-        key = COMMUNICATION_ERROR_BEHAVIOUR
-        behaviour = self.dictionary[key].number() if key in self.dictionary else 0
-        if self.state is NmtState.OPERATIONAL and behaviour in nmt.STATE_AFTER_ERROR:
-            self._enter(nmt.STATE_AFTER_ERROR[behaviour])
-        self._on_communication_lost()
+        self._pdos.changed(key)
 
     def emergency(self, code: int, vendor: bytes = b"") -> None:
         self._emergencies.occurred(code, vendor)
@@ -146,84 +132,72 @@ class Node:
     def emergency_over(self) -> None:
         self._emergencies.end_all()
 
-    # -- configuration from the dictionary ---------------------------------------------------------------
+    def bus_off(self) -> None:
+        """The device's CAN controller has left the bus: it acts as 1029h and its profile say."""
+        self._communication_error()
 
-    def _reconfigure_on_write(self) -> None:
-        """SYNC and SDO channels listen where their objects say, from the moment that is written."""
-        servers = [self.dictionary.members(index)[1:3] for index in self.dictionary.indices(*SDO_SERVERS)]
-        for entry in (self.dictionary[SYNC], *(entry for server in servers for entry in server)):
-            entry.on_write = lambda _: self._configure_soon()
+    # -- for who disturbs it -----------------------------------------------------------------------------
 
-    def _configure_soon(self) -> None:
-        """Configure when the write that asked for it has been taken into the dictionary."""
-        self.clock.at(self.clock.now_ns, self._configure)
+    def sdo_channels(self) -> dict[int, int]:
+        """The SDO servers as they listen now: identifier of the requests to that of the answers."""
+        return {channel.request: channel.response for channel in self._sdo.channels()}
 
-    def _configure(self) -> None:
-        for tpdo in self._tpdos:
-            tpdo.stop()
-        count = pdo.PDO_COUNT - 1
-        tpdo_indices = self.dictionary.indices(pdo.TPDO_COMMUNICATION, pdo.TPDO_COMMUNICATION + count)
-        rpdo_indices = self.dictionary.indices(pdo.RPDO_COMMUNICATION, pdo.RPDO_COMMUNICATION + count)
-        self._tpdos = [
-            pdo.Tpdo(self.clock, self.dictionary, index - pdo.TPDO_COMMUNICATION, self.send)
-            for index in tpdo_indices
-        ]
-        self._rpdos = [
-            pdo.Rpdo(self.dictionary, index - pdo.RPDO_COMMUNICATION, self._rpdo_too_short)
-            for index in rpdo_indices
-        ]
-        self._handlers = dict(self._all_handlers())
-        if self.state is NmtState.OPERATIONAL:
-            self._start_tpdos()
+    def tpdo_cob_ids(self) -> frozenset[int]:
+        """The identifiers on which the device sends PDOs now."""
+        return frozenset(tpdo.cob_id for tpdo in self._pdos.sent)
 
-    def _all_handlers(self) -> list[tuple[int, Callable[[Frame], None]]]:
-        heartbeats = [nmt.HEARTBEAT_BASE + node for node in range(1, 128) if node != self.node_id]
-        return [
-            *((cob_id, self._heartbeat_received) for cob_id in heartbeats),
-            *((rpdo.cob_id, self._rpdo_handler(rpdo)) for rpdo in self._rpdos if rpdo.valid),
-            *((tpdo.cob_id, self._remote_handler(tpdo)) for tpdo in self._tpdos if tpdo.valid),
-            *self._sdo_handlers(),
-            (self.dictionary[SYNC].number() & _COB_ID, self._sync_received),
-            (nmt.NMT_COB_ID, self._nmt_received),
-        ]
+    # -- the bus ---------------------------------------------------------------------------------------
 
-    def _sdo_handlers(self) -> list[tuple[int, Callable[[Frame], None]]]:
-        handlers = []
-        for index in self.dictionary.indices(*SDO_SERVERS):
-            request, response = (self.dictionary[index, number].number() for number in (1, 2))
-            if not (request | response) & _INVALID:
-                handlers.append((request & _COB_ID, self._sdo_handler(response & _COB_ID)))
-        return handlers
+    def _receive(self, frame: Frame, _sender: object) -> None:
+        if not frame.extended:
+            for handle in tuple(self._handlers.get(frame.cob_id, ())):
+                handle(frame)
 
-    def _sdo_handler(self, response_cob_id: int) -> Callable[[Frame], None]:
-        server = SdoServer(self.dictionary)
+    def _listen(self) -> None:
+        """Find out which frames are for this device, and what each is."""
+        handlers = defaultdict(list)
+        for identifier, handler in self._all_handlers():
+            handlers[identifier].append(handler)
+        self._handlers = handlers
 
+    def _all_handlers(self) -> Iterator[tuple[int, Handler]]:
+        yield nmt.NMT_COB_ID, self._nmt_received
+        yield self._sync.cob_id, self._sync_received
+        for node_id in range(1, 128):
+            handler = self._guard_received if node_id == self.node_id else self._heartbeat_received
+            yield nmt.HEARTBEAT_BASE + node_id, handler
+        for channel in self._sdo.channels():
+            yield channel.request, self._sdo_handler(channel.server)
+        for rpdo in self._pdos.received:
+            yield rpdo.cob_id, self._rpdo_handler(rpdo)
+        for tpdo in self._pdos.sent:
+            yield tpdo.cob_id, self._remote_handler(tpdo)
+
+    def _sdo_handler(self, server: SdoServer) -> Handler:
         def handle(frame: Frame) -> None:
-            if self.state in nmt.COMMUNICATING and not frame.remote:
-                response = server.respond(frame.data)
-                if response is not None:
-                    self.send(response_cob_id, response)
+            if self._communicates() and not frame.remote:
+                server.receive(frame.data)
 
         return handle
 
-    def _rpdo_handler(self, rpdo: pdo.Rpdo) -> Callable[[Frame], None]:
+    def _rpdo_handler(self, rpdo: pdo.Rpdo) -> Handler:
         def handle(frame: Frame) -> None:
             if self.state is NmtState.OPERATIONAL and not frame.remote:
                 rpdo.receive(frame.data)
 
         return handle
 
-    def _remote_handler(self, tpdo: pdo.Tpdo) -> Callable[[Frame], None]:
+    def _remote_handler(self, tpdo: pdo.Tpdo) -> Handler:
         def handle(frame: Frame) -> None:
             if self.state is NmtState.OPERATIONAL and frame.remote:
                 tpdo.requested()
 
         return handle
 
-    # -- services --------------------------------------------------------------------------------------
+    # -- NMT -------------------------------------------------------------------------------------------
 
     def _nmt_received(self, frame: Frame) -> None:
-        if len(frame.data) < 2 or frame.data[1] not in (0, self.node_id):
+        if len(frame.data) != 2 or frame.data[1] not in (0, self.node_id):
             return
         service = frame.data[0]
         if service in nmt.STATE_AFTER:
@@ -237,41 +211,84 @@ class Node:
         before, self.state = self.state, state
         if state is before:
             return
-        for tpdo in self._tpdos:
-            tpdo.stop()
+        if before is NmtState.OPERATIONAL:
+            self._pdos.stop()
+        if state not in nmt.COMMUNICATING:
+            self._stop_communicating()
+        elif before not in nmt.COMMUNICATING:
+            self._sync.start()
         if state is NmtState.OPERATIONAL:
-            self._start_tpdos()
+            self._pdos.start()
         self._on_state(before)
 
-    def _start_tpdos(self) -> None:
-        for tpdo in self._tpdos:
-            tpdo.start()
+    def _communicates(self) -> bool:
+        return self.state in nmt.COMMUNICATING
 
-    def _sync_received(self, _frame: Frame) -> None:
-        self.synchronise()
+    def _stop_communicating(self) -> None:
+        self._sync.stop()
+        self._emergencies.silence()
+        self._sdo.reset()
 
-    def synchronise(self) -> None:
+    # -- SYNC and PDOs ---------------------------------------------------------------------------------
+
+    def _sync_received(self, frame: Frame) -> None:
+        if self._communicates() and not frame.remote:
+            self._sync.received(frame.data)
+
+    def _wrong_sync(self) -> None:
+        self._emergencies.occurred(EMCY_SYNC_LENGTH)
+
+    def _synchronise(self, counter: int | None) -> None:
         """What a SYNC does: received PDOs take effect, then those to send are sampled."""
+        self._emergencies.ended(EMCY_SYNC_LENGTH)
         operational = self.state is NmtState.OPERATIONAL
         if operational:
-            for rpdo in self._rpdos:
-                rpdo.synchronise()
-        if self.state in nmt.COMMUNICATING:
-            self._on_sync()
+            self._pdos.take()
+        self._on_sync()
         if operational:
-            for tpdo in self._tpdos:
-                tpdo.synchronise()
+            self._pdos.synchronise(counter)
+
+    def _rpdo_error(self, number: int, code: int, present: bool) -> None:
+        change = self._emergencies.occurred if present else self._emergencies.ended
+        change(code, (number + 1).to_bytes(2, "little"))
+
+    # -- error control ---------------------------------------------------------------------------------
+
+    def _send_heartbeat(self) -> None:
+        self._send_state(bytes([self.state]))
+
+    def _send_state(self, data: bytes) -> None:
+        self.send(nmt.HEARTBEAT_BASE + self.node_id, data)
+
+    def _guard_received(self, frame: Frame) -> None:
+        """A device whose heartbeat runs is not guarded as well (CiA 301 §7.2.8.3)."""
+        if frame.remote and self._guarding.supported and not self._heartbeat.running:
+            self._guarding.requested(self.state)
 
     def _heartbeat_received(self, frame: Frame) -> None:
-        node_id = frame.cob_id - nmt.HEARTBEAT_BASE
-        self._consumer.received(node_id)
-        if len(frame.data) == 1:
-            self._on_heartbeat(node_id, frame.data[0])
+        if frame.remote or len(frame.data) != 1:
+            return
+        node_id, state = frame.cob_id - nmt.HEARTBEAT_BASE, frame.data[0] & 0x7F
+        if state != NmtState.INITIALISING:  # a boot-up message is no heartbeat
+            self._consumer.received(node_id)
+        self._on_heartbeat(node_id, state)
 
     def _heartbeat_lost(self, node_id: int) -> None:
-        self.emergency(EMCY_HEARTBEAT_LOST, bytes([node_id]))
-        self._on_communication_lost()
+        self.emergency(EMCY_LIFE_SIGN_LOST, bytes([node_id]))
+        self._communication_error()
 
-    def _rpdo_too_short(self) -> None:
-        self.emergency(EMCY_PDO_TOO_SHORT)
-        self._emergencies.ended(EMCY_PDO_TOO_SHORT)
+    def _heartbeat_back(self, node_id: int) -> None:
+        self._emergencies.ended(EMCY_LIFE_SIGN_LOST, bytes([node_id]))
+
+    def _guard_lost(self) -> None:
+        self.emergency(EMCY_LIFE_SIGN_LOST)
+        self._communication_error()
+
+    def _guard_back(self) -> None:
+        self._emergencies.ended(EMCY_LIFE_SIGN_LOST)
+
+    def _communication_error(self) -> None:
+        self._on_communication_lost()
+        behaviour = self.dictionary.number(nmt.ERROR_BEHAVIOUR)
+        if self.state is NmtState.OPERATIONAL and behaviour in nmt.STATE_AFTER_ERROR:
+            self._enter(nmt.STATE_AFTER_ERROR[behaviour])

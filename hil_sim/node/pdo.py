@@ -1,61 +1,25 @@
-"""PDOs of a device: mapping, transmission types, timers, all from its dictionary (CiA 301 §7.2.2)."""
+"""One PDO that a device sends or receives: transmission types and timers (CiA 301 §7.2.2)."""
 
 from collections.abc import Callable
-from contextlib import suppress
 
 from hil_sim.clock import MILLISECOND_NS, Clock, Event
-from hil_sim.node.abort import AbortCode, SdoAbort
-from hil_sim.node.dictionary import Dictionary, Entry, Key, Value
+from hil_sim.node import cob_id
+from hil_sim.node.dictionary import Dictionary, Key
+from hil_sim.node.pdo_mapping import Mapping
 
 RPDO_COMMUNICATION, RPDO_MAPPING = 0x1400, 0x1600
 TPDO_COMMUNICATION, TPDO_MAPPING = 0x1800, 0x1A00
-PDO_COUNT = 0x200
 
-_INVALID = 1 << 31
-_COB_ID = 0x7FF
-_SYNCHRONOUS = range(241)
-_REMOTE_ONLY = (252, 253)
-_EVENT_DRIVEN = (254, 255)
+# Sub-indices of the communication parameters.
+COB_ID, TRANSMISSION_TYPE, INHIBIT_TIME, EVENT_TIMER, SYNC_START = 1, 2, 3, 5, 6
+
+SYNCHRONOUS = range(241)
+EVENT_DRIVEN = (254, 255)
+SYNCHRONOUS_REMOTE, REMOTE = 252, 253
+_ON_CHANGE = (0, *EVENT_DRIVEN)
 _INHIBIT_UNIT_NS = 100_000
-_FIRST_REAL_OBJECT = 0x20  # below are dummy entries: data types that only take room
 
-
-class Mapping:
-    """The objects of one PDO, in the order of their bits."""
-
-    def __init__(self, dictionary: Dictionary, index: int) -> None:
-        count = dictionary[index, 0].number()
-        fields = [unpack_mapping(dictionary[index, number].number()) for number in range(1, count + 1)]
-        self._fields = [(_mapped(dictionary, key), bits) for key, bits in fields]
-        self.keys = frozenset(key for key, _ in fields)
-        self.length = (sum(bits for _, bits in fields) + 7) // 8
-
-    def pack(self) -> bytes:
-        packed, shift = 0, 0
-        for entry, bits in self._fields:
-            if entry is not None:
-                packed |= (int.from_bytes(entry.encode(), "little") & (1 << bits) - 1) << shift
-            shift += bits
-        return packed.to_bytes(self.length, "little")
-
-    def unpack(self, data: bytes) -> None:
-        """Write the values into the dictionary; one that is refused leaves its object as it was."""
-        packed = int.from_bytes(data, "little")
-        for entry, bits in self._fields:
-            raw = (packed & (1 << bits) - 1).to_bytes((bits + 7) // 8, "little")
-            packed >>= bits
-            if entry is not None:
-                with suppress(SdoAbort):
-                    entry.write(raw)
-
-
-def unpack_mapping(value: int) -> tuple[Key, int]:
-    """A mapping entry as object and length in bits."""
-    return (value >> 16, value >> 8 & 0xFF), value & 0xFF
-
-
-def _mapped(dictionary: Dictionary, key: Key) -> Entry | None:
-    return None if key[0] < _FIRST_REAL_OBJECT else dictionary[key]
+TOO_SHORT, TOO_LONG, TIMED_OUT = 0x8210, 0x8220, 0x8250  # error codes (CiA 301 table 26)
 
 
 class Tpdo:
@@ -66,25 +30,41 @@ class Tpdo:
     ) -> None:
         self._clock = clock
         self._send = send
-        communication = {
-            entry.key[1]: entry.number() for entry in dictionary.members(TPDO_COMMUNICATION + number)
-        }
-        cob_id = communication[1]
-        self.valid = not cob_id & _INVALID
-        self.cob_id = cob_id & _COB_ID
-        self.transmission_type = communication[2]
-        self._inhibit_ns = communication.get(3, 0) * _INHIBIT_UNIT_NS
-        self._event_ns = communication.get(5, 0) * MILLISECOND_NS
-        self._mapping = Mapping(dictionary, TPDO_MAPPING + number)
+        index = TPDO_COMMUNICATION + number
+        identifier = dictionary.number((index, COB_ID), cob_id.INVALID)
+        self._mapping = Mapping.current(dictionary, TPDO_MAPPING + number)
+        self.cob_id = identifier & cob_id.IDENTIFIER
+        self.active = cob_id.is_valid(identifier) and bool(self._mapping.fields)
+        self._remote = not identifier & cob_id.NO_REMOTE
+        self._type = dictionary.number((index, TRANSMISSION_TYPE), 255)
+        self._inhibit_ns = dictionary.number((index, INHIBIT_TIME)) * _INHIBIT_UNIT_NS
+        self._event_ns = dictionary.number((index, EVENT_TIMER)) * MILLISECOND_NS
+        self._sync_start = dictionary.number((index, SYNC_START))
         self._syncs = 0
+        self._sent = b""  # what the others know
+        self._sampled: bytes | None = None
         self._changed = False
         self._timer: Event | None = None
         self._inhibited: Event | None = None
 
+    @property
+    def on_change(self) -> bool:
+        """Whether a change of its objects is an event."""
+        return self.active and self._type in _ON_CHANGE
+
     def start(self) -> None:
-        """The device became operational: event-driven PDOs show themselves once (CiA 301 §7.2.2.2)."""
-        if self.valid and self.transmission_type in _EVENT_DRIVEN:
-            self.transmit()
+        """The device became operational, or the PDO valid: an event-driven one shows itself once."""
+        self._syncs = 0
+        if self.active and self._type in EVENT_DRIVEN:
+            self._transmit()
+        else:
+            self.resume()
+
+    def resume(self) -> None:
+        """Go on with other parameters."""
+        if self.active:
+            self._sent = self._mapping.pack()
+            self._arm()
 
     def stop(self) -> None:
         for event in (self._timer, self._inhibited):
@@ -92,60 +72,108 @@ class Tpdo:
                 event.cancel()
         self._timer = self._inhibited = None
 
-    def synchronise(self) -> None:
-        """A SYNC came."""
-        kind = self.transmission_type
-        if not self.valid or kind not in _SYNCHRONOUS:
+    def synchronise(self, counter: int | None) -> None:
+        """A SYNC came, with the `counter` that it may have."""
+        if not self.active:
             return
+        if self._type == SYNCHRONOUS_REMOTE:
+            self._sampled = self._mapping.pack()
+        elif self._type == 0:
+            self.check()
+            if self._changed:
+                self._transmit()
+        elif self._type in SYNCHRONOUS:
+            self._count(counter)
+
+    def _count(self, counter: int | None) -> None:
+        if counter is not None and self._sync_start:
+            if counter != self._sync_start:
+                return
+            self._sync_start, self._syncs = 0, self._type - 1
         self._syncs += 1
-        if self._changed if kind == 0 else self._syncs >= kind:
-            self.transmit()
+        if self._syncs >= self._type:
+            self._syncs = 0
+            self._transmit()
+
+    def check(self) -> None:
+        """Look whether the objects have other values than were sent."""
+        if self.on_change and self._mapping.pack() != self._sent:
+            self._event()
 
     def changed(self, key: Key) -> None:
         """An object has changed of which the application says so."""
-        if key in self._mapping.keys:
-            self._changed = True
-            if self.valid and self.transmission_type in _EVENT_DRIVEN and self._inhibited is None:
-                self.transmit()
+        if self.on_change and key in self._mapping.keys:
+            self._event()
 
     def requested(self) -> None:
         """A remote frame asked for it."""
-        if self.valid:
-            self.transmit()
+        if not (self.active and self._remote):
+            return
+        if self._type != SYNCHRONOUS_REMOTE:
+            self._transmit()
+        elif self._sampled is not None:
+            self._send(self.cob_id, self._sampled)
 
-    def transmit(self) -> None:
+    def _event(self) -> None:
+        self._changed = True
+        if self._type in EVENT_DRIVEN and self._inhibited is None:
+            self._transmit()
+
+    def _transmit(self) -> None:
         self.stop()
-        self._syncs = 0
         self._changed = False
-        self._send(self.cob_id, self._mapping.pack())
-        if self.transmission_type in _EVENT_DRIVEN:
-            if self._event_ns:
-                self._timer = self._clock.after(self._event_ns, self.transmit)
-            if self._inhibit_ns:
-                self._inhibited = self._clock.after(self._inhibit_ns, self._inhibit_over)
+        self._sent = self._mapping.pack()
+        self._send(self.cob_id, self._sent)
+        self._arm()
+        if self._inhibit_ns and self._type in EVENT_DRIVEN:
+            self._inhibited = self._clock.after(self._inhibit_ns, self._inhibit_over)
+
+    def _arm(self) -> None:
+        if self._event_ns and self._type in EVENT_DRIVEN:
+            self._timer = self._clock.after(self._event_ns, self._event)
 
     def _inhibit_over(self) -> None:
         self._inhibited = None
         if self._changed:
-            self.transmit()
+            self._transmit()
 
 
 class Rpdo:
-    """One PDO that the device receives; a synchronous one takes effect with the next SYNC."""
+    """One PDO that the device receives; a synchronous one takes effect with the next SYNC.
 
-    def __init__(self, dictionary: Dictionary, number: int, too_short: Callable[[], None]) -> None:
-        cob_id = dictionary[RPDO_COMMUNICATION + number, 1].number()
-        self.valid = not cob_id & _INVALID
-        self.cob_id = cob_id & _COB_ID
-        self.transmission_type = dictionary[RPDO_COMMUNICATION + number, 2].number()
-        self._mapping = Mapping(dictionary, RPDO_MAPPING + number)
-        self._too_short = too_short
+    `report` is told an error code and whether that error is there.
+    """
+
+    def __init__(
+        self, clock: Clock, dictionary: Dictionary, number: int, report: Callable[[int, bool], None]
+    ) -> None:
+        self._clock = clock
+        self._report = report
+        index = RPDO_COMMUNICATION + number
+        identifier = dictionary.number((index, COB_ID), cob_id.INVALID)
+        self._mapping = Mapping.current(dictionary, RPDO_MAPPING + number)
+        self.cob_id = identifier & cob_id.IDENTIFIER
+        self.active = cob_id.is_valid(identifier) and bool(self._mapping.fields)
+        self._type = dictionary.number((index, TRANSMISSION_TYPE), 255)
+        self._deadline_ns = dictionary.number((index, EVENT_TIMER)) * MILLISECOND_NS
+        self._deadline: Event | None = None
         self._waiting: bytes | None = None
 
+    def stop(self) -> None:
+        self._waiting = None
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
     def receive(self, data: bytes) -> None:
-        if len(data) < self._mapping.length:
-            self._too_short()
-        elif self.transmission_type in _SYNCHRONOUS:
+        length = self._mapping.length
+        self._report(TOO_SHORT, len(data) < length)
+        self._report(TOO_LONG, len(data) > length)
+        self._report(TIMED_OUT, False)
+        self._watch()
+        if len(data) < length:
+            return
+        if self._type in SYNCHRONOUS:
             self._waiting = data
         else:
             self._mapping.unpack(data)
@@ -155,45 +183,8 @@ class Rpdo:
             data, self._waiting = self._waiting, None
             self._mapping.unpack(data)
 
-
-def guard_configuration(dictionary: Dictionary, reload: Callable[[], None]) -> None:
-    """Let SDO clients change PDOs only as CiA 301 §7.5.2.36 says, and call `reload` after each change.
-
-    A mapping changes while its number of objects is 0; that number then says whether the mapping can be.
-    """
-    for first in (RPDO_MAPPING, TPDO_MAPPING):
-        for index in dictionary.indices(first, first + PDO_COUNT - 1):
-            count, *slots = dictionary.members(index)
-            count.on_write = _count_check(dictionary, index, reload)
-            for slot in slots:
-                slot.on_write = _slot_check(dictionary, count)
-    for first in (RPDO_COMMUNICATION, TPDO_COMMUNICATION):
-        for index in dictionary.indices(first, first + PDO_COUNT - 1):
-            for entry in dictionary.members(index)[1:]:
-                entry.on_write = lambda _: reload()
-
-
-def _slot_check(dictionary: Dictionary, count: Entry) -> Callable[[Value], None]:
-    def check(value: Value) -> None:
-        if count.value != 0:
-            raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
-        key, bits = unpack_mapping(int(value))
-        if not value or key[0] < _FIRST_REAL_OBJECT:
-            return
-        entry = dictionary.find(*key)
-        if not entry.mappable or entry.bits != bits:
-            raise SdoAbort(AbortCode.NOT_MAPPABLE)
-
-    return check
-
-
-def _count_check(dictionary: Dictionary, index: int, reload: Callable[[], None]) -> Callable[[Value], None]:
-    def check(value: Value) -> None:
-        slots = [dictionary[index, number].number() for number in range(1, int(value) + 1)]
-        if any(not slot for slot in slots):
-            raise SdoAbort(AbortCode.NOT_MAPPABLE)
-        if sum(unpack_mapping(slot)[1] for slot in slots) > 64:
-            raise SdoAbort(AbortCode.PDO_TOO_LONG)
-        reload()
-
-    return check
+    def _watch(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        if self._deadline_ns:
+            self._deadline = self._clock.after(self._deadline_ns, lambda: self._report(TIMED_OUT, True))

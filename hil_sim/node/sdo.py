@@ -1,127 +1,138 @@
-"""SDO server: expedited and segmented transfer, bytes in and bytes out (CiA 301 §7.2.4.3)."""
+"""SDO server: which request begins or continues which transfer; expedited transfer (CiA 301 §7.2.4.3)."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
+from hil_sim.clock import SECOND_NS, Clock, Event
 from hil_sim.node.abort import AbortCode, SdoAbort
-from hil_sim.node.dictionary import Dictionary
+from hil_sim.node.coding import size
+from hil_sim.node.dictionary import Dictionary, Entry
+from hil_sim.node.sdo_block import BLOCK_SIZE, BlockDownload, BlockUpload
+from hil_sim.node.sdo_transfer import Received, SegmentedDownload, SegmentedUpload, Transfer
+
+TIMEOUT_NS = 1 * SECOND_NS  # how long a client may be silent in the middle of a transfer
 
 # Client command specifiers, the upper three bits of the first byte.
-_DOWNLOAD_SEGMENT = 0
-_DOWNLOAD = 1
-_UPLOAD = 2
-_UPLOAD_SEGMENT = 3
-_ABORT = 4
-
-_TOGGLE = 0x10
-
-
-@dataclass(slots=True)
-class _Transfer:
-    """A segmented transfer that is under way."""
-
-    index: int
-    subindex: int
-    download: bool
-    data: bytes
-    announced: int | None = None
-    toggle: int = 0
+_DOWNLOAD_SEGMENT, _DOWNLOAD, _UPLOAD, _UPLOAD_SEGMENT, _ABORT, _BLOCK_UPLOAD, _BLOCK_DOWNLOAD = range(7)
+# Bits of the first byte that say "not the beginning" of a block transfer.
+_SUBCOMMAND = {_BLOCK_UPLOAD: 3, _BLOCK_DOWNLOAD: 1}
 
 
 class SdoServer:
-    """One SDO channel of a device: `respond` takes a request of 8 bytes and gives the answer, if any."""
+    """One SDO channel of a device: takes requests of 8 bytes and sends what there is to answer."""
 
-    def __init__(self, dictionary: Dictionary) -> None:
+    def __init__(self, clock: Clock, dictionary: Dictionary, send: Callable[[bytes], None]) -> None:
+        self._clock = clock
         self._dictionary = dictionary
-        self._transfer: _Transfer | None = None
-        self._commands = {
-            _DOWNLOAD_SEGMENT: self._download_segment,
+        self._send = send
+        self._transfer: Transfer | None = None
+        self._timeout: Event | None = None
+        self._initiations = {
             _DOWNLOAD: self._download,
             _UPLOAD: self._upload,
-            _UPLOAD_SEGMENT: self._upload_segment,
+            _BLOCK_UPLOAD: self._block_upload,
+            _BLOCK_DOWNLOAD: self._block_download,
         }
 
     def reset(self) -> None:
+        """Forget a transfer, without a word."""
+        if self._transfer is not None:
+            self._transfer.close()
         self._transfer = None
+        self._watch()
 
-    def respond(self, request: bytes) -> bytes | None:
+    def receive(self, request: bytes) -> None:
         if len(request) != 8:
-            return None
-        command = request[0] >> 5
-        if command == _ABORT:
-            self._transfer = None
-            return None
-        index, subindex = self._addressed(request, command)
+            return
+        multiplexer = self._multiplexer(request)
         try:
-            if command not in self._commands:
-                raise SdoAbort(AbortCode.UNKNOWN_COMMAND)
-            return self._commands[command](request)
+            response = self._respond(request)
         except SdoAbort as abort:
+            self._abort(multiplexer, abort.code)
+            return
+        if self._transfer is not None and self._transfer.finished:
             self._transfer = None
-            return b"\x80" + _multiplexer(index, subindex) + abort.code.to_bytes(4, "little")
+        self._watch()
+        if response is not None:
+            self._send(response)
 
-    def _addressed(self, request: bytes, command: int) -> tuple[int, int]:
-        if command in (_DOWNLOAD_SEGMENT, _UPLOAD_SEGMENT):
-            return (self._transfer.index, self._transfer.subindex) if self._transfer else (0, 0)
-        return int.from_bytes(request[1:3], "little"), request[3]
+    def _respond(self, request: bytes) -> bytes | None:
+        if request[0] == _ABORT << 5:
+            self.reset()
+            return None
+        if self._transfer is not None and self._transfer.takes(request):
+            return self._transfer.respond(request)
+        self.reset()  # whatever else comes ends a transfer
+        command = request[0] >> 5
+        if _continues(request) or command not in self._initiations:
+            raise SdoAbort(AbortCode.UNKNOWN_COMMAND)
+        return self._initiations[command](request)
+
+    def _multiplexer(self, request: bytes) -> bytes:
+        """The index and sub-index that an abort of this request names."""
+        if self._transfer is not None and (self._transfer.takes(request) or _continues(request)):
+            return self._transfer.multiplexer
+        return bytes(3) if _continues(request) else request[1:4]
+
+    def _abort(self, multiplexer: bytes, code: AbortCode) -> None:
+        self.reset()
+        self._send(b"\x80" + multiplexer + code.to_bytes(4, "little"))
+
+    def _watch(self) -> None:
+        if self._timeout is not None:
+            self._timeout.cancel()
+        self._timeout = None if self._transfer is None else self._clock.after(TIMEOUT_NS, self._timed_out)
+
+    def _timed_out(self) -> None:
+        if self._transfer is not None:
+            self._abort(self._transfer.multiplexer, AbortCode.TIMED_OUT)
+
+    # -- the beginnings ----------------------------------------------------------------------------------
+
+    def _read(self, request: bytes) -> bytes:
+        return self._dictionary.read(int.from_bytes(request[1:3], "little"), request[3])
+
+    def _writable(self, request: bytes) -> Entry:
+        return self._dictionary.find_writable(int.from_bytes(request[1:3], "little"), request[3])
+
+    def _received(self, request: bytes, sized: bool) -> Received:
+        announced = int.from_bytes(request[4:8], "little") if sized else None
+        return Received(self._writable(request), announced)
 
     def _upload(self, request: bytes) -> bytes:
-        index, subindex = self._addressed(request, _UPLOAD)
-        data = self._dictionary.read(index, subindex)
+        data = self._read(request)
         if 1 <= len(data) <= 4:
-            self._transfer = None
             return bytes([0x43 | (4 - len(data)) << 2]) + request[1:4] + data.ljust(4, b"\0")
-        self._transfer = _Transfer(index, subindex, False, data)
+        self._transfer = SegmentedUpload(request[1:4], data)
         return b"\x41" + request[1:4] + len(data).to_bytes(4, "little")
 
-    def _upload_segment(self, request: bytes) -> bytes:
-        transfer = self._continued(request, download=False)
-        segment, transfer.data = transfer.data[:7], transfer.data[7:]
-        last = not transfer.data
-        if last:
-            self._transfer = None
-        command = (request[0] & _TOGGLE) | (7 - len(segment)) << 1 | last
-        return bytes([command]) + segment.ljust(7, b"\0")
-
     def _download(self, request: bytes) -> bytes:
-        index, subindex = self._addressed(request, _DOWNLOAD)
-        expedited, sized = request[0] & 2, request[0] & 1
-        size = 4 - (request[0] >> 2 & 3) if sized else 4
+        expedited, sized = bool(request[0] & 2), bool(request[0] & 1)
         if expedited:
-            self._transfer = None
-            if not sized:  # the device takes what it needs (CiA 301 §7.2.4.3.3, s = 0)
-                size = min(self._dictionary.find(index, subindex).size or 4, 4)
-            self._dictionary.write(index, subindex, request[4 : 4 + size])
+            entry = self._writable(request)
+            # Where the client does not say how long its data is, the device takes what it needs.
+            length = 4 - (request[0] >> 2 & 3) if sized else min(size(entry.data_type) or 4, 4)
+            entry.write(request[4 : 4 + length])
         else:
-            self._begin_download(index, subindex, int.from_bytes(request[4:8], "little") if sized else None)
+            self._transfer = SegmentedDownload(request[1:4], self._received(request, sized))
         return b"\x60" + request[1:4] + bytes(4)
 
-    def _begin_download(self, index: int, subindex: int, announced: int | None) -> None:
-        entry = self._dictionary.find(index, subindex)
-        if not entry.writable:
-            raise SdoAbort(AbortCode.READ_ONLY)
-        if announced is not None and entry.size is not None and announced != entry.size:
-            raise SdoAbort(AbortCode.TOO_LONG if announced > entry.size else AbortCode.TOO_SHORT)
-        self._transfer = _Transfer(index, subindex, True, b"", announced)
+    def _block_upload(self, request: bytes) -> bytes:
+        """The client says how many segments it takes, and below which length no block is worth it to it."""
+        data, block_size, threshold = self._read(request), request[4], request[5]
+        if threshold and len(data) <= threshold:
+            return self._upload(request)
+        self._transfer = BlockUpload(
+            self._clock, self._send, request[1:4], data, block_size, with_crc=bool(request[0] & 4)
+        )
+        return b"\xc6" + request[1:4] + len(data).to_bytes(4, "little")
 
-    def _download_segment(self, request: bytes) -> bytes:
-        transfer = self._continued(request, download=True)
-        transfer.data += request[1 : 8 - (request[0] >> 1 & 7)]
-        if request[0] & 1:
-            self._transfer = None
-            if transfer.announced not in (None, len(transfer.data)):
-                raise SdoAbort(AbortCode.LENGTH_MISMATCH)
-            self._dictionary.write(transfer.index, transfer.subindex, transfer.data)
-        return bytes([0x20 | (request[0] & _TOGGLE)]) + bytes(7)
-
-    def _continued(self, request: bytes, download: bool) -> _Transfer:
-        transfer = self._transfer
-        if transfer is None or transfer.download is not download:
-            raise SdoAbort(AbortCode.UNKNOWN_COMMAND)
-        if request[0] & _TOGGLE != transfer.toggle:
-            raise SdoAbort(AbortCode.TOGGLE_BIT)
-        transfer.toggle ^= _TOGGLE
-        return transfer
+    def _block_download(self, request: bytes) -> bytes:
+        received = self._received(request, sized=bool(request[0] & 2))
+        self._transfer = BlockDownload(request[1:4], received, with_crc=bool(request[0] & 4))
+        return b"\xa4" + request[1:4] + bytes([BLOCK_SIZE, 0, 0, 0])
 
 
-def _multiplexer(index: int, subindex: int) -> bytes:
-    return index.to_bytes(2, "little") + bytes([subindex])
+def _continues(request: bytes) -> bool:
+    """Whether a request has sense only within a transfer."""
+    command = request[0] >> 5
+    return command in (_DOWNLOAD_SEGMENT, _UPLOAD_SEGMENT) or bool(request[0] & _SUBCOMMAND.get(command, 0))

@@ -1,12 +1,14 @@
-"""A simulated bus with a listener on it, driven in simulated time."""
+"""A simulated bus with a listener on it and one device as node 5, driven in simulated time."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import eds
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.clock import MILLISECOND_NS, Clock
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
+from hil_sim.node.node import Node
 
 NODE = 5
 
@@ -27,23 +29,24 @@ class Heard:
         return self.frame.data
 
 
-class Bench:
-    """Clock, bus, and one joint drive as node 5; `heard` is everything that others send."""
+class DeviceBench:
+    """Clock, bus, and a device without a profile from any EDS or DCF; `heard` is all that others send."""
 
-    def __init__(self, position: float = 0.0) -> None:
+    def __init__(self, file: Path) -> None:
         self.clock = Clock()
         self.bus = CanBus(self.clock)
         self.heard: list[Heard] = []
         self.bus.attach(self, self._hear)
-        description = eds.load(eds.locate("joint_drive.eds", None), NODE)
-        self.joint = Joint(JointConstants(), position)
-        self.drive = JointDrive(self.clock, self.bus, "joint", NODE, description, self.joint)
+        self.node = self._device(eds.load(file, NODE))
+
+    def _device(self, description: eds.Description) -> Node:
+        return Node(self.clock, self.bus, "device", NODE, description)
 
     def _hear(self, frame: Frame, _sender: object) -> None:
         self.heard.append(Heard(self.clock.now_ns / MILLISECOND_NS, frame))
 
     def boot(self) -> None:
-        self.drive.power_on()
+        self.node.power_on()
         self.run(100)
 
     def start(self) -> None:
@@ -58,12 +61,19 @@ class Bench:
         self.bus.send(Frame(cob_id, bytes.fromhex(data)), self)
         self.run(2)
 
+    def ask(self, cob_id: int) -> list[bytes]:
+        """Send a remote frame; the frames that answer it."""
+        before = len(self.of(cob_id))
+        self.bus.send(Frame(cob_id, remote=True), self)
+        self.run(2)
+        return self.of(cob_id)[before:]
+
     def of(self, cob_id: int) -> list[bytes]:
         """The data of all frames heard with this identifier."""
         return [heard.data for heard in self.heard if heard.cob_id == cob_id]
 
     def sdo(self, request: str) -> str | None:
-        """Ask the drive's SDO server; hexadecimal as in a manual, `None` for silence."""
+        """Ask the SDO server; hexadecimal as in a manual, `None` for silence."""
         before = len(self.of(0x580 + NODE))
         self.send(0x600 + NODE, request)
         answers = self.of(0x580 + NODE)[before:]
@@ -82,6 +92,18 @@ class Bench:
         assert answer is not None
         raw = bytes.fromhex(answer)
         return "ok" if raw[0] == 0x60 else f"{int.from_bytes(raw[4:], 'little'):08X}"
+
+
+class Bench(DeviceBench):
+    """The same with a joint drive."""
+
+    def __init__(self, position: float = 0.0, file: Path | None = None) -> None:
+        self.joint = Joint(JointConstants(), position)
+        super().__init__(file or eds.locate("joint_drive.eds", None))
+
+    def _device(self, description: eds.Description) -> Node:
+        self.drive = JointDrive(self.clock, self.bus, "joint", NODE, description, self.joint)
+        return self.drive
 
     def controlword(self, value: int) -> int:
         """Write the controlword by SDO; gives the statusword after it."""

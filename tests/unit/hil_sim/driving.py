@@ -79,6 +79,7 @@ def cyclic(bench: Bench, cycles: int, target: Callable[[int], int], size: int = 
 
 def map_target(bench: Bench, index: int, bits: int) -> None:
     """Let RPDO1 carry another target than 607Ah."""
+    assert bench.write(0x1400, 1, 0x8000_0200 + NODE, 4) == "ok"
     for subindex, value in ((0, 0), (3, index << 16 | bits), (0, 3)):
         assert bench.write(0x1600, subindex, value, 1 if subindex == 0 else 4) == "ok"
-    bench.run(5)
+    assert bench.write(0x1400, 1, 0x200 + NODE, 4) == "ok"

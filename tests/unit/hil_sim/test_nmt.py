@@ -1,8 +1,12 @@
-"""NMT, heartbeat, emergencies and storage of a device (CiA 301 §7.2.7, §7.2.8)."""
+"""NMT of a device: its states, what lives in each, what a reset brings back (CiA 301 §7.2.8, §7.3.2)."""
 
 from itertools import pairwise
+from pathlib import Path
 
-from tests.unit.hil_sim.bench import NODE, Bench
+import pytest
+
+from tests.unit.hil_sim.bench import NODE, Bench, DeviceBench
+from tests.unit.hil_sim.device_file import UNSIGNED32, communication
 
 
 def test_boot_up_then_heartbeats_at_1017h(bench: Bench) -> None:
@@ -56,50 +60,82 @@ def test_reset_communication_keeps_the_application(bench: Bench) -> None:
     assert bench.read(0x1017) == 100
 
 
-def test_stored_parameters_survive_a_reset_and_can_be_restored(bench: Bench) -> None:
+SERVICES = {"start": "01", "stop": "02", "pre": "80", "reset node": "81", "reset communication": "82"}
+AFTER = {"start": 5, "stop": 4, "pre": 127, "reset node": 0, "reset communication": 0}
+
+
+@pytest.mark.parametrize("before", ["start", "stop", "pre"])
+@pytest.mark.parametrize("service", SERVICES)
+@pytest.mark.parametrize("address", [0, NODE])
+def test_every_service_in_every_state(bench: Bench, before: str, service: str, address: int) -> None:
     bench.boot()
-    bench.write(0x6072, 0, 500, 2)
-    assert bench.write(0x1010, 1, 0x12345678, 4) == "08000020"
-    assert bench.write(0x1010, 1, 0x65766173, 4) == "ok"
-    assert bench.read(0x1010, 1) == 1
-    bench.send(0x000, "81 00")
-    bench.run(60)
-    assert bench.read(0x6072) == 500
-    assert bench.write(0x1011, 1, 0x64616F6C, 4) == "ok"
-    assert bench.read(0x6072) == 500  # takes effect with the next reset
-    bench.send(0x000, "81 00")
-    bench.run(60)
-    assert bench.read(0x6072) == 2000
+    bench.send(0x000, f"{SERVICES[before]} {NODE:02X}")
+    bench.heard.clear()
+    bench.send(0x000, f"{SERVICES[service]} {address:02X}")
+    bench.run(110)
+    beats = bench.of(0x700 + NODE)
+    assert beats[0][0] == AFTER[service]
+    if AFTER[service] == 0:
+        bench.run(100)
+        assert bench.of(0x700 + NODE)[1:] == [b"\x7f"]
 
 
-def test_an_error_makes_an_emergency_a_register_bit_and_a_history(bench: Bench) -> None:
+@pytest.mark.parametrize("data", ["", "01", "01 00 00", "03 00", "7F 00", "00 05", "83 00"])
+def test_what_is_no_nmt_service_changes_nothing(bench: Bench, data: str) -> None:
     bench.boot()
-    bench.drive.fault(0x4310)
-    bench.run(2)
-    assert bench.of(0x80 + NODE) == [bytes.fromhex("10 43 09 00 00 00 00 00")]
-    assert bench.read(0x1001) == 0x09
-    assert bench.read(0x1003) == 1
-    assert bench.read(0x1003, 1) == 0x4310
-    assert bench.read(0x603F) == 0x4310
-    assert bench.read(0x6041) & 0x4F == 0x08
-    bench.controlword(0x80)
-    assert bench.of(0x80 + NODE)[-1] == bytes(8)
-    assert bench.read(0x1001) == 0
-    assert bench.write(0x1003, 0, 1, 1) == "06090031"
-    assert bench.write(0x1003, 0, 0, 1) == "ok"
-    assert bench.read(0x1003) == 0
+    bench.send(0x000, data)
+    bench.run(110)
+    assert bench.of(0x700 + NODE)[-1] == b"\x7f"
 
 
-def test_a_missing_heartbeat_is_an_emergency_and_stops_the_drive(bench: Bench) -> None:
-    bench.start()
-    bench.enable()
-    bench.write(0x1016, 1, 0x0010_0064, 4)  # node 16 within 100 ms
-    bench.run(500)
-    assert bench.read(0x6041) & 0x6F == 0x27  # watching begins with the first heartbeat
-    bench.send(0x710, "05")
+def test_a_booting_device_hears_nothing(bench: Bench) -> None:
+    bench.boot()
+    bench.send(0x000, "81 00")
+    bench.send(0x000, "01 00")
+    assert bench.sdo("40 00 10 00 00 00 00 00") is None
+    bench.run(160)
+    assert bench.of(0x700 + NODE)[-2:] == [b"\x00", b"\x7f"]
+
+
+def test_a_reset_during_the_boot_boots_once(bench: Bench) -> None:
+    bench.drive.power_on()
+    bench.drive.power_off()
+    bench.drive.power_on()
     bench.run(90)
-    bench.send(0x710, "05")
-    assert bench.read(0x6041) & 0x6F == 0x27
-    bench.run(200)
-    assert bench.of(0x80 + NODE)[0][:2] == b"\x30\x81"
-    assert bench.read(0x6041) & 0x4F == 0x40
+    assert bench.of(0x700 + NODE) == [b"\x00"]
+
+
+def test_a_stopped_device_shows_its_heartbeat_and_nothing_else(bench: Bench) -> None:
+    bench.start()
+    bench.write(0x1800, 1, 0x180 + NODE, 4)
+    bench.send(0x000, "02 00")
+    bench.heard.clear()
+    for cob_id in (0x080, 0x200 + NODE, 0x600 + NODE):
+        bench.send(cob_id, "40 00 10 00 00 00 00 00" if cob_id != 0x080 else "")
+    bench.drive.fault(0x4310)
+    bench.ask(0x180 + NODE)
+    bench.run(300)
+    assert {heard.cob_id for heard in bench.heard} == {0x700 + NODE}
+    assert {heard.data for heard in bench.heard} == {b"\x04"}
+
+
+def test_power_off_is_silence_and_power_on_boots(bench: Bench) -> None:
+    bench.start()
+    bench.drive.power_off()
+    bench.heard.clear()
+    bench.send(0x080)
+    assert bench.sdo("40 00 10 00 00 00 00 00") is None
+    bench.run(1000)
+    assert bench.heard == []
+    bench.drive.power_on()
+    bench.run(60)
+    assert bench.of(0x700 + NODE) == [b"\x00"]
+
+
+@pytest.mark.parametrize(("startup", "state"), [(0x0, 5), (0x4, 127), (0x1, 127), (0x8, 5)])
+def test_1f80h_lets_a_device_start_itself(tmp_path: Path, startup: int, state: int) -> None:
+    file = communication().add(0x1F80, None, UNSIGNED32, startup).write(tmp_path)
+    bench = DeviceBench(file)
+    bench.boot()
+    bench.write(0x1017, 0, 10, 2)
+    assert bench.of(0x700 + NODE)[-1] == bytes([state])

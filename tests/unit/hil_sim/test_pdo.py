@@ -3,7 +3,6 @@
 import struct
 from itertools import pairwise
 
-from hil_sim.bus.can_bus import Frame
 from tests.unit.hil_sim.bench import NODE, Bench
 
 TPDO1, TPDO2, TPDO3, TPDO4 = (base + NODE for base in (0x180, 0x280, 0x380, 0x480))
@@ -48,11 +47,32 @@ def test_an_asynchronous_rpdo_takes_effect_at_once(bench: Bench) -> None:
     assert bench.read(0x6041) & 0x6F == 0x21
 
 
-def test_an_rpdo_that_is_too_short_is_an_emergency(bench: Bench) -> None:
+def test_an_rpdo_that_is_too_short_is_an_emergency_until_a_good_one_comes(bench: Bench) -> None:
     bench.start()
     bench.send(RPDO1, "06 00")
+    bench.send(RPDO1, "06 00")
     bench.send(0x080)
-    assert bench.of(0x80 + NODE)[0][:2] == b"\x10\x82"
+    assert bench.of(0x80 + NODE) == [bytes.fromhex("10 82 11 01 00 00 00 00")]
+    assert bench.read(0x6040) == 0
+    bench.send(RPDO1, "06 00 08 00 00 00 00")
+    assert bench.of(0x80 + NODE)[1:] == [bytes(8)]
+    assert bench.read(0x1001) == 0
+
+
+def test_an_rpdo_that_is_too_long_is_used_and_an_emergency(bench: Bench) -> None:
+    bench.start()
+    bench.send(RPDO1, "06 00 08 00 00 00 00 55")
+    bench.send(0x080)
+    assert bench.of(0x80 + NODE) == [bytes.fromhex("20 82 11 01 00 00 00 00")]
+    assert bench.read(0x6041) & 0x6F == 0x21
+
+
+def test_what_an_rpdo_brought_is_forgotten_when_the_node_leaves_operation(bench: Bench) -> None:
+    bench.start()
+    bench.send(RPDO1, "06 00 08 00 00 00 00")
+    bench.send(0x000, "80 00")
+    bench.send(0x000, "01 00")
+    bench.send(0x080)
     assert bench.read(0x6040) == 0
 
 
@@ -74,11 +94,11 @@ def test_an_event_driven_pdo_goes_on_change_within_its_inhibit_time_and_on_its_t
     assert [round(b - a) for a, b in pairwise(times[1:])] == [300, 300, 300]
 
 
-def test_a_remote_frame_asks_for_a_pdo(bench: Bench) -> None:
+def test_a_remote_frame_asks_for_a_pdo_that_allows_it(bench: Bench) -> None:
     bench.start()
-    bench.bus.send(Frame(TPDO1, remote=True), bench)
-    bench.run(2)
-    assert len(bench.of(TPDO1)) == 1
+    assert bench.ask(TPDO1) == []  # bit 30 of its COB-ID
+    assert bench.write(0x1800, 1, TPDO1, 4) == "ok"
+    assert len(bench.ask(TPDO1)) == 1
 
 
 def test_transmission_type_zero_goes_with_the_sync_after_a_change(bench: Bench) -> None:
@@ -96,7 +116,10 @@ def test_transmission_type_zero_goes_with_the_sync_after_a_change(bench: Bench) 
 def test_a_mapping_changes_only_by_the_proper_sequence(bench: Bench) -> None:
     bench.boot()
     velocity = 0x606C_0020
-    assert bench.write(0x1A00, 2, velocity, 4) == "06010000"
+    assert bench.write(0x1A00, 0, 0, 1) == "08000022"  # while the PDO is valid
+    assert bench.write(0x1A00, 2, velocity, 4) == "08000022"
+    assert bench.write(0x1800, 1, 0xC000_0000 | TPDO1, 4) == "ok"
+    assert bench.write(0x1A00, 2, velocity, 4) == "06010000"  # while it maps objects
     assert bench.write(0x1A00, 0, 0, 1) == "ok"
     assert bench.write(0x1A00, 2, 0x6065_0020, 4) == "06040041"  # not mappable
     assert bench.write(0x1A00, 2, 0x606C_0010, 4) == "06040041"  # wrong length
@@ -105,6 +128,7 @@ def test_a_mapping_changes_only_by_the_proper_sequence(bench: Bench) -> None:
     assert bench.write(0x1A00, 3, 0x6064_0020, 4) == "ok"
     assert bench.write(0x1A00, 0, 3, 1) == "06040042"  # 80 bits
     assert bench.write(0x1A00, 0, 2, 1) == "ok"
+    assert bench.write(0x1800, 1, 0x4000_0000 | TPDO1, 4) == "ok"
     bench.send(0x000, "01 00")
     bench.send(0x080)
     assert len(bench.of(TPDO1)[-1]) == 6

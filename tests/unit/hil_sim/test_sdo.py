@@ -90,8 +90,88 @@ def test_a_stopped_node_is_silent(booted: Bench) -> None:
 
 
 def test_a_second_server_answers_once_it_is_configured(booted: Bench) -> None:
-    assert booted.write(0x1201, 1, 0x640 + NODE, 4) == "ok"
-    assert booted.write(0x1201, 2, 0x5C0 + NODE, 4) == "ok"
-    booted.run(1)
-    booted.send(0x640 + NODE, "40 00 10 00 00 00 00 00")
-    assert booted.of(0x5C0 + NODE) == [bytes.fromhex("43 00 10 00 92 01 02 00")]
+    assert booted.write(0x1201, 1, 0x680 + NODE, 4) == "ok"
+    assert booted.write(0x1201, 2, 0x6C0 + NODE, 4) == "ok"
+    booted.send(0x680 + NODE, "40 00 10 00 00 00 00 00")
+    assert booted.of(0x6C0 + NODE) == [bytes.fromhex("43 00 10 00 92 01 02 00")]
+    assert booted.write(0x1201, 1, 0x690 + NODE, 4) == "06090030"  # not while it is valid
+    assert booted.write(0x1201, 1, 0x8000_0690 + NODE, 4) == "ok"
+    booted.send(0x680 + NODE, "40 00 10 00 00 00 00 00")
+    assert len(booted.of(0x6C0 + NODE)) == 1
+
+
+def test_identifiers_that_are_restricted_or_extended_are_refused(booted: Bench) -> None:
+    for cob_id in (0x001, 0x07F, 0x101, 0x180, 0x581, 0x640, 0x6E0, 0x701, 0x7FF, 0x2000_0681, 0x1681):
+        assert booted.write(0x1201, 1, cob_id, 4) == "06090030", hex(cob_id)
+
+
+def test_channels_do_not_disturb_each_other(booted: Bench) -> None:
+    booted.write(0x1201, 1, 0x680 + NODE, 4)
+    booted.write(0x1201, 2, 0x6C0 + NODE, 4)
+    booted.sdo("40 08 10 00 00 00 00 00")
+    booted.send(0x680 + NODE, "21 81 60 00 04 00 00 00")
+    assert booted.sdo("60 00 00 00 00 00 00 00") == "00 47 57 52 4D 53 20 6A"
+    booted.write(0x1800, 2, 2, 1)  # ends the upload on this channel, and configures a PDO
+    booted.send(0x680 + NODE, "07 40 9C 00 00 00 00 00")
+    assert booted.of(0x6C0 + NODE)[-1] == bytes.fromhex("20 00 00 00 00 00 00 00")
+    assert booted.read(0x6081) == 40_000
+
+
+def test_a_client_that_falls_silent_is_told_after_a_second(booted: Bench) -> None:
+    booted.sdo("40 08 10 00 00 00 00 00")
+    booted.run(990)
+    assert booted.sdo("60 00 00 00 00 00 00 00") == "00 47 57 52 4D 53 20 6A"
+    booted.run(1010)
+    assert booted.of(0x580 + NODE)[-1] == bytes.fromhex("80 08 10 00 00 00 04 05")
+    assert booted.sdo("70 00 00 00 00 00 00 00") == "80 00 00 00 01 00 04 05"
+
+
+def test_a_finished_transfer_does_not_time_out(booted: Bench) -> None:
+    booted.sdo("40 17 10 00 00 00 00 00")
+    booted.sdo("21 81 60 00 04 00 00 00")
+    booted.sdo("07 40 9C 00 00 00 00 00")
+    answers = len(booted.of(0x580 + NODE))
+    booted.run(3000)
+    assert len(booted.of(0x580 + NODE)) == answers
+
+
+def test_a_new_initiation_ends_a_transfer(booted: Bench) -> None:
+    booted.sdo("40 08 10 00 00 00 00 00")
+    assert booted.read(0x1017) == 100
+    assert booted.sdo("60 00 00 00 00 00 00 00") == "80 00 00 00 01 00 04 05"
+
+
+def test_a_segment_of_the_other_direction_ends_a_transfer(booted: Bench) -> None:
+    booted.sdo("40 08 10 00 00 00 00 00")
+    assert booted.sdo("01 41 00 00 00 00 00 00") == "80 08 10 00 01 00 04 05"
+    assert booted.sdo("60 00 00 00 00 00 00 00") == "80 00 00 00 01 00 04 05"
+
+
+def test_nmt_stop_ends_a_transfer_without_a_word(booted: Bench) -> None:
+    booted.sdo("40 08 10 00 00 00 00 00")
+    answers = len(booted.of(0x580 + NODE))
+    booted.send(0x000, f"02 {NODE:02X}")
+    booted.run(3000)
+    assert len(booted.of(0x580 + NODE)) == answers
+    booted.send(0x000, f"80 {NODE:02X}")
+    assert booted.sdo("60 00 00 00 00 00 00 00") == "80 00 00 00 01 00 04 05"
+
+
+def test_a_segmented_download_shorter_than_announced_is_refused(booted: Bench) -> None:
+    assert booted.sdo("21 81 60 00 04 00 00 00") == "60 81 60 00 00 00 00 00"
+    assert booted.sdo("09 40 9C 00 00 00 00 00") == "80 81 60 00 10 00 07 06"
+
+
+def test_a_segmented_download_without_a_size_is_measured_at_its_end(booted: Bench) -> None:
+    assert booted.sdo("20 81 60 00 00 00 00 00") == "60 81 60 00 00 00 00 00"
+    assert booted.sdo("0B 40 9C 00 00 00 00 00") == "80 81 60 00 13 00 07 06"
+
+
+@pytest.mark.parametrize("request_", ["40 08 10", "", "40 08 10 00 00 00 00"])
+def test_a_request_that_is_not_eight_bytes_long_is_none(booted: Bench, request_: str) -> None:
+    assert booted.sdo(request_) is None
+
+
+def test_a_remote_frame_is_no_request(booted: Bench) -> None:
+    booted.ask(0x600 + NODE)
+    assert booted.of(0x580 + NODE) == []
