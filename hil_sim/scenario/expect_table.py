@@ -12,7 +12,7 @@ _SUBJECTS = {
     "component": ("state", "problem"),
     "channel": ("min", "max", "is", "missing"),
     "truth": ("min", "max", "is"),
-    "answer": ("is",),
+    "answer": ("is", "says"),
 }
 
 
@@ -77,6 +77,7 @@ _CONDITIONS: Mapping[str, Callable[[Table, str], Condition]] = {
     "state": _is,
     "problem": _contains,
     "is": _is,
+    "says": _contains,
     "min": _in_range,
     "max": _in_range,
     "missing": _missing,

@@ -94,6 +94,13 @@ class Expectation:
         what = {Track.TRUTH: "true ", Track.ANSWER: "answer to ", Track.PROBLEM: "problem of "}
         return f"{what.get(self.track, '')}{self.glob} {self.condition.words} {self.timing.words}"
 
+    def is_open(self, observed: Observed, now_s: float) -> bool:
+        """Whether what comes later can still change the verdict."""
+        if self.timing.when is When.AT:
+            return not self.timing.choose(observed.get(self.track, ()))
+        over = now_s > self.timing.end_s
+        return not over and (self.timing.when is When.BETWEEN or not self.judge(observed).ok)
+
     def judge(self, observed: Observed) -> Verdict:
         """Compare with what was seen."""
         moments = observed.get(self.track, ())

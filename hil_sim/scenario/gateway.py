@@ -21,6 +21,7 @@ _READ_BYTES = 1 << 16
 _LISTENING = b"listening on "
 
 Result = dict[str, Any]
+Answered = Callable[[Result | None, str], None]  # the result, or `None` and what was refused
 
 
 class GatewayFailed(SimulatorError):
@@ -75,7 +76,7 @@ class GatewayLink:
     def __init__(self, loop: Loop, address: tuple[str, int]) -> None:
         self._loop = loop
         self._socket = socket.create_connection(address, READY_S)
-        self._waiting: dict[int, Callable[[Result | None, str], None]] = {}
+        self._waiting: dict[int, Answered] = {}
         self._asked = 0
         self._rest = b""
         loop.watch(self._socket, selectors.EVENT_READ, self._read)
@@ -84,13 +85,8 @@ class GatewayLink:
         self._loop.forget(self._socket)
         self._socket.close()
 
-    @property
-    def idle(self) -> bool:
-        """Whether everything asked has been answered."""
-        return not self._waiting
-
-    def ask(self, method: str, params: Result, answered: Callable[[Result | None, str], None]) -> None:
-        """Send a request; `answered` gets the result, or `None` and what was refused."""
+    def ask(self, method: str, params: Result, answered: Answered) -> None:
+        """Send a request; `answered` is called in the loop."""
         self._asked += 1
         self._waiting[self._asked] = answered
         request = {"jsonrpc": "2.0", "id": self._asked, "method": method, "params": params}

@@ -1,21 +1,29 @@
 """Watches a gateway and the robot's truth, in simulated time, as long as a scenario runs."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from hil_sim.clock import MILLISECOND_NS
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.scenario.expectation import Moment, Seen, Track
-from hil_sim.scenario.gateway import GatewayFailed, GatewayLink, Result
+from hil_sim.scenario.gateway import Answered, GatewayFailed, Result
+from hil_sim.scenario.script import GATEWAY_LINES, NEEDS_LEASE
 from hil_sim.scenario.truth import truth
 
-_PERIOD_NS = 50 * MILLISECOND_NS
+_PERIOD_NS = 100 * MILLISECOND_NS
+_LEASE_S = 60.0
+
+
+class Link(Protocol):
+    """What asks a gateway."""
+
+    def ask(self, method: str, params: Result, answered: Answered) -> None: ...
 
 
 class Observer:
-    """Looks twenty times a simulated second; `observed` is all that was seen."""
+    """Looks ten times a simulated second; `observed` is all that was seen."""
 
-    def __init__(self, robot: Exoskeleton, link: GatewayLink) -> None:
+    def __init__(self, robot: Exoskeleton, link: Link) -> None:
         self.observed: dict[Track, list[Moment]] = {track: [] for track in Track}
         self._robot = robot
         self._link = link
@@ -27,6 +35,19 @@ class Observer:
     def note(self, track: Track, values: Mapping[str, Seen]) -> None:
         """Something was seen now."""
         self.observed[track].append(Moment(self._robot.clock.now_s, values))
+
+    def ask(self, key: str, wanted: object) -> None:
+        """Ask for what a line says; the answer is seen as `KEY` ("done", or why not) and `KEY.DRIVE`."""
+        method, parameter = GATEWAY_LINES[key]
+
+        def answered(result: Result | None, refused: str) -> None:
+            drives = {} if result is None else result.get("drives", {})
+            words = {f"{key}.{drive}": str(word) for drive, word in drives.items()}
+            self.note(Track.ANSWER, {key: refused or "done", **words})
+
+        if key in NEEDS_LEASE:  # without it, what needs it is refused and says so
+            self._link.ask("control.acquire", {"ttl_s": _LEASE_S}, lambda _result, _refused: None)
+        self._link.ask(method, {parameter: wanted}, answered)
 
     def _look(self) -> None:
         self.note(Track.TRUTH, truth(self._robot))

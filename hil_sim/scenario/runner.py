@@ -10,13 +10,13 @@ from hil_sim.clock import SECOND_NS
 from hil_sim.errors import SimulatorError
 from hil_sim.operator import Operator
 from hil_sim.robot import SimulatedRobot
-from hil_sim.scenario.expectation import Observed, Track, Verdict
-from hil_sim.scenario.gateway import GatewayLink, GatewayProcess, Result
+from hil_sim.scenario.expectation import Observed, Verdict
+from hil_sim.scenario.gateway import GatewayLink, GatewayProcess
 from hil_sim.scenario.observer import Observer
-from hil_sim.scenario.script import GATEWAY_LINES, Line, Script
+from hil_sim.scenario.script import Line, Script
 from hil_sim.scenario.table import ScenarioError
 
-_LEASE_S = 60.0
+_LOOK_NS = SECOND_NS // 2  # how often to look whether everything is decided
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,26 +77,19 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
         observer = Observer(robot.exoskeleton, link)
         for line in script.lines:
             if line.for_gateway is not None:
-                ask = partial(_ask, link, observer, line, line.for_gateway)
+                ask = partial(observer.ask, line.for_gateway, line.request[line.for_gateway])
                 robot.exoskeleton.clock.at(round(line.time_s * SECOND_NS), ask)
+        robot.exoskeleton.clock.every(_LOOK_NS, partial(_end_early, robot, script, observer))
         robot.run(script.seconds)
         skipped_s = robot.loop.skipped_ns / SECOND_NS
     verdicts = tuple(expectation.judge(observer.observed) for expectation in script.expectations)
     return Outcome(verdicts, observer.observed, skipped_s)
 
 
-def _ask(link: GatewayLink, observer: Observer, line: Line, key: str) -> None:
-    """Ask the gateway; its answer is seen as `stop.DRIVE`, or `set`: "done" or why not."""
-    method, parameter = GATEWAY_LINES[key]
-
-    def answered(result: Result | None, refused: str) -> None:
-        said = {key: refused or "done"}
-        drives = {} if result is None else result.get("drives", {})
-        observer.note(Track.ANSWER, said | {f"{key}.{drive}": word for drive, word in drives.items()})
-
-    def ignored(_result: Result | None, _refused: str) -> None:
-        """Without the lease, what needs it is refused and says so."""
-
-    if key == "set":
-        link.ask("control.acquire", {"ttl_s": _LEASE_S}, ignored)
-    link.ask(method, {parameter: line.request[key]}, answered)
+def _end_early(robot: SimulatedRobot, script: Script, observer: Observer) -> None:
+    """Nothing is to happen any more, and nothing can change a verdict."""
+    now_s = robot.exoskeleton.clock.now_s
+    if all(line.time_s < now_s for line in script.lines) and not any(
+        one.is_open(observer.observed, now_s) for one in script.expectations
+    ):
+        robot.stop()

@@ -23,6 +23,7 @@ from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 _AFTER_S = 1.0  # how long a scenario goes on after the last time that it names
 # What a gateway is asked for: the line's key → method of the wire and the name of the parameter.
 GATEWAY_LINES = {"stop": ("robot.stop", "reason"), "set": ("parameter.write", "changes")}
+NEEDS_LEASE = frozenset({"set"})
 
 
 @dataclass(frozen=True, slots=True)

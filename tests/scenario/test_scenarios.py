@@ -1,0 +1,125 @@
+"""`gwrms sim run` as its users run it: scenarios that hold, one that does not, and what cannot be run.
+
+These take as long as what happens in them; `gwrms sim run scenarios/*.toml` runs every one.
+"""
+
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.timeout(300)
+
+FOLDER = Path(__file__).parents[2] / "scenarios"
+DEADLINE_S = 240.0
+
+NOT_SO = """\
+title = "Too much is expected"
+
+[robot]
+scenario = "stand"
+
+[[expect]]
+component = "trunk"
+state = "ok"
+within_s = [0, 60]
+
+[[expect]]
+truth = "gait.state"
+is = "asleep"
+within_s = [1, 2]
+
+[[expect]]
+component = "left_elbow"
+state = "ok"
+within_s = [0, 3]
+
+[[expect]]
+channel = "left_knee.position"
+min = 10
+between_s = [0, 4]
+"""
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-P", "-m", "gateway.main", "sim", "run", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+
+
+@pytest.mark.parametrize("name", ["drive_fault", "node_lost"])
+def test_a_scenario_of_the_tree_holds(name: str, tmp_path: Path) -> None:
+    done = run(FOLDER / f"{name}.toml", "--dir", tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "FAILED" not in done.stdout
+    assert "expectations met" in done.stdout
+
+
+def test_what_is_not_as_expected_is_told_and_the_exit_status_is_1(tmp_path: Path) -> None:
+    file = tmp_path / "not_so.toml"
+    file.write_text(NOT_SO, encoding="utf-8")
+    done = run(file)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert done.stderr == ""
+    title, *lines = done.stdout.splitlines()
+    assert title == "Too much is expected"
+    told = {expected: seen.strip() for expected, seen in zip(lines[0:8:2], lines[1:8:2], strict=True)}
+    assert [line.split()[0] for line in told] == ["ok", "FAILED", "FAILED", "FAILED"]
+    asleep = told["  FAILED  true gait.state is 'asleep' once between 1 and 2 s"]
+    assert re.fullmatch(r"gait.state was 'running' from 1.\d\d to 2.00 s", asleep)
+    elbow = told["  FAILED  left_elbow is 'ok' once between 0 and 3 s"]
+    assert elbow == "there is no component left_elbow"
+    position = told["  FAILED  left_knee.position at least 10 always between 0 and 4 s"]
+    assert position.startswith("left_knee.position was ")
+    assert "3 of 4 expectations failed" in lines
+
+
+def test_a_gateway_that_does_not_start_is_told_with_its_last_words(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text("[robot]\ncolour = 1\n", encoding="utf-8")
+    done = run(FOLDER / "drive_fault.toml", "--dir", tmp_path)
+    assert done.returncode == 1
+    assert "the gateway did not start; it said:" in done.stderr
+    assert "colour" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "usage: gwrms sim run"),
+        (["none.toml"], "none.toml: cannot be read: No such file or directory"),
+        (["x.toml", "--speed", "0"], "0 is no speed"),
+    ],
+)
+def test_wrong_usage_and_files_that_are_no_scenarios_are_2(arguments: list[str], words: str) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+
+
+def test_a_wrong_file_keeps_the_others_from_running(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text('[[at]]\ntime_s = 1\nfault = "node_list"\n', encoding="utf-8")
+    done = run(FOLDER / "drive_fault.toml", wrong)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "wrong.toml [[at]] 1: there is no fault 'node_list'; did you mean 'node_lost'?" in done.stderr
+
+
+def test_a_script_happens_to_a_robot_without_a_gateway(tmp_path: Path) -> None:
+    file = tmp_path / "cut.toml"
+    file.write_text('[[at]]\ntime_s = 0.2\nfault = "sensor_unplugged"\non = "trunk"\n', encoding="utf-8")
+    command = [sys.executable, "-P", "-m", "gateway.main", "sim", "--dir", str(tmp_path / "robot")]
+    with subprocess.Popen([*command, "--script", str(file)], stdout=subprocess.PIPE) as simulator:
+        assert simulator.stdout is not None
+        assert b"ready" in simulator.stdout.readline()
+        with socket.socket(socket.AF_UNIX) as control:
+            control.settimeout(DEADLINE_S)
+            control.connect(str(tmp_path / "robot" / "control"))
+            answer = b""
+            while b"sensor_unplugged" not in answer:
+                control.sendall(b'{"list": true}\n')
+                answer = control.recv(65536)
+        assert not (tmp_path / "robot" / "trunk").exists()
+        simulator.terminate()
+    assert simulator.returncode == 0
