@@ -109,10 +109,19 @@ class Node(BusUser):
         return self.worker.submit(lambda sdo: sdo.download(index, subindex, data, timeout_s))
 
     def run(
-        self, job: Callable[[SdoChannel], T], *, urgent: bool = False, ahead: bytes | None = None
+        self,
+        job: Callable[[SdoChannel], T],
+        *,
+        urgent: bool = False,
+        ahead: bytes | None = None,
+        wake: bool = True,
     ) -> Future[T]:
         """Do several transfers in a row, nothing in between; see `SdoWorker.submit`."""
-        return self.worker.submit(job, urgent=urgent, ahead=ahead)
+        return self.worker.submit(job, urgent=urgent, ahead=ahead, wake=wake)
+
+    def wake(self) -> None:
+        """Follow what was asked for with `wake=False`."""
+        self.worker.wake()
 
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with the node now, in words with what to check; `None` when nothing is."""

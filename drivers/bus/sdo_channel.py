@@ -64,11 +64,11 @@ class SdoChannel:
     def interrupt(self, ahead: bytes | None = None) -> None:
         """End the transfer in flight, refuse further ones until `resume`, and send a request `ahead`.
 
-        The job that comes next finds that request sent when it makes it, and waits for the answer.
+        The job that comes next finds that request sent when it makes it, and waits for the answer. The one
+        that is interrupted learns of it when it next turns here, or by `wake`.
         """
         with self._sending:
             self._interrupted.set()
-            self._inbox.put(None)
             self._ahead = None
             with contextlib.suppress(Unavailable):  # whoever waits for an answer is told
                 if self._in_flight is not None:
@@ -77,6 +77,10 @@ class SdoChannel:
                     self._send(ahead)
                     self._ahead = ahead
             self._in_flight = None
+
+    def wake(self) -> None:
+        """Let a job that waits for an answer look whether it was interrupted."""
+        self._inbox.put(None)
 
     def resume(self) -> None:
         """Allow transfers again."""
@@ -162,7 +166,9 @@ class SdoChannel:
         """The next response; raises `queue.Empty` at the deadline and `Interrupted`."""
         while True:
             response = self._inbox.get(timeout=max(0.0, deadline - time.monotonic()))
-            self._check_interrupted()
+            if self._interrupted.is_set():
+                self._inbox.put(response)  # it may be the answer to what was sent ahead
+                raise Interrupted
             if response is not None:
                 return response
 

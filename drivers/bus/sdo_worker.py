@@ -65,16 +65,19 @@ class SdoWorker:
             self._open = False
             self._repeated.clear()
             self.channel.interrupt()
-            self._changed.notify()
+        self.wake()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
 
-    def submit(self, job: Job[T], *, urgent: bool = False, ahead: bytes | None = None) -> Future[T]:
+    def submit(
+        self, job: Job[T], *, urgent: bool = False, ahead: bytes | None = None, wake: bool = True
+    ) -> Future[T]:
         """Do `job` when its turn comes; the future's callbacks run in the worker's thread.
 
         `ahead` is the first request of an urgent job: it is sent now, by the caller's thread, if no other
-        urgent job has the channel.
+        urgent job has the channel. With `wake=False` the worker may not notice before `wake` is called: who
+        sends requests to many nodes has no use for their threads in between.
         """
         task = _Task(0 if urgent else 1, next(self._numbers), job)
         with self._changed:
@@ -84,8 +87,17 @@ class SdoWorker:
             if urgent and not self._has_urgent():
                 self.channel.interrupt(ahead)
             heapq.heappush(self._tasks, task)
-            self._changed.notify()
+            if wake:
+                self._changed.notify()
+        if urgent and wake:
+            self.channel.wake()
         return task.future
+
+    def wake(self) -> None:
+        """Let the worker look what there is to do."""
+        with self._changed:
+            self._changed.notify()
+        self.channel.wake()
 
     def repeat(self, period_s: float, job: Job[object]) -> Callable[[], None]:
         """Do `job` every `period_s`, never twice at once; returns how to end it. Its errors are its own."""

@@ -36,17 +36,22 @@ class PowerDrive:
         self._stop_rpdo: StopRpdo | None = None
         self._quick_stop_request = self._request(Controlword.QUICK_STOP)
 
-    def quick_stop(self) -> Future[StopOutcome]:
+    def quick_stop(self, *, wake: bool = True) -> Future[StopOutcome]:
         """Ask the drive for a quick stop, ahead of everything else that is asked of its node.
 
         The controlword is on the bus when this returns, unless another stop has the node's SDO channel. The
-        future's result says what the statusword confirmed within `stop_timeout_s`.
+        future's result says what the statusword confirmed within `stop_timeout_s`. Who stops several drives
+        wakes those who wait for their answers when all have been asked: `wake=False`, then `wake`.
         """
         self._stops += 1
         rpdo = self._stop_rpdo
         sent = rpdo is not None and rpdo.send()
         stopping = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, self.settings.stop_timeout_s)
-        return self._stop(stopping, None if sent else self._quick_stop_request)
+        return self._stop(stopping, None if sent else self._quick_stop_request, wake=wake)
+
+    def wake(self) -> None:
+        """Follow what was asked for with `wake=False`."""
+        self.node.wake()
 
     def disable_voltage(self) -> Future[StopOutcome]:
         """Take the motor's current away: an axis that a quick stop does not stop goes limp."""
@@ -75,10 +80,10 @@ class PowerDrive:
         """Find out which way a stop takes; raises `DriverError`."""
         self._stop_rpdo = find_stop_rpdo(self.node, sdo, self._offset)
 
-    def _stop(self, stopping: Stopping, ahead: bytes | None) -> Future[StopOutcome]:
+    def _stop(self, stopping: Stopping, ahead: bytes | None, *, wake: bool = True) -> Future[StopOutcome]:
         """Ask, where that is not done, and confirm, each in a job of its own; see `Stopping`."""
         if ahead is None:
-            return self._confirm(stopping)
+            return self._confirm(stopping, wake=wake)
         outcome: Future[StopOutcome] = Future()
 
         def confirm(asked: Future[None]) -> None:
@@ -88,12 +93,12 @@ class PowerDrive:
             else:
                 self._confirm(stopping).add_done_callback(partial(_pass_on, outcome))
 
-        asked = self.node.run(lambda sdo: stopping.ask(self._axis(sdo)), urgent=True, ahead=ahead)
+        asked = self.node.run(lambda sdo: stopping.ask(self._axis(sdo)), urgent=True, ahead=ahead, wake=wake)
         asked.add_done_callback(confirm)
         return outcome
 
-    def _confirm(self, stopping: Stopping) -> Future[StopOutcome]:
-        return self.node.run(lambda sdo: stopping.confirm(self._axis(sdo)), urgent=True)
+    def _confirm(self, stopping: Stopping, *, wake: bool = True) -> Future[StopOutcome]:
+        return self.node.run(lambda sdo: stopping.confirm(self._axis(sdo)), urgent=True, wake=wake)
 
     def _axis(self, sdo: SdoChannel) -> Axis:
         return Axis(sdo, self._offset)
