@@ -7,18 +7,15 @@ from pathlib import Path
 import eds
 from eds import Description, dcf
 from eds.datatypes import DATA_TYPE_BY_NAME
-from gateway.cli.params_file import FileProblem, Saved, Scope, device, is_meant
+from gateway.cli.params_file import FileProblem, Saved, Scope, device, is_configuration, is_meant
 from gateway.coding import Coding, Number, scaled
 from gateway.messages import ComponentInfo, ParameterInfo
-
-# What `ParameterInfo.read_only` calls what is no configuration: commands, written while the robot moves.
-COMMANDS = ("commanded", "controlword", "storage")
 
 
 def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
     """What the globs mean in the device; without any, all that can be configured there, by whomever."""
     infos = _of_node(scope, _named(scope, scope.component)).values()
-    return [info for info in infos if (is_meant(info, globs) if globs else info.read_only not in COMMANDS)]
+    return [info for info in infos if is_configuration(info) and (not globs or is_meant(info, globs))]
 
 
 def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:

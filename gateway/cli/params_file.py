@@ -10,6 +10,8 @@ from gateway.coding import Number
 from gateway.messages import ComponentInfo, Description, ParameterInfo
 from gateway.sources import matches
 
+COMMANDS = ("commanded", "controlword", "storage")  # as `ParameterInfo.read_only` calls them
+
 
 class FileProblem(ValueError):
     """A file of parameters that cannot be used; the message names file, place and remedy."""
@@ -41,6 +43,11 @@ class Format:
     ]  # what globs mean; without any, what it is for
     write: Callable[[Path, Scope, Mapping[str, Number]], bytes]
     read: Callable[[Path, Scope], Saved]
+
+
+def is_configuration(info: ParameterInfo) -> bool:
+    """Whether it can be read and is no command, which the master writes while the robot moves."""
+    return info.problem is None and info.read_only not in COMMANDS
 
 
 def is_meant(info: ParameterInfo, globs: Sequence[str]) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gateway.cli.params_file import FileProblem, Saved, Scope, device, is_meant
+from gateway.cli.params_file import FileProblem, Saved, Scope, device, is_configuration, is_meant
 from gateway.coding import Number
 from gateway.messages import ParameterInfo
 
@@ -19,7 +19,7 @@ def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
     return [
         info
         for info in scope.robot.parameters
-        if info.problem is None
+        if is_configuration(info)
         and scope.component in (None, info.component)
         and (is_meant(info, globs) if globs else info.read_only is None)
     ]

@@ -11,7 +11,7 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from eds import dcf
-from gateway.cli.params_dcf import COMMANDS
+from gateway.cli.params_file import COMMANDS
 from gateway.main import main
 from gateway.modules.parameters import Lock
 from gateway.wire import LINE_LIMIT

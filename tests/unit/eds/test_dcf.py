@@ -1,12 +1,16 @@
 """DCFs: what is written is read by us and by others, what others wrote is read or refused in words."""
 
 import configparser
+import contextlib
+import tempfile
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
 import canopen
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import eds
 from eds import EdsError, dcf
@@ -212,3 +216,18 @@ def test_an_eds_is_no_dcf(tmp_path: Path) -> None:
         dcf.read(SHIPPED / "joint_drive.eds", 5)
     with pytest.raises(EdsError, match="no object has a ParameterValue"):
         dcf.read(made(tmp_path, ODD, {}), 5)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.data())
+def test_a_damaged_file_is_read_or_refused_in_words(data: st.DataObject) -> None:
+    text = bytearray(FOREIGN.replace("{speed}", "5").encode())
+    for _ in range(data.draw(st.integers(1, 6))):
+        place = data.draw(st.integers(0, len(text) - 1))
+        text[place : place + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "damaged.dcf"
+        path.write_bytes(text)
+        with contextlib.suppress(EdsError):
+            node_id, _name = dcf.owner(path)
+            assert dcf.read(path, node_id or 1).values
