@@ -161,9 +161,21 @@ _OTHERWISE: dict[Key, int] = {
     SUPPORTED_MODES: 0x3AD,
 }
 
+# What is built into the robot, whatever a vendor's file says of the motor that its makers thought of.
+_BUILT_IN = frozenset(
+    {
+        ENCODER_INCREMENTS,
+        ENCODER_REVOLUTIONS,
+        GEAR_MOTOR_REVOLUTIONS,
+        GEAR_SHAFT_REVOLUTIONS,
+        RATED_CURRENT,
+        RATED_TORQUE,
+    }
+)
+
 
 class Objects:
-    """The dictionary of a drive, read with its gaps filled.
+    """The dictionary of a drive with its gaps filled; where the file gives no value, the object has ours.
 
     A vendor's manufacturer objects mean something else than ours: of them only our own drive's count.
     """
@@ -171,12 +183,16 @@ class Objects:
     def __init__(self, dictionary: Dictionary) -> None:
         self.dictionary = dictionary
         self._ours = _PRODUCT_CODE in dictionary and dictionary[_PRODUCT_CODE].value == _OUR_PRODUCT
+        for key, value in _OTHERWISE.items():
+            if self.has(key) and not dictionary[key].described:
+                dictionary[key].default = dictionary[key].value = value
 
     def has(self, key: Key) -> bool:
         return key in self.dictionary and (self._ours or key[0] not in _MANUFACTURER)
 
     def number(self, key: Key) -> int:
-        return self.dictionary[key].number() if self.has(key) else _OTHERWISE[key]
+        counts = self.has(key) and (self._ours or key not in _BUILT_IN)
+        return self.dictionary[key].number() if counts else _OTHERWISE[key]
 
     def positive(self, key: Key) -> int:
         """A number that cannot be 0."""

@@ -11,7 +11,7 @@ from hil_sim.node.dictionary import Entry, Key, Value
 
 _GRAM_SQUARE_CENTIMETRE = 1e-7  # kg·m²
 _TRIP = 1.25  # of the peak current: where the power stage switches itself off
-_NOT_WATCHED = 0xFFFF_FFFF  # 6065h and 6067h
+_NOT_WATCHED = (0, 0xFFFF_FFFF)  # 6065h and 6067h; 0 is what vendors' files say
 
 
 class Control(Enum):
@@ -99,15 +99,20 @@ def read(objects: Objects) -> Settings:
         return number(key) / counts
 
     def at_most(key: Key, most: Key) -> float:
-        return min(radians(key), radians(most))
+        return min(positive(key), positive(most)) / counts
 
     def torque(*keys: Key) -> float:
         return min(peak_torque, *(number(key) / 1000.0 * rated_torque for key in keys))
 
+    def limits(low: Key, high: Key) -> tuple[float, float]:
+        """None where they are equal, as in vendors' files."""
+        return (radians(low), radians(high)) if number(low) < number(high) else (-math.inf, math.inf)
+
     def window(size: Key, time: Key) -> Window:
-        watched = number(size) != _NOT_WATCHED
+        watched = number(size) not in _NOT_WATCHED
         return Window(radians(size) if watched else math.inf, number(time) / 1000.0)
 
+    low_limit, high_limit = limits(od.MIN_POSITION_LIMIT, od.MAX_POSITION_LIMIT)
     return Settings(
         counts_per_radian=counts,
         gear=gear,
@@ -130,8 +135,8 @@ def read(objects: Objects) -> Settings:
         deceleration=at_most(od.PROFILE_DECELERATION, od.MAX_DECELERATION),
         quick_stop_deceleration=at_most(od.QUICK_STOP_DECELERATION, od.MAX_DECELERATION),
         torque_slope=number(od.TORQUE_SLOPE) / 1000.0 * rated_torque,
-        low_limit=radians(od.MIN_POSITION_LIMIT),
-        high_limit=radians(od.MAX_POSITION_LIMIT),
+        low_limit=low_limit,
+        high_limit=high_limit,
         following=window(od.FOLLOWING_ERROR_WINDOW, od.FOLLOWING_ERROR_TIMEOUT),
         position_window=window(od.POSITION_WINDOW, od.POSITION_WINDOW_TIME),
         velocity_window=window(od.VELOCITY_WINDOW, od.VELOCITY_WINDOW_TIME),

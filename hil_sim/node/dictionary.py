@@ -19,6 +19,7 @@ class Entry:
     """One object: `value`, or what `source` says when the value is made at the moment of reading.
 
     `on_write` is asked before a new value is taken and may raise `SdoAbort`; `on_written` is told after.
+    `described` says whether the file gives a value at all.
     """
 
     __slots__ = (
@@ -26,6 +27,7 @@ class Entry:
         "commissioned",
         "data_type",
         "default",
+        "described",
         "high",
         "key",
         "low",
@@ -46,6 +48,7 @@ class Entry:
             self.low, self.high = 0, 1
         given: Value | None = variable.default
         self.commissioned: Value | None = variable.value  # what a DCF sets the device to
+        self.described = (given, self.commissioned) != (None, None)
         self.default: Value = coding.empty(self.data_type) if given is None else given
         self.value: Value = self.default if self.commissioned is None else self.commissioned
         self.source: Callable[[], Value] | None = None
