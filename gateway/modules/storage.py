@@ -1,7 +1,7 @@
 """Store (1010h) and restore (1011h): what a device keeps over a reset, on command, verified (CiA 301 §7.5.2).
 
 Refused unless the device says that it can, every drive that it may move is known to be at rest, and nothing
-is on trial that would become permanent.
+is on trial anywhere.
 """
 
 import time
@@ -142,13 +142,12 @@ class _Run:
     # Before
 
     def _check_trials(self) -> None:
-        """What is on trial would be made permanent."""
+        """It would be made permanent; and taking it back must not wait for a device that stores."""
         for undo in self._storage.keeping.undo.all():
-            name = next((one.parameter for one in undo.changes if one.component in self._sharing), None)
-            if name is not None:
-                how = "on trial; confirm or revert" if undo.trial else "still being taken back; wait for"
-                said = f"{name} is {how} that first (write {undo.write} of {undo.who})"
-                raise self._refusal(Kind.TRIAL_PENDING, said)
+            how = "on trial; confirm or revert" if undo.trial else "still being taken back; wait for"
+            names = ", ".join(change.parameter for change in undo.changes)
+            said = f"{names}: {how} that first (write {undo.write} of {undo.who})"
+            raise self._refusal(Kind.TRIAL_PENDING, said)
 
     def _check_capability(self) -> None:
         capability = self._capability()

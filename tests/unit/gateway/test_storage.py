@@ -174,9 +174,10 @@ def test_what_is_on_trial_is_never_made_permanent(resting: Bench, writer: Client
     for method in ("parameter.store", "parameter.restore"):
         error = writer.refused(method, component="left_knee")
         assert error.kind == "trial_pending"
-        assert "left_knee.max_torque is on trial; confirm or revert that first" in str(error)
+        assert "left_knee.max_torque: on trial; confirm or revert that first" in str(error)
         assert f"(write {trial['write']} of" in str(error)
-    assert writer.call("parameter.store", component="right_knee")["component"] == "right_knee"
+    # Taking it back, when its time is over, must not wait for another device either.
+    assert writer.refused("parameter.store", component="right_knee").kind == "trial_pending"
     writer.call("parameter.confirm", write=trial["write"])
     assert writer.call("parameter.store", component="left_knee")["component"] == "left_knee"
 
