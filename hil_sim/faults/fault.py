@@ -13,7 +13,7 @@ from hil_sim.drive.drive import JointDrive
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import CONTROLLER, JOINTS, SENSORS, Exoskeleton
 from hil_sim.node.node import Node
-from hil_sim.sensors.suite import FEET
+from hil_sim.sensors.suite import FEET, TRUNK
 
 Value = float | str
 
@@ -29,6 +29,7 @@ class Target(Enum):
     NODE = (*JOINTS, CONTROLLER)
     SENSOR = SENSORS
     INSOLE = FEET
+    IMU = (TRUNK,)
     FEET = ("insoles",)  # both at once
     BUS = ("bus",)
     HOST = ("host",)

@@ -1,5 +1,6 @@
 """Faults of one sensor: its plug, its settings, its cells. The switches are `hil_sim.sensors.faults`."""
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
@@ -105,6 +106,18 @@ FAULTS = {
         Target.INSOLE,
         _switched("saturated"),
         "Pressures end at a ceiling far too low, and the frame's flag says so (bit 2 of the COBS format).",
+    ),
+    "imu_drift": Fault(
+        Target.IMU,
+        _switched("drift", lambda site: math.radians(site.number("deg_per_s"))),
+        "Pitch runs away while the acceleration still points to the true down.",
+        {"deg_per_s": Number(1.0, -100.0, 100.0, "°/s", "what the gyro about the side axis reads too much")},
+    ),
+    "imu_saturated": Fault(
+        Target.IMU,
+        _switched("clipped_at", lambda site: site.number("limit")),
+        "No axis of the acceleration goes beyond the limit: at rest less than 9.8 m/s² in all.",
+        {"limit": Number(6.0, 0.1, 1000.0, "m/s²", "where each axis ends")},
     ),
     "swapped_feet": Fault(
         Target.FEET,

@@ -1,5 +1,6 @@
 """What can be wrong with a sensor and its line: plain switches, all off, to be set while the robot runs."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -25,3 +26,11 @@ class InsoleFaults(LineFaults):
     saturated: bool = False  # its amplifier ends far too low, and it says so where its format can
     drift: float = 0.0  # Pa/s by which every cell reads more and more; 0 again takes all of it away
     swapped: bool = False  # it lies in the other shoe
+
+
+@dataclass(slots=True)
+class ImuFaults(LineFaults):
+    """What else can be wrong with an IMU."""
+
+    drift: float = 0.0  # rad/s that its gyro about y reads too much, and its pitch with it; 0 takes it away
+    clipped_at: float = math.inf  # m/s² at which each axis of its accelerometer ends

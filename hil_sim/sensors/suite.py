@@ -11,7 +11,7 @@ from hil_sim.gait.wearer import Foot, Trunk
 from hil_sim.sensors import cia410, insole_cobs, insole_csv, insole_frame
 from hil_sim.sensors.bno08x_rvc import BNO08X_RVC
 from hil_sim.sensors.cia410 import Inclinometer
-from hil_sim.sensors.faults import InsoleFaults, LineFaults
+from hil_sim.sensors.faults import ImuFaults, InsoleFaults, LineFaults
 from hil_sim.sensors.line import SerialLine
 from hil_sim.sensors.serial_sensor import M, SerialFormat, SerialSensor
 from hil_sim.sensors.sole import Cell, Pressures, Sole
@@ -63,13 +63,14 @@ class SensorSuite:
     def __init__(self, choice: SensorChoice, clock: Clock, bus: CanBus, seed: int) -> None:
         self.choice = choice
         self.insole_faults = {name: InsoleFaults() for name in FEET}
-        self.faults: dict[str, LineFaults] = {**self.insole_faults, TRUNK: LineFaults()}
+        self.imu_faults = ImuFaults()
+        self.faults: dict[str, LineFaults] = {**self.insole_faults, TRUNK: self.imu_faults}
         self.lines: dict[str, SerialLine] = {}
         self._clock = clock
         self._last_ns = clock.now_ns - PERIOD_NS
         self._soles = [self._sole(choice.insole, name, seed) for name in FEET]
         self._senders = [self._serial(INSOLES[choice.insole][0], name, seed) for name in FEET]
-        self._imu = TrunkImu(self.faults[TRUNK], random.Random(f"{seed} {TRUNK}"))
+        self._imu = TrunkImu(self.imu_faults, random.Random(f"{seed} {TRUNK}"))
         self._trunk = self._trunk_sensor(choice.imu, bus, seed)
 
     def measure(self, left: Foot, right: Foot, trunk: Trunk) -> None:

@@ -2,10 +2,10 @@
 
 import math
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hil_sim.gait.wearer import GRAVITY, Trunk
-from hil_sim.sensors.faults import LineFaults
+from hil_sim.sensors.faults import ImuFaults
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -29,25 +29,34 @@ class Motion:
 class TrunkImu:
     """The sensor itself."""
 
-    def __init__(self, faults: LineFaults, random_source: random.Random) -> None:
+    def __init__(self, faults: ImuFaults, random_source: random.Random) -> None:
         self._faults = faults
         self._random = random_source
         self._before: Trunk | None = None
         self._last: Motion | None = None
+        self._drifted = 0.0
 
     def measure(self, trunk: Trunk, dt: float) -> Motion:
         """The trunk, `dt` seconds after the last measurement."""
+        drift = self._faults.drift
+        self._drifted = self._drifted + drift * dt if drift else 0.0
         if self._last is None or not self._faults.frozen:
-            rate = angular_rate(self._before or trunk, trunk, dt)
+            roll, pitch, yaw = angular_rate(self._before or trunk, trunk, dt)
+            told = replace(trunk, pitch=trunk.pitch + self._drifted)
             self._last = Motion(
-                angles=(trunk.roll, trunk.pitch, math.remainder(trunk.yaw, math.tau)),
-                orientation=quaternion(trunk),
-                acceleration=self._noisy(specific_force(trunk), _NOISE_ACCELERATION),
-                rate=self._noisy(rate, _NOISE_RATE),
+                angles=(told.roll, told.pitch, math.remainder(told.yaw, math.tau)),
+                orientation=quaternion(told),
+                acceleration=self._clipped(self._noisy(specific_force(trunk), _NOISE_ACCELERATION)),
+                rate=self._noisy((roll, pitch + drift, yaw), _NOISE_RATE),
                 temperature=_TEMPERATURE_C,
             )
         self._before = trunk
         return self._last
+
+    def _clipped(self, vector: Vector) -> Vector:
+        end = self._faults.clipped_at
+        x, y, z = (min(max(value, -end), end) for value in vector)
+        return x, y, z
 
     def _noisy(self, vector: Vector, noise: float) -> Vector:
         x, y, z = vector

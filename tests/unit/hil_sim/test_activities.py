@@ -12,7 +12,7 @@ from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.gaits import GAITS
 from hil_sim.gait.subject import NOMINAL, subject
 from hil_sim.gait.wearer import GRAVITY
-from hil_sim.sensors.faults import LineFaults
+from hil_sim.sensors.faults import ImuFaults
 from hil_sim.sensors.trunk_imu import TrunkImu
 from tests.unit.hil_sim.moving import USUAL, Moment, Moving, stride_of
 
@@ -143,7 +143,7 @@ def test_turning_goes_round_with_shorter_steps_inside(turn: Activity, inner: int
 
 
 def test_after_whole_turns_the_imu_still_tells_a_yaw_within_half_a_turn() -> None:
-    moving, imu = Moving(), TrunkImu(LineFaults(), random.Random(0))
+    moving, imu = Moving(), TrunkImu(ImuFaults(), random.Random(0))
     told = [imu.measure(moment.trunk, 0.01) for moment in moving.do(Activity.TURN_LEFT, 14.0)]
     assert moving.generator.heading > math.tau
     assert all(abs(motion.angles[2]) <= math.pi for motion in told)

@@ -204,6 +204,38 @@ def test_insole_saturated_ends_at_a_ceiling_and_says_so_in_its_flags(shared: Out
     assert any(frame.flags & SATURATED for frame in frames)
 
 
+def test_imu_drift_tilts_what_is_told_and_not_what_is_felt(shared: Outside) -> None:
+    def pitch_deg() -> float:
+        """Mean pitch of the angle frames."""
+        told = [words[1] * 180.0 / 32768.0 for words in trunk(shared, 0x53, 1.0)]
+        return sum(told) / len(told)
+
+    def forward_g() -> float:
+        """Mean acceleration along x, in which a true tilt shows gravity."""
+        felt = [words[0] * 16.0 / 32768.0 for words in trunk(shared, 0x51, 1.0)]
+        return sum(felt) / len(felt)
+
+    shared.run(1.0)
+    before, felt_before = pitch_deg(), forward_g()
+    shared.faults.begin("imu_drift", "trunk", params={"deg_per_s": 10})
+    shared.run(1.0)
+    assert pitch_deg() == pytest.approx(before + 15, abs=3)
+    assert forward_g() == pytest.approx(felt_before, abs=0.05)
+    shared.faults.clear()
+    assert pitch_deg() == pytest.approx(before, abs=3)
+
+
+def test_imu_saturated_never_says_more_than_its_limit(shared: Outside) -> None:
+    def most() -> float:
+        frames = trunk(shared, 0x51, 0.5)
+        return max(abs(word) * 16.0 * 9.80665 / 32768.0 for words in frames for word in words[:3])
+
+    assert most() > 9
+    shared.faults.begin("imu_saturated", "trunk", params={"limit": 6})
+    shared.run(0.02)
+    assert most() == pytest.approx(6, abs=0.01)
+
+
 def test_swapped_feet_load_each_insole_in_the_other_ones_turn(tmp_path: Path) -> None:
     def loads(swapped: bool) -> dict[str, list[int]]:
         with closing(Outside(tmp_path)) as outside:

@@ -10,7 +10,7 @@ from drivers.insole.layout import load as load_layout
 from hil_sim.gait.wearer import GRAVITY, Foot, Trunk
 from hil_sim.sensors import insole_cobs, insole_csv, insole_frame, vectornav, witmotion, xsens
 from hil_sim.sensors.bno08x_rvc import BNO08X_RVC, phone_angles
-from hil_sim.sensors.faults import InsoleFaults, LineFaults
+from hil_sim.sensors.faults import ImuFaults, InsoleFaults
 from hil_sim.sensors.serial_sensor import Tick
 from hil_sim.sensors.sole import Cell, Pressures, Sole
 from hil_sim.sensors.trunk_imu import Motion, TrunkImu, quaternion
@@ -29,7 +29,7 @@ class Quiet(random.Random):
 
 
 def motion(trunk: Trunk) -> Motion:
-    return TrunkImu(LineFaults(), Quiet()).measure(trunk, 0.01)
+    return TrunkImu(ImuFaults(), Quiet()).measure(trunk, 0.01)
 
 
 def sole(
@@ -232,7 +232,7 @@ def test_a_tilted_imu_at_rest_feels_gravity_where_it_should() -> None:
 
 
 def test_the_rate_is_that_of_the_attitude() -> None:
-    sensor = TrunkImu(LineFaults(), Quiet())
+    sensor = TrunkImu(ImuFaults(), Quiet())
     sensor.measure(Trunk(0.1, 0.2, 0.3, (0.0, 0.0, GRAVITY)), 0.01)
     rate = sensor.measure(Trunk(0.1, 0.21, 0.3, (0.0, 0.0, 0.0)), 0.01).rate
     assert rate == pytest.approx([0.0, math.cos(0.1), -math.sin(0.1)], abs=1e-3)

@@ -20,7 +20,7 @@ from hil_sim.gait.activity import Activity
 from hil_sim.gait.generator import Generator
 from hil_sim.gait.walk import Shape
 from hil_sim.gait.wearer import Foot, Wearer
-from hil_sim.sensors.faults import InsoleFaults, LineFaults
+from hil_sim.sensors.faults import ImuFaults, InsoleFaults, LineFaults
 from hil_sim.sensors.insole_cobs import CELLS, INSOLE_COBS
 from hil_sim.sensors.serial_sensor import SerialSensor
 from hil_sim.sensors.sole import Pressures, Sole
@@ -40,7 +40,7 @@ class Seeded:
 
     left: InsoleFaults = field(default_factory=InsoleFaults)
     right: InsoleFaults = field(default_factory=InsoleFaults)
-    trunk: LineFaults = field(default_factory=LineFaults)
+    trunk: ImuFaults = field(default_factory=ImuFaults)
     cells: CellFault = lambda pascal, _: pascal  # of the left foot
     motion: MotionFault = lambda motion, _: motion
     axes: tuple[str, str, str] | None = None
@@ -187,7 +187,7 @@ CASES: dict[str, tuple[Callable[[], Seeded], str]] = {
     "insole ten times too low": (lambda: Seeded(cells=times(0.1)), "scale is off"),
     "sign of the tilt": (lambda: Seeded(motion=backwards), "tilt and gravity disagree"),
     "IMU upside down": (lambda: Seeded(axes=("x", "-y", "-z")), "upside down"),
-    "IMU hangs": (lambda: Seeded(trunk=LineFaults(frozen=True)), "same acceleration"),
+    "IMU hangs": (lambda: Seeded(trunk=ImuFaults(frozen=True)), "same acceleration"),
     "acceleration ten times too high": (lambda: Seeded(motion=heavier(10.0)), "scale is off"),
     "acceleration ten times too low": (lambda: Seeded(motion=heavier(0.1)), "scale is off"),
     "impossible rates": (lambda: Seeded(motion=spinning), "faster than"),
