@@ -98,6 +98,8 @@ class Arming:
             _check_reaction(sdo, ABORT_CONNECTION + offset)
         if self._entry is None or unsigned(sdo.upload(CONSUMER, self._entry)[:4]) != self._ours:
             self._take_entry(sdo)
+        if not self.armed:
+            self._heartbeat.beat()  # a device begins to watch with the first one that it hears
 
     def _take_entry(self, sdo: SdoChannel) -> None:
         """Write the entry that has our node id already, else the first one that is free."""

@@ -28,8 +28,8 @@ class Heartbeat(BusUser):
         self.problem: str | None = None  # why a device must not rely on it, in words
         self._bus = bus
         self._fed_ns = self._ticked_ns = 0
-        cycle = Cycle(HEARTBEAT + self.node_id, bytes([NmtState.OPERATIONAL]), period_s, self._alive)
-        self._cycles = Cycles(f"can {bus.name} heartbeat", [cycle], bus.send)
+        self._cycle = Cycle(HEARTBEAT + self.node_id, bytes([NmtState.OPERATIONAL]), period_s, self._alive)
+        self._cycles = Cycles(f"can {bus.name} heartbeat", [self._cycle], bus.send)
 
     def start(self) -> None:
         """Send from when the bus opens on; whoever starts it feeds it."""
@@ -46,6 +46,10 @@ class Heartbeat(BusUser):
     def feed(self) -> None:
         """Say that whatever the devices rely on still runs."""
         self._fed_ns = time.monotonic_ns()
+
+    def beat(self) -> None:
+        """Send one now; raises `Unavailable`."""
+        self._bus.send(self._cycle.can_id, self._cycle.data)
 
     def bus_opened(self) -> None:
         self._ticked_ns = time.monotonic_ns()

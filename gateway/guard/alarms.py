@@ -13,7 +13,7 @@ from gateway.loop import Loop
 
 log = logging.getLogger(__name__)
 
-WHO = "guard"
+WHO, ALARM = "guard", "alarm"
 SAY_AGAIN_S = 5.0  # how often one rule is written down; what comes between is counted, the newest is told
 STALE_S = 2.0  # a guard that says nothing for so long is not there
 STATE_WORDS = {int(state): state.words for state in State}
@@ -52,7 +52,8 @@ class Alarms:
     def _write(self, about: str, what: str, reason: str, left_out: int) -> None:
         self._silent_until[about] = time.monotonic() + SAY_AGAIN_S
         more = {"left_out": left_out} if left_out else {}
-        log.warning("%s %s: %s%s", what, about, reason, f" ({left_out} more before)" if left_out else "")
+        level = logging.WARNING if what == ALARM else logging.INFO
+        log.log(level, "%s %s: %s%s", what, about, reason, f" ({left_out} more before)" if left_out else "")
         self._append(WHO, what, about=about, reason=reason, **more)
 
 

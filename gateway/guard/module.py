@@ -13,7 +13,7 @@ from drivers.bus.arming import Arming
 from drivers.joint.quick_stop import StopOutcome
 from gateway import messages
 from gateway.futures import failed
-from gateway.guard.alarms import WHO, Alarms, GuardSource
+from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
 from gateway.guard.settings import Action, GuardSettings
 from gateway.guard.watcher import Change, State, Watcher
@@ -108,7 +108,7 @@ class GuardModule:
                 self._stopping[name] = _quick_stop(drive)
 
     def _arming_changed(self, joints: str, arming: Arming) -> None:
-        what = "armed" if arming.armed else "alarm"
+        what = "armed" if arming.armed else ALARM
         self._loop.post(lambda: self._tell(joints, what, arming.text))
 
     # In the loop.
@@ -117,7 +117,7 @@ class GuardModule:
         if change.acts:
             self._act(name, watcher, change)
         elif change.state is State.BLIND:
-            self._tell(name, "alarm", change.reason)
+            self._tell(name, ALARM, change.reason)
         else:
             self._tell(name, "alarm over", f"{watcher.what} is {change.state.words}")
         self._publish()
@@ -130,11 +130,11 @@ class GuardModule:
         if Action.REVERT_TRIALS in actions:
             self._control.revert_trials(why)
         if Action.ALARM in actions:
-            self._tell(name, "alarm", change.reason)
+            self._tell(name, ALARM, change.reason)
 
     def _tell(self, about: str, what: str, reason: str) -> None:
         if not self._ended:
-            self._count += what == "alarm"
+            self._count += what == ALARM
             self._alarms.tell(about, what, reason)
 
     def _refuses_reset(self) -> str | None:

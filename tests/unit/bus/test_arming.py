@@ -89,6 +89,18 @@ def test_the_first_free_entry_is_taken_and_read_back(bench: Make, reaction: int)
         assert found.arming.text == "armed by 1016h:2, 250 ms"
 
 
+def test_it_is_armed_only_when_it_has_heard_us_after_its_entry_was_written(
+    bench: Make, channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A consumer watches from the first heartbeat on that it receives (CiA 301 §7.2.8.3.2.2)."""
+    monkeypatch.setattr("drivers.bus.cycles.Cycles.start", lambda _cycles: None)  # ours would come much later
+    with bench({**consumer(0), **option(3)}) as found:
+        until(lambda: found.arming.armed)
+        until(lambda: (0x764, b"\x05") in found.fake.seen)
+        written = next(at for at, (_, data) in enumerate(found.fake.seen) if data[:4] == b"\x23\x16\x10\x01")
+        assert found.fake.seen.index((0x764, b"\x05")) > written
+
+
 def test_an_entry_of_ours_is_taken_up_again_and_not_written_twice(bench: Make) -> None:
     with bench({**consumer(0, OURS), **option(3)}) as found:
         until(lambda: found.arming.armed)
