@@ -55,10 +55,10 @@ def test_times_are_of_both_clocks(tmp_path: Path) -> None:
 
 
 def test_who_walks_has_phases_and_alternating_events(tmp_path: Path) -> None:
-    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 9.0)
+    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 6.5)
     assert rows[10]["label"] == "stand"
     assert rows[10]["left_phase"] is None
-    even = rows[300:]
+    even = rows[250:]
     assert {row["label"] for row in even} == {"walk"}
     assert not any(row["transition"] for row in even)
     events = [(row, event) for row in even for event in row["events"]]
@@ -76,8 +76,8 @@ def test_who_walks_has_phases_and_alternating_events(tmp_path: Path) -> None:
 
 def test_the_file_alone_shows_that_newton_holds(tmp_path: Path) -> None:
     robot = Exoskeleton(Scenario.FALL, seed=2)
-    robot.follow([Entry(Activity.WALK, 5.0), Entry(Activity.FALL, 4.0), Entry(Activity.SIT)])
-    header, rows = recorded(tmp_path / "truth", robot, 12.0)
+    robot.follow([Entry(Activity.WALK, 3.0), Entry(Activity.FALL, 2.5), Entry(Activity.STAND)])
+    header, rows = recorded(tmp_path / "truth", robot, 7.0)
     mass = header["wearer"]["mass"]
     for row in rows:
         forces = row["left_foot.force"] + row["right_foot.force"] + row["support.force"]
@@ -87,7 +87,7 @@ def test_the_file_alone_shows_that_newton_holds(tmp_path: Path) -> None:
 
 
 def test_velocities_are_those_of_the_joints(tmp_path: Path) -> None:
-    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK), 6.0)
+    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK), 3.5)
     for joint in ("left_hip", "right_knee"):
         slopes = [(b[f"{joint}.position"] - a[f"{joint}.position"]) / 0.01 for a, b in pairwise(rows)]
         told = [(a[f"{joint}.velocity"] + b[f"{joint}.velocity"]) / 2.0 for a, b in pairwise(rows)]
@@ -98,10 +98,10 @@ def lived(truth: Path | None) -> list[float]:
     """Where the first seconds of a day have brought the joints."""
     robot = Exoskeleton(Scenario.DAY, seed=7, person=2)
     if truth is not None:
-        recorded(truth, robot, 3.5)
+        recorded(truth, robot, 2.0)
     else:
         robot.power_on()
-        robot.clock.run_until(3_500_000_000)
+        robot.clock.run_until(2_000_000_000)
     return [drive.joint.position for drive in robot.drives.values()]
 
 
