@@ -6,11 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from gateway.main import COMMANDS
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.fault import FaultRefused, Target
 from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
+from hil_sim.scenario.script import load
 
+BENCH = (Path(__file__).parents[3] / "docs" / "bench.md").read_text(encoding="utf-8")
 TESTED = {
     name
     for file in Path(__file__).parent.glob("test_fault_*.py")
@@ -41,6 +44,26 @@ def pass_time(robot: Exoskeleton, seconds: float) -> None:
 def test_every_fault_has_a_test_of_its_own_and_says_how_it_looks(name: str) -> None:
     assert any(tested.startswith(f"{name}_") for tested in TESTED)
     assert re.fullmatch(r"[A-Z0-9].{20,}\.", FAULTS[name].looks)
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_every_fault_stands_in_the_bench_chapter_as_it_looks(name: str) -> None:
+    assert f"\n| `{name}` | {FAULTS[name].looks} |\n" in BENCH
+
+
+def test_the_bench_chapter_names_no_fault_and_no_command_that_is_none() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| [A-Z0-9]", BENCH, re.MULTILINE)
+    assert rows
+    assert set(rows) == set(FAULTS)
+    commands = set(re.findall(r"gwrms ([a-z-]+)", BENCH))
+    assert {"sim", "sim-fault", "gateway"} <= commands <= set(COMMANDS)
+
+
+def test_the_bench_chapters_scenario_can_be_read(tmp_path: Path) -> None:
+    (text,) = re.findall(r"```toml\n(.*?)```", BENCH, re.DOTALL)
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    script = load(tmp_path / "mine.toml")
+    assert f"\n{script.title}\n  ok      {script.expectations[0].words}\n" in BENCH
 
 
 def test_there_are_at_least_thirty() -> None:
