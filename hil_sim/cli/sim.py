@@ -56,8 +56,8 @@ the wearer
 
 the drives
   Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
-  bus. It keeps commanding "enable operation" until a drive leaves that state. Then it stops all drives and
-  waits for 1 in its object 2000h.
+  bus. It keeps commanding "enable operation" until a drive leaves that state, a heartbeat goes missing or 0
+  is written to its object 2000h. Then it stops all drives and waits for 1 in that object.
 
 sensors
   --imu and --insole choose the languages that they speak, from the makers' manuals. `gwrms sensor
