@@ -6,6 +6,7 @@ entry of anybody else is never touched.
 
 import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from functools import partial
 
 from drivers.bus.heartbeat import Heartbeat
@@ -56,15 +57,15 @@ class Arming:
         """Look no more. The drive stays as it is: disarm it first."""
         self.node.detach(self)
 
-    def disarm(self) -> None:
-        """Free our entry, and read back that it is free; waits for the drive.
+    def disarm(self) -> Future[None]:
+        """Free our entry, and read back that it is free.
 
-        Raises `DriverError` where the drive does not confirm it: it is then to be taken for armed.
+        It fails with a `DriverError` where the drive does not confirm it: then take it for armed.
         """
         with self._lock:
             self._life += 1
             self._end_checks()
-        self.node.run(self._disarm).result()
+        return self.node.run(self._disarm)
 
     # What the node tells.
 

@@ -1,20 +1,16 @@
 """All drives that stop by themselves when the gateway dies, and why it may not end now."""
 
-import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from drivers.bus.arming import Arming
 from drivers.bus.heartbeat import Heartbeat
-from drivers.errors import DriverError
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.quantities import AXIS_OFFSET, STATUSWORD
 
 if TYPE_CHECKING:
     from drivers.joint.drive import JointDrive
-
-log = logging.getLogger(__name__)
 
 
 class Armings:
@@ -68,14 +64,10 @@ class Armings:
             heartbeat.feed()
 
     def stop(self) -> list[str]:
-        """Disarm what can be reached, then let the heartbeats end; returns what could not be disarmed."""
-        failures = []
+        """Disarm the drives, then let the heartbeats end; returns which may still be armed, and why."""
+        freeing = [arming.disarm() for arming in self._each()]
+        failures = [str(error) for one in freeing if (error := one.exception()) is not None]
         for arming in self._each():
-            try:
-                if arming.node.ready:
-                    arming.disarm()
-            except DriverError as error:
-                failures.append(f"{error}; it may act as if the gateway had died")
             arming.stop()
         for heartbeat in self._heartbeats.values():
             heartbeat.stop()
@@ -103,11 +95,12 @@ def _by_node(drives: "Mapping[str, JointDrive]") -> "Iterable[list[JointDrive]]"
 
 
 def _still_on(name: str, drive: "JointDrive") -> str | None:
-    """A drive that is enabled, or that answers and does not say whether it is."""
-    if not drive.node.ready:
+    """A drive that is enabled, or that is there and does not say whether it is."""
+    now_ns = time.monotonic_ns()
+    if not drive.node.ready or drive.node.life.lost(now_ns):
         return None
     index = next(i for i, channel in enumerate(drive.channels) if channel.quantity == STATUSWORD)
-    statusword = drive.latest.read(index, time.monotonic_ns())[0]
+    statusword = drive.latest.read(index, now_ns)[0]
     if statusword is None:
         return f"nobody knows whether {name} is enabled"
     enabled = drive_state(int(statusword)) is DriveState.OPERATION_ENABLED

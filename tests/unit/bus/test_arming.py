@@ -192,7 +192,7 @@ def test_nobody_relies_on_a_heartbeat_that_somebody_else_sends_too(bench: Make, 
 def test_disarming_frees_our_entry_alone_and_is_read_back(bench: Make) -> None:
     with bench({**consumer(THEIRS, 0), **option(3)}) as found:
         until(lambda: found.arming.armed)
-        found.arming.disarm()
+        found.arming.disarm().result()
         assert [entry(found.fake, at) for at in (1, 2)] == [THEIRS, 0]
         assert found.arming.armed is False
         asked = len(found.fake.requests)
@@ -204,7 +204,7 @@ def test_disarming_frees_our_entry_alone_and_is_read_back(bench: Make) -> None:
 def test_disarming_a_drive_that_was_never_armed_writes_nothing(bench: Make) -> None:
     with bench({**consumer(THEIRS), **option(3)}) as found:
         found.until_said("not armed", "taken")
-        found.arming.disarm()
+        found.arming.disarm().result()
         assert not found.fake.writes
 
 
@@ -213,8 +213,8 @@ def test_a_drive_that_does_not_confirm_that_it_is_free_is_taken_for_armed(bench:
         until(lambda: found.arming.armed)
         found.fake.on_write = lambda index, subindex, data: found.fake.objects.update(consumer(OURS))
         with pytest.raises(Mismatch):
-            found.arming.disarm()
+            found.arming.disarm().result()
         assert found.arming.armed is True
         found.fake.silent = True
         with pytest.raises(DriverError):
-            found.arming.disarm()
+            found.arming.disarm().result()
