@@ -1,6 +1,7 @@
 """`gwrms sim run`: scenario files as tests."""
 
 import argparse
+import signal
 import sys
 import tempfile
 from contextlib import ExitStack
@@ -9,7 +10,7 @@ from pathlib import Path
 from hil_sim.cli.arguments import speed
 from hil_sim.scenario import report
 from hil_sim.scenario.runner import run
-from hil_sim.scenario.script import load
+from hil_sim.scenario.script import Script, load
 from hil_sim.scenario.table import ScenarioError
 
 _DESCRIPTION = """\
@@ -24,6 +25,9 @@ file that is no scenario. docs/bench.md tells how to write one; those in scenari
 example
   gwrms sim run scenarios/node_lost.toml
 """
+
+
+_TERMINATED = 128 + signal.SIGTERM  # as a shell says it; robot and gateway are ended on the way
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -61,12 +65,19 @@ def main(argv: list[str]) -> int:
     except ScenarioError as error:
         sys.stderr.write(f"gwrms sim run: {error}\n")
         return 2
-    failed = False
-    for script in scripts:
-        with ExitStack() as stack:
-            folder = arguments.dir or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gwrms-")))
-            outcome = run(script, folder, arguments.speed)
-        sys.stdout.write(report.text(script, outcome))
-        sys.stdout.flush()
-        failed = failed or not outcome.ok
-    return 1 if failed else 0
+    before = signal.signal(signal.SIGTERM, lambda _signal, _frame: sys.exit(_TERMINATED))
+    try:
+        held = [_holds(script, arguments) for script in scripts]
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    return 0 if all(held) else 1
+
+
+def _holds(script: Script, arguments: argparse.Namespace) -> bool:
+    """Run one, and print what came of it."""
+    with ExitStack() as stack:
+        folder = arguments.dir or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gwrms-")))
+        outcome = run(script, folder, arguments.speed)
+    sys.stdout.write(report.text(script, outcome))
+    sys.stdout.flush()
+    return outcome.ok

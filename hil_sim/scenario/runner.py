@@ -10,7 +10,7 @@ from hil_sim.clock import SECOND_NS
 from hil_sim.errors import SimulatorError
 from hil_sim.operator import Operator
 from hil_sim.robot import SimulatedRobot
-from hil_sim.scenario.expectation import Observed, Verdict
+from hil_sim.scenario.expectation import Verdict
 from hil_sim.scenario.gateway import GatewayLink, GatewayProcess
 from hil_sim.scenario.observer import Observer
 from hil_sim.scenario.script import Line, Script
@@ -24,7 +24,6 @@ class Outcome:
     """What a scenario gave; `skipped_s` is simulated time that the computer was too slow for."""
 
     verdicts: tuple[Verdict, ...]
-    observed: Observed
     skipped_s: float
 
     @property
@@ -83,7 +82,7 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
         robot.run(script.seconds)
         skipped_s = robot.loop.skipped_ns / SECOND_NS
     verdicts = tuple(expectation.judge(observer.observed) for expectation in script.expectations)
-    return Outcome(verdicts, observer.observed, skipped_s)
+    return Outcome(verdicts, skipped_s)
 
 
 def _end_early(robot: SimulatedRobot, script: Script, observer: Observer) -> None:

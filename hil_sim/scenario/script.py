@@ -1,9 +1,7 @@
-"""A scenario file: the robot, what happens to it and when, and what is expected.
+"""A scenario file: the robot, what happens to it and when, and what is expected (docs/bench.md).
 
-title = "A node falls silent and comes back"
-[robot]      activity, seed, seconds
-[[at]]       time_s, and one of fault, clear, activity, controller, stop, set
-[[expect]]   component, channel, truth or answer; at_s, within_s or between_s; what it must be
+`[robot]` has scenario, seconds, seed, subject, imu and insole; each `[[at]]` a time and one thing that
+happens; each `[[expect]]` what is looked at, what it must be, and when.
 """
 
 import tomllib

@@ -4,11 +4,14 @@ These take as long as what happens in them; `gwrms sim run scenarios/*.toml` run
 """
 
 import re
+import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 pytestmark = pytest.mark.timeout(300)
@@ -104,6 +107,18 @@ def test_a_wrong_file_keeps_the_others_from_running(tmp_path: Path) -> None:
     done = run(FOLDER / "drive_fault.toml", wrong)
     assert (done.returncode, done.stdout) == (2, "")
     assert "wrong.toml [[at]] 1: there is no fault 'node_list'; did you mean 'node_lost'?" in done.stderr
+
+
+def test_a_run_that_is_terminated_leaves_no_gateway_behind(tmp_path: Path) -> None:
+    command = [sys.executable, "-P", "-m", "gateway.main", "sim", "run", str(FOLDER / "node_lost.toml")]
+    with subprocess.Popen([*command, "--dir", str(tmp_path)]) as running:
+        deadline = time.monotonic() + DEADLINE_S
+        while not (gateways := psutil.Process(running.pid).children()):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        running.terminate()
+        assert running.wait(DEADLINE_S) == 128 + signal.SIGTERM
+    assert not any(gateway.is_running() for gateway in gateways)
 
 
 def test_a_script_happens_to_a_robot_without_a_gateway(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import can
 import pytest
 
 from hil_sim.bus import hub as hub_module
-from hil_sim.bus.can_bus import CanBus, Frame
+from hil_sim.bus.can_bus import CanBus, Disturbance, Frame
 from hil_sim.bus.hub import Hub
 from hil_sim.bus.socketcand import Messages, frame_message, parse_send
 from hil_sim.clock import Clock
@@ -99,6 +99,25 @@ def test_a_client_reaches_the_bus_and_the_other_clients_but_not_itself(running: 
         assert answer.arbitration_id == 0x1ABCDEF0
         assert answer.is_extended_id
     assert Frame(0x60A, b"\x40\x00\x10\xff") in running.heard
+
+
+def test_error_frames_reach_the_clients_and_cost_no_frame(running: Running) -> None:
+    class EverySecondAttempt(Disturbance):
+        attempts = 0
+
+        def survives(self, _frame: Frame, _sender: object, /) -> bool:
+            self.attempts += 1
+            return self.attempts % 2 == 0
+
+    with running.client() as client:
+        running.bus.disturbances.append(EverySecondAttempt())
+        error = receive(client, lambda message: message.is_error_frame)
+        assert error.arbitration_id == 0x088  # Linux can/error.h: protocol violation, error on the bus
+        counters: list[int] = []
+        while len(counters) < 20:
+            message = receive(client, lambda message: message.arbitration_id == 0x181)
+            counters.append(struct.unpack("<Q", message.data)[0])
+        assert counters == list(range(counters[0], counters[0] + 20))
 
 
 def connect(running: Running) -> socket.socket:

@@ -1,6 +1,6 @@
 """Scenario files: what they may say, how expectations are judged, and what a person reads of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -219,8 +219,7 @@ def test_state_and_problem_of_one_line_are_two_expectations(tmp_path: Path) -> N
 
 def test_the_report_tells_what_was_expected_and_what_was_seen() -> None:
     verdicts = (Verdict(True, "a is 1", "a was 1"), Verdict(False, "b is 2", "b was 3"))
-    observed: Mapping[Track, Sequence[Moment]] = {}
-    text = report.text(Script(title="Two things"), Outcome(verdicts, observed, skipped_s=0.0))
+    text = report.text(Script(title="Two things"), Outcome(verdicts, skipped_s=0.0))
     assert text.splitlines() == [
         "Two things",
         "  ok      a is 1",
@@ -229,7 +228,7 @@ def test_the_report_tells_what_was_expected_and_what_was_seen() -> None:
         "          b was 3",
         "1 of 2 expectations failed",
     ]
-    slow = report.text(Script(title="x"), Outcome(verdicts[:1], observed, skipped_s=0.31))
+    slow = report.text(Script(title="x"), Outcome(verdicts[:1], skipped_s=0.31))
     assert "all 1 expectations met\nThis computer was too slow: 0.3 s were left out" in slow
 
 
