@@ -205,7 +205,7 @@ class Tuning:
         if ledger.kept.trial and trial_s is not None:
             self.trials.begin(ledger.kept, trial_s, session, ledger.replaced)
         else:
-            self.trials.take_up(ledger.kept, "its roll-back failed", done(None))
+            self.trials.take_up(ledger.kept, "its roll-back failed", done(None), ledger.problem)
 
     def _written(self, outcome: Outcome, ledger: WriteLedger) -> Written:
         now_ns = time.monotonic_ns()

@@ -14,6 +14,7 @@ import pytest
 from gateway.config import load
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
+from hil_sim.control_socket import ask
 from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.node.dictionary import Value
 from hil_sim.robot import SimulatedRobot
@@ -140,6 +141,51 @@ def test_a_node_lost_in_mid_roll_back_is_taken_back_when_it_returns(
     hip.power_on()
     until(lambda: writer.call("robot.describe")["trials"] == [], "taken back")
     until(lambda: read(writer) == before, "as it was")
+
+
+THREE = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")}
+
+
+def test_doubled_sdo_answers_change_nothing(robot: SimulatedRobot, writer: Client) -> None:
+    for joint in ("left_hip", "left_knee", "left_ankle"):
+        ask(robot.folder.path, {"fault": "sdo_duplicate", "on": joint})
+    for torque in (60.0, 61.0, 62.0, 63.0):
+        changes = dict.fromkeys(THREE, torque)
+        assert writer.call("parameter.write", changes=changes)["after"] == changes
+        values = writer.call("parameter.read", names=list(THREE))["values"]
+        assert {name: one["value"] for name, one in values.items()} == changes
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [{"fault": "sdo_late", "params": {"delay_ms": 800}}, {"fault": "sdo_silent"}, {"fault": "bus_cut"}],
+)
+def test_answers_that_fail_in_mid_transaction_leave_all_as_they_were_in_the_end(
+    robot: SimulatedRobot, writer: Client, fault: dict[str, Any]
+) -> None:
+    """The knee's write is carried out, but nobody is told, or too late."""
+    before = read(writer)
+    dictionary = robot.exoskeleton.drives["left_knee"].dictionary
+    on = {} if fault["fault"] == "bus_cut" else {"on": "left_knee"}
+
+    def begin(_value: Value) -> None:
+        dictionary[KNEE_TORQUE].on_write = None
+        robot.operator.obey({**fault, **on})
+
+    dictionary[KNEE_TORQUE].on_write = begin
+    error = writer.refused("parameter.write", changes=THREE)
+    assert error.kind in ("rolled_back", "rollback_failed")
+    ask(robot.folder.path, {"clear": "all"})
+    until(lambda: writer.call("robot.describe")["trials"] == [], "all is taken back")
+    until(lambda: read(writer) == before, "as it was")
+
+
+def test_a_write_goes_through_a_storm_of_emergencies(robot: SimulatedRobot, writer: Client) -> None:
+    """8000h is the vendor's to define: the drive goes on."""
+    ask(robot.folder.path, {"fault": "bus_load", "params": {"percent": 90, "cob_id": 0x081}})
+    assert writer.call("parameter.write", changes=THREE)["after"] == THREE
+    values = writer.call("parameter.read", names=list(THREE))["values"]
+    assert {name: one["value"] for name, one in values.items()} == THREE
 
 
 def test_two_clients_racing_for_the_lease_never_both_have_it(robot: SimulatedRobot) -> None:
