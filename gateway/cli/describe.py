@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, exact, say, say_json, table
-from gateway.messages import ChannelInfo, Description, ParameterInfo
+from gateway.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo
 
 PAGE = 100  # columns
 
@@ -42,6 +42,8 @@ def _chapters(robot: Description) -> Iterator[str]:
             right=(3,),
         ) + "".join(_read_only(robot.parameters))
     yield _stop(robot)
+    if robot.guard.configured:
+        yield _guard(robot.guard)
 
 
 def _channels(channels: list[ChannelInfo]) -> str:
@@ -91,11 +93,27 @@ def _stop(robot: Description) -> str:
                 name,
                 _option(drive.quick_stop_option, drive.quick_stop),
                 _option(drive.abort_connection_option, drive.abort_connection),
-                "stops if the gateway dies" if drive.armed else "no",
+                "stops if the gateway dies" if drive.armed else robot.guard.arming.get(name, "no"),
             )
             for name, drive in robot.stop.drives.items()
         ],
     )
+
+
+def _guard(guard: GuardInfo) -> str:
+    if guard.problem is not None:
+        return f"the guard does not run: {guard.problem}\n"
+    return table(
+        ("GUARD RULE", "WATCHES", "TRIPS", "ACTIONS", "STATE", "REASON"),
+        [_rule(rule) for rule in guard.rules],
+    )
+
+
+def _rule(rule: GuardRuleInfo) -> tuple[str, ...]:
+    actions = ", ".join(action.replace("_", " ") for action in rule.actions)
+    more = len(rule.problems) - (rule.state == "blind")
+    unseen = f" ({more} more that it cannot see)" if more > 0 else ""
+    return (rule.name, rule.watch, rule.limit, actions, rule.state, f"{rule.reason or ''}{unseen}")
 
 
 def _option(code: int | None, words: str | None) -> str:

@@ -24,6 +24,7 @@ from gateway.guard.settings import (
     LevelRule,
     RangeRule,
     Rule,
+    SilenceRule,
     quantities,
 )
 from gateway.guard.watcher import Watcher
@@ -90,15 +91,16 @@ class Wiring:
         return UnseenWatcher(self.rule, name, self._now_ns, self._changed, why)
 
     def _silence(self, component: Component) -> Watcher:
-        pulse = _pulse(component, getattr(self.rule, "silent_s", None))
+        silent_s = self.rule.silent_s if isinstance(self.rule, SilenceRule) else None
+        pulse = _pulse(component, silent_s)
         watcher = SilenceWatcher(self.rule, component.name, self._now_ns, self._changed, pulse)
         if component.kind is not Kind.INSOLE:
             self._begins.append(partial(_life(component).subscribe, watcher))
         return watcher
 
     def _emcy(self, rule: EmcyRule, component: Component) -> Watcher:
-        vendor = cast("JointDrive | CanDevice", component).node.description.vendor_id
-        pulse = _pulse(component, None)
+        on_node = cast("JointDrive | CanDevice", component)
+        vendor, pulse = on_node.node.description.vendor_id, _pulse(component, on_node.settings.lost_after_s)
         watcher = EmcyWatcher(rule, component.name, self._now_ns, self._changed, pulse, vendor)
         self._begins.append(partial(_life(component).subscribe, watcher))
         return watcher
