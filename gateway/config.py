@@ -18,6 +18,8 @@ from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
 from gateway.guard.checks import complaints as about_guard
 from gateway.guard.settings import WATCHES, GuardSettings
+from gateway.modules.stop.settings import StopSettings
+from gateway.modules.stop.settings import complaints as about_stop
 from gateway.records.folder import default_folder
 
 Table = Mapping[str, Any]
@@ -102,6 +104,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     insole: dict[str, InsoleSettings] = {}
     imu: dict[str, MountedSettings] = {}
     parameter: dict[str, ParameterSettings] = {}
+    stop: StopSettings = StopSettings()
     guard: GuardSettings | None = None
 
     def sharing(self, component: str) -> tuple[str, ...]:
@@ -121,7 +124,11 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return default_folder(self.robot.name) if given is None else self.path.parent / given
 
 
-_SINGLE: Mapping[str, type[Struct]] = {"robot": RobotSettings, "gateway": GatewaySettings}
+_SINGLE: Mapping[str, type[Struct]] = {
+    "robot": RobotSettings,
+    "gateway": GatewaySettings,
+    "stop": StopSettings,
+}
 _NAMED: Mapping[str, type[Struct]] = {
     "can": CanSettings,
     "joint": JointTable,
@@ -235,6 +242,7 @@ def _complaints(config: RobotConfig) -> Iterator[str]:
             yield from _about_release(_header(table, name), name, device)
     for name, parameter in config.parameter.items():
         yield from _about_parameter(config, name, parameter)
+    yield from about_stop(config, config.stop)
     if config.guard is not None:
         yield from about_guard(config, config.guard)
 

@@ -217,6 +217,9 @@ class StopInfo(Struct, frozen=True):
     since_ns: int | None
     stopped_again: dict[str, int]  # drive → how often somebody enabled it while the stop was held
     drives: dict[str, DriveReaction]
+    fallbacks: list[str] = []  # what follows, in words, where a drive does not confirm its quick stop
+    controllers: dict[str, str | None] = {}  # that a stop goes to as well; why it cannot, `None` where it can
+    problem: str | None = None  # why the held stop will not outlive this gateway
 
 
 class GuardRuleInfo(Struct, frozen=True):
@@ -427,10 +430,13 @@ StopOutcome = Literal["confirmed", "unconfirmed", "unreachable"]
 
 
 class Stopped(Struct, frozen=True):
-    """Result of `robot.stop`."""
+    """Result of `robot.stop`: what is known when all have confirmed, or the time for an answer is over."""
 
     drives: dict[str, StopOutcome]
     held: bool
+    controllers: dict[str, StopOutcome] = {}  # of `[[stop.controller]]`
+    fallbacks: dict[str, str] = {}  # drive → what was carried out beyond the quick stop, in words
+    problem: str | None = None  # why the stop is not held beyond this gateway
 
 
 class Reset(Struct, frozen=True):
@@ -442,10 +448,15 @@ class Reset(Struct, frozen=True):
 
 
 class Enabled(Struct, frozen=True):
-    """Result of `robot.enable`: each drive's state in words, and which were not led there, and why."""
+    """Result of `robot.enable`: each drive's state in words, and which were not led there, and why.
+
+    Where there are problems, every drive that was begun has been stopped again. `modes` are those that the
+    drives were enabled in, in words.
+    """
 
     drives: dict[str, str]
     problems: dict[str, str]
+    modes: dict[str, str] = {}
 
 
 class JournalEntries(Struct, frozen=True):

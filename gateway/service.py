@@ -12,6 +12,7 @@ from gateway.config import RobotConfig
 from gateway.futures import gather, then
 from gateway.loop import Loop
 from gateway.modules.resource import RESOURCE_CHANNELS
+from gateway.records.folder import RecordsFolder
 from gateway.registry import MODULES, Module, Registry, Spec
 from gateway.session import Answer, Session
 from gateway.sources import channel_info, check_globs, merge, narrow
@@ -19,7 +20,7 @@ from gateway.streams import Streams
 
 log = logging.getLogger(__name__)
 
-GUARD_AGAIN_S = 5.0  # how soon a guard that could not start is tried again
+AGAIN_S = 5.0  # how soon what could not begin is tried again
 CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are configured
 
 # Which module answers what; the rest is the service's own.
@@ -42,6 +43,8 @@ MODULE_OF: Mapping[str, str] = {
     "journal.tail": "control",
 }
 
+MAY_MOVE = ("component", "status")  # who looks at these may have to stop the robot
+
 
 class Service:
     """The methods of one robot's gateway."""
@@ -62,16 +65,25 @@ class Service:
         }
 
     def resume(self) -> None:
-        """Begin what runs without any client: a guard that the robot's file asks for."""
+        """Begin what needs no client: a configured guard, and what the last gateway left unfinished."""
         if self._config.guard is not None:
             self.registry.use("guard", "guard").add_done_callback(self._guard_began)
+        if RecordsFolder(self._config.records).unfinished:
+            self.registry.use("control", None).add_done_callback(self._control_began)
+
+    def _control_began(self, control: "Future[Module]") -> None:
+        """It keeps itself as long as a stop is held, or a write is to be taken back."""
+        error = control.exception()
+        if error is not None:
+            log.critical("what the last gateway left, a held stop or a write on trial, waits: %s", error)
+            self._loop.call_later(AGAIN_S, self.resume)
 
     def _guard_began(self, guard: "Future[Module]") -> None:
         error = guard.exception()
         if error is not None:
             self._guard_problem = str(error)
             log.critical("the guard does not run: %s", error)
-            self._loop.call_later(GUARD_AGAIN_S, self.resume)
+            self._loop.call_later(AGAIN_S, self.resume)
 
     def objection(self) -> str | None:
         """Why the gateway must not end now, in words; `None` where it may."""
@@ -101,7 +113,10 @@ class Service:
 
     def _use(self, name: str, session: Session) -> "Future[Module]":
         # What a client asked for just before it vanished is still done (a stop above all).
-        return self.registry.use(name, None if session.closed else session)
+        user = None if session.closed else session
+        if name in MAY_MOVE:
+            self.registry.use("control", user)  # so that a stop does not wait for its module
+        return self.registry.use(name, user)
 
     def _hello(self, session: Session, params: messages.HelloParams) -> messages.Hello:
         if params.protocol != wire.PROTOCOL:

@@ -17,7 +17,7 @@ _HEADER = struct.Struct("<BHB")
 _ABORT = 0x80
 _TOGGLE = 0x10
 _SEGMENT = 7
-_EXPEDITED = 4  # bytes that fit into the first request
+EXPEDITED = 4  # bytes that fit into the first request
 
 INVALID_COMMAND = 0x0504_0001
 OUT_OF_MEMORY = 0x0504_0005
@@ -78,14 +78,14 @@ def _upload_segments(index: int, subindex: int) -> Upload:
 
 def expedited(index: int, subindex: int, data: bytes) -> bytes:
     """The one request that writes an object of up to four bytes."""
-    return _HEADER.pack(0x23 | (_EXPEDITED - len(data)) << 2, index, subindex) + data.ljust(_EXPEDITED, b"\0")
+    return _HEADER.pack(0x23 | (EXPEDITED - len(data)) << 2, index, subindex) + data.ljust(EXPEDITED, b"\0")
 
 
 def download(index: int, subindex: int, data: bytes) -> Download:
     """Write an object: done when the device has confirmed the last byte."""
     if not data:
         raise ValueError(f"0x{index:04X}:{subindex:02X}: nothing to write")
-    if len(data) <= _EXPEDITED:
+    if len(data) <= EXPEDITED:
         yield from _ask(expedited(index, subindex, data), index, subindex, 0x60)
         return
     header = _HEADER.pack(0x21, index, subindex)

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 from drivers.bus.arming import Arming
 from drivers.joint.quick_stop import StopOutcome
 from gateway import messages
-from gateway.futures import failed
+from gateway.futures import done
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
 from gateway.guard.settings import Action, GuardSettings
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
-from gateway.modules.stop import Drive
+from gateway.modules.stop.drive import quick_stop_all
 
 if TYPE_CHECKING:
     from drivers.joint.drive import JointDrive
@@ -31,6 +31,7 @@ LOOK_NS = (
     250_000_000  # how often the loop looks at the latest; each watcher says when it wants to be looked at
 )
 LEAST_S = 0.005
+_NO_STOP: Future[StopOutcome] = done(StopOutcome.UNCONFIRMED)
 
 
 class GuardModule:
@@ -102,10 +103,9 @@ class GuardModule:
 
     def _stop_drives(self) -> None:
         """At once, past the loop; one that is being stopped so already is not asked twice."""
-        for name, drive in self._control.drives.items():
-            running = self._stopping.get(name)
-            if running is None or running.done():
-                self._stopping[name] = _quick_stop(drive)
+        drives = self._control.drives.items()
+        idle = {name: drive for name, drive in drives if self._stopping.get(name, _NO_STOP).done()}
+        self._stopping |= quick_stop_all(idle)
 
     def _arming_changed(self, joints: str, arming: Arming) -> None:
         what = "armed" if arming.armed else ALARM
@@ -164,13 +164,6 @@ class GuardModule:
     def _publish(self) -> None:
         states = {name: _worst(wiring).state for name, wiring in self._wirings.items()}
         self._source.publish(time.monotonic_ns(), self._count, states)
-
-
-def _quick_stop(drive: Drive) -> "Future[StopOutcome]":
-    try:
-        return drive.quick_stop()
-    except Exception as error:  # noqa: BLE001 - the other drives are to be stopped all the same
-        return failed(error)
 
 
 def _worst(wiring: Wiring) -> Watcher:

@@ -5,15 +5,16 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
 from gateway import messages
 from gateway.futures import then
 from gateway.modules.lease import RENEWED, TAKEN, Leases
-from gateway.modules.stop import Drive, Stop
+from gateway.modules.stop.drive import Drive
+from gateway.modules.stop.stop_control import StopControl
 from gateway.modules.storage import RESTORING, STORING, Command
 from gateway.modules.tuning import Tuning
 from gateway.records.journal import Journal
 from gateway.records.records import Records
+from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
     from gateway.modules.component import ComponentModule
@@ -54,24 +55,20 @@ class ControlModule:
             "parameter.store": lambda session, params: self._store(STORING, session, params.component),
             "parameter.restore": lambda session, params: self._store(RESTORING, session, params.component),
             "robot.stop": lambda session, params: self.stop_robot(session.who, str(params.reason)),
+            "robot.reset": lambda session, _params: self._reset(session),
+            "robot.enable": lambda session, params: self._enable(session, params.joints),
             "journal.tail": lambda _session, params: self._tail(params.n),
         }
 
     def start(self) -> None:
-        joints = self._context.config.joint
-        drives = {
-            name: cast("Drive", one)
-            for name, one in self._component.robot.components.items()
-            if name in joints
-        }
-        absent = {name: why for name, why in self._component.absent.items() if name in joints}
-        self._drives = drives
         self._records = Records(self._context.config.records)
         config, loop = self._context.config, self._context.loop
         self._tuning = Tuning(config, self._component, loop, self._records, self._trials_changed)
         left = self._tuning.load()
         loop.post(lambda: self._tuning.resume(left))
-        self._stop = Stop(self._context.loop, drives, absent)
+        self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
+        held = self._stop.load()
+        loop.post(lambda: self._stop.resume(held))
 
     def stop(self) -> None:
         self._stop.close()
@@ -84,18 +81,11 @@ class ControlModule:
         return then(ready, lambda _none: self._described())
 
     def _described(self) -> Described:
-        stop = messages.StopInfo(
-            held=self._stop.held,
-            reason=self._stop.reason,
-            since_ns=self._stop.since_ns,
-            stopped_again=self._stop.again,
-            drives={name: reaction(drive, self.armed(name)) for name, drive in self._drives.items()},
-        )
         return Described(
             components=self._component.components(),
             channels=self._component.channels(),
             parameters=self._tuning.infos(),
-            stop=stop,
+            stop=self._stop.info(self.armed),
             trials=self._tuning.trials.infos(),
             records=self._records.info,
         )
@@ -108,6 +98,9 @@ class ControlModule:
     def revert_trials(self, why: str) -> None:
         """Take back everything that is on trial. In the loop's thread."""
         self._tuning.trials.revert_all(why)
+
+    def _hold_changed(self) -> None:
+        self.keep_awake("stop", self._stop.held)
 
     def _trials_changed(self) -> None:
         self.keep_awake("trials", self._tuning.trials.pending)
@@ -154,7 +147,7 @@ class ControlModule:
     @property
     def drives(self) -> Mapping[str, Drive]:
         """Every joint that is there."""
-        return self._drives
+        return self._stop.drives
 
     @property
     def journal(self) -> Journal:
@@ -166,26 +159,20 @@ class ControlModule:
 
     def stop_robot(self, who: str, reason: str) -> "Future[messages.Stopped]":
         """Quick stop on every drive, held until it is reset. In the loop's thread."""
-        self.keep_awake("stop", True)
+        stopped = self._stop.stop(who, reason)
         self._tuning.interrupt()
-        stopped = self._stop.stop(reason, lambda name: self._component.when_ready([name]))
-        journal = self._records.journal  # told after the drives were, and nobody waits for it
-        journal.append(who, "stop", reason=reason)
-        return then(stopped, lambda answer: self._journal_stop(who, answer))
-
-    def _journal_stop(self, who: str, stopped: messages.Stopped) -> messages.Stopped:
-        self._records.journal.append(who, "stop answered", result=stopped.drives)
         return stopped
 
+    def _reset(self, session: "Session") -> "Future[messages.Reset]":
+        self._leases.require(session)
+        why_not = self.refuses_reset()
+        if why_not is not None:
+            raise refuse(Kind.STOPPED, f"the stop is not reset: {why_not}")
+        return self._stop.reset(session.who)
 
-def reaction(drive: Drive, armed: bool) -> messages.DriveReaction:
-    """What a drive does by itself, as it said when it came up."""
-    options = {} if drive.reading is None else drive.reading.options
-    quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
-    return messages.DriveReaction(
-        quick_stop_option=quick_stop,
-        abort_connection_option=abort_connection,
-        armed=armed,
-        quick_stop=option_text(QUICK_STOP_OPTIONS, quick_stop),
-        abort_connection=option_text(ABORT_CONNECTION_OPTIONS, abort_connection),
-    )
+    def _enable(self, session: "Session", joints: list[str] | None) -> "Future[messages.Enabled]":
+        self._leases.require(session)
+        return self._stop.enable(session.who, joints, lambda: self._lost_lease(session))
+
+    def _lost_lease(self, session: "Session") -> str | None:
+        return None if self._leases.held_by(session) else "the lease of who asked for it has ended"

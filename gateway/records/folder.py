@@ -28,8 +28,14 @@ class RecordsFolder:
 
     @property
     def unfinished(self) -> bool:
-        """Whether a stop is held or a write is still to be taken back, as the last gateway left it."""
-        return self.hold.exists() or self.undo.exists()
+        """Whether a stop is held or a write is still to be taken back, as the last gateway left it.
+
+        Where that cannot be seen, it is to be taken for so.
+        """
+        try:
+            return self.hold.exists() or self.undo.exists()
+        except PermissionError:
+            return True
 
     def open(self) -> None:
         """Make the folder and take its lock.

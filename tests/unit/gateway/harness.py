@@ -18,11 +18,16 @@ import pytest
 import eds
 from drivers.component import Component, Kind
 from drivers.errors import DeviceAbort
+from drivers.joint.cia402 import DriveState
+from drivers.joint.commands import WAY_UP
+from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
+from drivers.joint.reading import DriveReading
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from gateway.config import RobotConfig, load
 from gateway.daemon import Daemon, listen
+from gateway.futures import done
 from gateway.modules.assembly import Robot
 
 DEADLINE_S = 20.0
@@ -230,10 +235,16 @@ class FakeDrive(FakeComponent):
 
     def __init__(self, name: str, statusword: int = ENABLED) -> None:
         super().__init__(name, Kind.JOINT, ["position", "statusword"])
-        self.reading = None
+        self.reading: DriveReading | None = None
         self.stops = 0
         self.stopping = StopOutcome.CONFIRMED
         self.hanging: Future[StopOutcome] | None = None
+        self.limp = self.nmt_stops = self.resets = 0
+        self.limping = StopOutcome.CONFIRMED
+        self.led = Led(DriveState.SWITCH_ON_DISABLED)
+        self.steps: list[DriveState] = []
+        self.on_step: Callable[[DriveState], None] = lambda origin: None
+        self.led_up: dict[DriveState, Led] = {}
         self.set_state(statusword)
 
     def set_state(self, statusword: int) -> None:
@@ -244,15 +255,36 @@ class FakeDrive(FakeComponent):
         super().start()
         self.set_state(int.from_bytes(self.node.objects[0x6041, 0], "little"))
 
-    def quick_stop(self) -> "Future[StopOutcome]":
+    def quick_stop(self, *, wake: bool = True) -> "Future[StopOutcome]":
         self.stops += 1
         if self.hanging is not None:
             return self.hanging
         if self.stopping is StopOutcome.CONFIRMED:
             self.set_state(QUICK_STOPPED)
-        future: Future[StopOutcome] = Future()
-        future.set_result(self.stopping)
-        return future
+        return done(self.stopping)
+
+    def wake(self) -> None:
+        """It has answered already."""
+
+    def disable_voltage(self) -> "Future[StopOutcome]":
+        self.limp += 1
+        if self.limping is StopOutcome.CONFIRMED:
+            self.set_state(DISABLED)
+        return done(self.limping)
+
+    def nmt_stop(self) -> None:
+        self.nmt_stops += 1
+
+    def reset(self) -> "Future[Led]":
+        self.resets += 1
+        if self.led.problem is None:
+            self.set_state(DISABLED)
+        return done(self.led)
+
+    def step_up(self, origin: DriveState) -> "Future[Led]":
+        self.steps.append(origin)
+        self.on_step(origin)
+        return done(self.led_up.get(origin) or Led(WAY_UP[origin][1]))
 
 
 HEAD = """

@@ -8,15 +8,21 @@ import pytest
 
 from drivers.component import Kind
 from drivers.joint.quick_stop import StopOutcome
-from gateway.modules.stop import is_enabled
-from tests.unit.gateway.harness import DISABLED, ENABLED, Bench, Client, config, serving, until
+from gateway.modules.stop.drive import is_enabled
+from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, config, serving, until
 
 
 def test_a_stop_needs_no_lease_and_answers_per_drive(connect: Callable[[], Client], bench: Bench) -> None:
     writer, other = connect(), connect()
     writer.call("control.acquire", ttl_s=60)
     answer = other.call("robot.stop", reason="the patient stumbles")
-    assert answer == {"drives": {"left_knee": "confirmed", "right_knee": "confirmed"}, "held": True}
+    assert answer == {
+        "drives": {"left_knee": "confirmed", "right_knee": "confirmed"},
+        "held": True,
+        "controllers": {},
+        "fallbacks": {},
+        "problem": None,
+    }
     assert (bench.left.stops, bench.right.stops) == (1, 1)
     stop = other.call("robot.describe")["stop"]
     assert (stop["held"], stop["reason"]) == (True, "the patient stumbles")
@@ -38,19 +44,17 @@ def test_a_drive_that_could_not_be_built_is_unreachable(client: Client, bench: B
 def test_a_driver_that_fails_does_not_keep_the_others_from_stopping(
     client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail() -> Future[StopOutcome]:
+    def fail(*, wake: bool = True) -> Future[StopOutcome]:
         raise RuntimeError("driver bug")
 
     monkeypatch.setattr(bench.left, "quick_stop", fail)
     assert client.call("robot.stop")["drives"] == {"left_knee": "unreachable", "right_knee": "confirmed"}
 
 
-def test_a_stop_is_answered_although_a_drive_never_is(
-    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gateway.modules.stop.ANSWER_S", 0.1)
+def test_a_stop_is_answered_although_a_drive_never_is(bench: Bench, tmp_path: Path) -> None:
     bench.left.hanging = Future()
-    answer = client.call("robot.stop")
+    with serving(config(tmp_path, ROBOT + "[stop]\ntimeout_s = 0.1\n")) as address, Client(address) as client:
+        answer = client.call("robot.stop")
     assert answer["drives"] == {"left_knee": "unconfirmed", "right_knee": "confirmed"}
 
 

@@ -1,0 +1,66 @@
+"""What a stop needs of a joint's driver, and the quick stop of many drives at once."""
+
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import Any, Protocol
+
+from drivers.joint.cia402 import DriveState, drive_state
+from drivers.joint.leading import Led
+from drivers.joint.quick_stop import StopOutcome
+from drivers.joint.reading import DriveReading
+from drivers.latest import Latest
+from drivers.samples import Channel
+from gateway.futures import failed
+
+
+class Drive(Protocol):
+    """One axis; see `drivers.joint.power.PowerDrive`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def node(self) -> Any:
+        """What the axes of one drive share."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def latest(self) -> Latest: ...
+
+    @property
+    def reading(self) -> DriveReading | None: ...
+
+    def quick_stop(self, *, wake: bool = True) -> "Future[StopOutcome]": ...
+
+    def wake(self) -> None: ...
+
+    def disable_voltage(self) -> "Future[StopOutcome]": ...
+
+    def nmt_stop(self) -> None: ...
+
+    def reset(self) -> "Future[Led]": ...
+
+    def step_up(self, origin: DriveState) -> "Future[Led]": ...
+
+
+def quick_stop(drive: Drive, *, wake: bool = True) -> "Future[StopOutcome]":
+    """Never raises: the other drives are to be stopped all the same."""
+    try:
+        return drive.quick_stop(wake=wake)
+    except Exception as error:  # noqa: BLE001 - it becomes the future's
+        return failed(error)
+
+
+def quick_stop_all(drives: Mapping[str, Drive]) -> "dict[str, Future[StopOutcome]]":
+    """Every controlword first, then those who wait for the answers. From any thread; never raises."""
+    stops = {name: quick_stop(drive, wake=False) for name, drive in drives.items()}
+    for drive in drives.values():
+        drive.wake()
+    return stops
+
+
+def is_enabled(statusword: float) -> bool:
+    """Whether a statusword (6041h) says OPERATION ENABLED."""
+    return drive_state(int(statusword)) is DriveState.OPERATION_ENABLED

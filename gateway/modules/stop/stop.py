@@ -1,0 +1,125 @@
+"""The robot's stop: every drive and controller at once, answered in time, and held.
+
+The stop acts first; only then its hold is made durable and journaled. Where that cannot be, the stop acts all
+the same, and says so. Nothing here can enable a drive.
+"""
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from typing import Any
+
+from drivers.joint.quick_stop import StopOutcome
+from gateway.futures import back, gather, outcome, then
+from gateway.loop import Loop
+from gateway.messages import StopOutcome as Said
+from gateway.messages import Stopped
+from gateway.modules.stop.controllers import Controllers
+from gateway.modules.stop.hold import Hold
+from gateway.modules.stop.settings import Fallback, StopSettings
+from gateway.modules.stop.stopper import Stopper, Tell, nmt_stop
+from gateway.modules.stop.target import Report, Target, stop_all
+
+log = logging.getLogger(__name__)
+
+WhenReady = Callable[[str], "Future[None]"]
+
+
+class Stop:
+    """One robot's stop. It belongs to the loop's thread. `absent` are drives that could not be built."""
+
+    def __init__(
+        self,
+        loop: Loop,
+        settings: StopSettings,
+        stoppers: Mapping[str, Stopper],
+        absent: Iterable[str],
+        controllers: Controllers,
+        hold: Hold,
+        tell: Tell,
+    ) -> None:
+        self._loop = loop
+        self._settings = settings
+        self._stoppers = stoppers
+        self._controllers = controllers
+        self._targets: Mapping[str, Target] = {**stoppers, **controllers.targets}
+        self._unreachable = {name: Report(StopOutcome.UNREACHABLE) for name in (*absent, *controllers.absent)}
+        self._hold = hold
+        self._tell = tell
+
+    def stop(self, who: str, reason: str, when_ready: WhenReady) -> "Future[Stopped]":
+        """Stop everything now, and what only just comes up as soon as it is there.
+
+        `when_ready` tells when a component that was started a moment ago can be reached.
+        """
+        first = stop_all(self._targets)
+        kept = self._hold.begin(who, reason)
+        log.warning("quick stop on every drive: %s", reason or "no reason given")
+        stops = {name: self._once_more(name, stop, when_ready(name)) for name, stop in first.items()}
+        drives = {name: stop for name, stop in stops.items() if name in self._stoppers}
+        last = then(back(self._loop, gather(drives)), self._last_resort)
+        return self._answer_in_time(stops, last, kept)
+
+    def _once_more(self, name: str, first: "Future[Report]", ready: "Future[None]") -> "Future[Report]":
+        """On a cold start the first attempt may come before the bus is open."""
+        if ready.done():
+            return first
+        both = gather({"first": then(first, lambda _report: None), "ready": ready})
+        return then(both, lambda _both: first if _is_confirmed(first) else self._targets[name].stop())
+
+    def _last_resort(self, found: Mapping[str, Report | Exception]) -> dict[str, Report]:
+        reports = {name: _report(one) for name, one in found.items()}
+        if Fallback.NMT_STOP not in self._settings.fallback:
+            return reports
+        return nmt_stop((stopper.drive for stopper in self._stoppers.values()), reports, self._tell)
+
+    def _answer_in_time(
+        self,
+        stops: "Mapping[str, Future[Report]]",
+        last: "Future[dict[str, Report]]",
+        kept: "Future[str | None]",
+    ) -> "Future[Stopped]":
+        answer: Future[Stopped] = Future()
+
+        def tell() -> None:
+            if not answer.done():
+                timer.cancel()
+                reports = {name: _now(stop) for name, stop in stops.items()}
+                reports |= last.result() if last.done() else {}
+                answer.set_result(self._answer({**reports, **self._unreachable}, kept))
+
+        timer = self._loop.call_later(self._settings.timeout_s, tell)
+        everything: dict[str, Future[Any]] = {**stops, "last resort": last, "hold kept": kept}
+        gather(everything).add_done_callback(lambda _all: self._loop.call(tell))
+        return answer
+
+    def _answer(self, reports: Mapping[str, Report], kept: "Future[str | None]") -> Stopped:
+        controllers = self._controllers.names
+        said: dict[str, Said] = {name: report.outcome.value for name, report in reports.items()}
+        return Stopped(
+            drives={name: one for name, one in said.items() if name not in controllers},
+            held=True,
+            controllers={name: one for name, one in said.items() if name in controllers},
+            fallbacks={name: one.fallback for name, one in reports.items() if one.fallback is not None},
+            problem=kept.result() if kept.done() else "nobody knows yet whether it outlives this gateway",
+        )
+
+
+def _is_confirmed(stop: "Future[Report]") -> bool:
+    report: Report | Exception = outcome(stop)
+    return isinstance(report, Report) and report.outcome is StopOutcome.CONFIRMED
+
+
+def _now(stop: "Future[Report]") -> Report:
+    """What is known by now; a target that has not answered yet is not confirmed."""
+    if not stop.done():
+        return Report(StopOutcome.UNCONFIRMED)
+    found: Report | Exception = outcome(stop)
+    return _report(found)
+
+
+def _report(found: Report | Exception) -> Report:
+    if isinstance(found, Report):
+        return found
+    log.error("a stop failed", exc_info=found)
+    return Report(StopOutcome.UNREACHABLE)
