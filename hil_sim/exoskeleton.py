@@ -2,11 +2,12 @@
 
 import math
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
+from pathlib import Path
 
 import eds
-from hil_sim import controller
+from hil_sim import controller, personality
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock, Event
 from hil_sim.controller import GaitController
@@ -47,8 +48,10 @@ class Scenario(StrEnum):
 class Exoskeleton:
     """A robot and its wearer in simulated time; the same arguments give the same frames and bytes.
 
-    The wearer is the subject of number `person`. What is in `measured` is called after each cycle of the
-    sensors.
+    The wearer is the subject of number `person`. `drives` gives joints another EDS or DCF than our own
+    drive's. What is in `measured` is called after each cycle of the sensors.
+
+    Raises `hil_sim.errors.SimulatorError` for a file that cannot be used.
     """
 
     def __init__(
@@ -57,12 +60,14 @@ class Exoskeleton:
         seed: int = 0,
         sensors: SensorChoice | None = None,
         person: int = 0,
+        drives: Mapping[str, Path] | None = None,
     ) -> None:
         self.seed = seed
         self.measured: list[Callable[[], None]] = []
         self.clock = Clock()
         self.bus = CanBus(self.clock)
-        self.drives = {name: self._drive(name, node_id) for name, node_id in JOINTS.items()}
+        files = dict.fromkeys(JOINTS, eds.locate(DRIVE_EDS, None)) | dict(drives or {})
+        self.drives = {name: self._drive(name, node_id, files[name]) for name, node_id in JOINTS.items()}
         self.controller = self._controller(person)
         self.wearer = Wearer(self.controller.generator)
         self.sensors = SensorSuite(sensors or SensorChoice(), self.clock, self.bus, seed)
@@ -94,8 +99,8 @@ class Exoskeleton:
         if math.isfinite(entry.seconds):
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
-    def _drive(self, name: str, node_id: int) -> JointDrive:
-        description = eds.load(eds.locate(DRIVE_EDS, None), node_id)
+    def _drive(self, name: str, node_id: int, file: Path) -> JointDrive:
+        description = personality.describe(file, node_id)
         start = getattr(STANDING, name.partition("_")[2])
         return JointDrive(self.clock, self.bus, name, node_id, description, Joint(JointConstants(), start))
 
@@ -111,6 +116,7 @@ class Exoskeleton:
             next(iter(self.drives.values())).counts_per_radian,
             subject(person),
             random.Random(f"{self.seed} gait"),
+            [drive.node_id for drive in self.drives.values() if drive.description.path.name != DRIVE_EDS],
         )
 
     def _measure(self) -> None:

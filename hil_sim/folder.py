@@ -6,12 +6,14 @@ from typing import IO
 
 from hil_sim import robot_file
 from hil_sim.errors import SimulatorError
-from hil_sim.sensors.suite import SensorChoice
+from hil_sim.exoskeleton import Exoskeleton
+from hil_sim.node.memory import FileMemory
+from hil_sim.node.node import Node
 from hil_sim.sensors.tables import companions
 
 
 class Folder:
-    """`--dir`: robot.toml, the links of the serial sensors, the hub's port and the lock.
+    """`--dir`: robot.toml, what the drives have stored, the sensors' links, the hub's port and the lock.
 
     The lock ends with the process, however that ends.
     """
@@ -56,19 +58,23 @@ class Folder:
         if port != self.hub_port():
             self._port_file.write_text(f"{port}\n", encoding="ascii")
 
-    def write_config(self, bus: str, sensors: SensorChoice) -> bool:
+    def write_config(self, bus: str, robot: Exoskeleton) -> bool:
         """Write robot.toml with the table of its `bus`, unless there is one: whoever edited it keeps that.
 
         Says whether the file was written; what it names is written beside it.
         """
         try:
             with self.config.open("x", encoding="utf-8") as file:
-                file.write(robot_file.text(self.path, bus, sensors))
+                file.write(robot_file.text(self.path, bus, robot))
         except FileExistsError:
             return False
-        for name, content in companions(sensors).items():
+        for name, content in companions(robot.sensors.choice).items():
             (self.path / name).write_text(content, encoding="utf-8")
         return True
+
+    def memory(self, node: Node) -> FileMemory:
+        """What a device stores on command, and has again at the next start."""
+        return FileMemory(self.path / "stored" / f"{node.name}.json", node.description.path.name)
 
     def link(self, sensor: str) -> Path:
         """The stable path of a serial sensor."""

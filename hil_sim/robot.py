@@ -1,6 +1,7 @@
 """The simulated robot with its doors open: bus by hub or virtual channel, sensors on pseudo-terminals."""
 
 import threading
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -28,8 +29,8 @@ class SimulatedRobot:
 
     With `virtual_channel` the bus is reached in the same process, otherwise through the hub on `port`.
     `speed` is simulated over real time, `None` as fast as it goes. The wearer is subject `person`; the ground
-    truth is written to `truth`. `faults` and `operator` belong to the thread that runs it; others use the
-    control socket in the folder.
+    truth is written to `truth`; `drives` names the files of joints with other drives than ours. `faults` and
+    `operator` belong to the thread that runs it; others use the control socket in the folder.
 
     Raises `hil_sim.errors.SimulatorError` where the folder or the port is taken.
     """
@@ -45,8 +46,9 @@ class SimulatedRobot:
         sensors: SensorChoice | None = None,
         person: int = 0,
         truth: Path | None = None,
+        drives: Mapping[str, Path] | None = None,
     ) -> None:
-        self.exoskeleton = Exoskeleton(scenario, seed, sensors, person)
+        self.exoskeleton = Exoskeleton(scenario, seed, sensors, person, drives)
         self.folder = Folder(folder)
         self.faults = Faults(self.exoskeleton, self.folder.path, seed)
         self.operator = Operator(self.exoskeleton, self.faults)
@@ -80,6 +82,8 @@ class SimulatedRobot:
             closing.callback(self.folder.close)
             loop = Loop(self.exoskeleton.clock, self._speed)
             closing.callback(loop.close)
+            for drive in self.exoskeleton.drives.values():
+                drive.storage.memory = self.folder.memory(drive)
             self._open_bus(loop, closing)
             self._open_sensors(closing)
             if self._truth is not None:
@@ -102,7 +106,7 @@ class SimulatedRobot:
         self._write_config(robot_file.hub_bus(hub.port))
 
     def _write_config(self, bus: str) -> None:
-        self.config_is_ours = self.folder.write_config(bus, self.exoskeleton.sensors.choice)
+        self.config_is_ours = self.folder.write_config(bus, self.exoskeleton)
 
     def _open_sensors(self, closing: ExitStack) -> None:
         for name, line in self.exoskeleton.sensors.lines.items():

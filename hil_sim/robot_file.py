@@ -1,10 +1,12 @@
 """The robot's file that a gateway needs for the simulated robot, written as an example to learn from."""
 
+import json
 from pathlib import Path
 
+from hil_sim import personality
 from hil_sim.bus.hub import HOST
-from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_EDS, CONTROLLER_NODE, DRIVE_EDS, JOINTS
-from hil_sim.sensors.suite import SensorChoice
+from hil_sim.drive.drive import JointDrive
+from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_EDS, CONTROLLER_NODE, DRIVE_EDS, Exoskeleton
 from hil_sim.sensors.tables import tables
 
 CHANNEL = "sim"
@@ -47,7 +49,7 @@ _FIRST_JOINT = """
 [joint.{name}]
 bus = "main"                    # the [can.…] table it is wired to
 node_id = {node_id}                     # its CANopen node id (1–127)
-eds = "{eds}"         # beside this file, or one that ships with GWRMS
+eds = {eds:<25} # beside this file, or one that ships with GWRMS
 counts_per_revolution = 4096    # of the encoder that 6064h counts, here the motor's
 gear_ratio = 100.0              # motor revolutions per revolution of the joint
 direction = 1                   # −1 where counts fall when the joint bends
@@ -58,11 +60,16 @@ _JOINT = """
 [joint.{name}]
 bus = "main"
 node_id = {node_id}
-eds = "{eds}"
+eds = {eds}
 counts_per_revolution = 4096
 gear_ratio = 100.0
 direction = 1
 zero_offset = 0.0
+"""
+
+_RATED = """\
+rated_torque = 40.0             # N·m at the joint, where 6076h does not say it
+rated_current = 5.0             # A, where 6075h does not
 """
 
 _DEVICES = """
@@ -117,7 +124,9 @@ _JOINT_PARAMETERS_NOTE = """
 # speed of its own moves in profile position mode (6081h, counts/s; 2π / 409 600 rad each).
 """
 
-_JOINT_PARAMETERS = """
+# By the object that the drive must have for it.
+_JOINT_PARAMETERS = {
+    0x6072: """
 [parameter."{name}.max_torque"]
 object = "0x6072:0"
 unit = "N·m"
@@ -126,7 +135,8 @@ min = 8.0
 max = 80.0
 max_step = 40.0
 live = true
-
+""",
+    0x6081: """
 [parameter."{name}.profile_velocity"]
 object = "0x6081:0"
 unit = "rad/s"
@@ -135,7 +145,8 @@ min = 0.05
 max = 6.0
 max_step = 2.0
 live = true
-"""
+""",
+}
 
 
 def hub_bus(port: int) -> str:
@@ -148,21 +159,31 @@ def virtual_bus(channel: str) -> str:
     return _VIRTUAL.format(channel=channel)
 
 
-def text(folder: Path, bus: str, sensors: SensorChoice) -> str:
+def text(folder: Path, bus: str, robot: Exoskeleton) -> str:
     """The file for the simulator in `folder` (absolute), with the tables of its bus and its sensors."""
-    first, *others = JOINTS.items()
-    joints = [(_FIRST_JOINT, first), *((_JOINT, other) for other in others)]
+    templates = (_FIRST_JOINT, *[_JOINT] * (len(robot.drives) - 1))
     return "".join(
         (
             _HEAD.format(path=folder / "robot.toml", bus=bus),
-            *(template.format(name=name, node_id=node, eds=DRIVE_EDS) for template, (name, node) in joints),
+            *map(_joint, templates, robot.drives.values()),
             _DEVICES.format(
-                sensors=tables(sensors, folder),
+                sensors=tables(robot.sensors.choice, folder),
                 controller=CONTROLLER,
                 controller_node=CONTROLLER_NODE,
                 controller_eds=CONTROLLER_EDS,
             ),
             _JOINT_PARAMETERS_NOTE,
-            *(_JOINT_PARAMETERS.format(name=name) for name in JOINTS),
+            *map(_joint_parameters, robot.drives.values()),
         )
     )
+
+
+def _joint(template: str, drive: JointDrive) -> str:
+    file = personality.name(drive.description)
+    table = template.format(name=drive.name, node_id=drive.node_id, eds=json.dumps(file, ensure_ascii=False))
+    return table if file == DRIVE_EDS else table + _RATED
+
+
+def _joint_parameters(drive: JointDrive) -> str:
+    texts = _JOINT_PARAMETERS.items()
+    return "".join(text.format(name=drive.name) for index, text in texts if drive.description.has(index))

@@ -9,9 +9,10 @@ import time
 from pathlib import Path
 from types import FrameType
 
+from hil_sim import personality
 from hil_sim.cli import run
 from hil_sim.cli.arguments import speed
-from hil_sim.exoskeleton import Scenario
+from hil_sim.exoskeleton import JOINTS, Scenario
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
@@ -31,6 +32,7 @@ what is in DIR
   left_insole, right_insole, trunk
                    links to the sensors' pseudo-terminals; a reader at another baud rate than in robot.toml
                    hears what it would hear on a wire. An IMU on the bus has none
+  stored           what the drives have stored (1010h), for the next start
   hub.port         TCP port of the bus: python-can's "socketcand" interface at 127.0.0.1, channel "sim"
   The same DIR keeps the same port and paths from start to start, also after a crash. One simulator at a time.
 
@@ -58,6 +60,8 @@ the drives
   Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
   bus. It keeps commanding "enable operation" until a drive leaves that state, a heartbeat goes missing or 0
   is written to its object 2000h. Then it stops all drives and waits for 1 in that object.
+  --drive gives them the objects, defaults, limits and PDOs of any vendor's EDS or DCF, and robot.toml names
+  it. The joint behind it stays the same (4096 counts, gear 100); the controller sets such a drive up by SDO.
 
 sensors
   --imu and --insole choose the languages that they speak, from the makers' manuals. `gwrms sensor
@@ -121,6 +125,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--subject", type=int, default=0, metavar="N", help="who wears the robot (default: 0, nominal)"
     )
+    parser.add_argument(
+        "--drive",
+        action="append",
+        default=[],
+        metavar="[JOINT=]FILE",
+        help="the EDS or DCF of the drives, or of one joint's (again for another one)",
+    )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth there")
     return parser
 
@@ -142,6 +153,11 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
     return parser.parse_args(argv), script
 
 
+def _drives(words: list[str]) -> dict[str, Path]:
+    """The files of `--drive`, looked for in the working folder and among those that ship."""
+    return personality.choose(words, JOINTS, Path.cwd() / "here")
+
+
 def main(argv: list[str]) -> int:
     """Run the simulator; returns the exit code."""
     if argv[:1] == ["run"]:
@@ -159,6 +175,7 @@ def main(argv: list[str]) -> int:
         sensors=SensorChoice(arguments.imu, arguments.insole),
         person=arguments.subject,
         truth=arguments.truth,
+        drives=_drives(arguments.drive) or script.drives,
     )
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -6,11 +6,14 @@ heartbeat goes missing, it stops commanding all of them and waits for its start 
 """
 
 import random
+from collections.abc import Collection, Iterable
+from functools import partial
 
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, Clock
 from hil_sim.controller import objects
+from hil_sim.controller.commissioning import SDO_RESPONSE, Commissioning
 from hil_sim.controller.drives import ENABLE_OPERATION, QUICK_STOP, Seen, first
 from hil_sim.controller.objects import COMMANDING, ControllerState
 from hil_sim.gait.activity import Activity
@@ -20,7 +23,7 @@ from hil_sim.gait.subject import NOMINAL, WearerSettings
 from hil_sim.gait.walk import Shape
 from hil_sim.node.dictionary import Value
 from hil_sim.node.nmt import NMT_COB_ID, NmtService, NmtState
-from hil_sim.node.node import Node
+from hil_sim.node.node import Handler, Node
 from hil_sim.node.sync import CYCLE_PERIOD
 
 _CYCLIC_SYNCHRONOUS_POSITION = 8
@@ -31,7 +34,8 @@ _TAKE_OVER_S = 1.0  # how long the way from where the joints are to the motion t
 class GaitController(Node):
     """Node that runs the gait; `joints` are the node ids of the drives in the order of its sub-indices.
 
-    `counts_per_radian` holds for every drive. The motion is that of `wearer`; its strides vary by `source`.
+    `counts_per_radian` holds for every drive; those that are `foreign` are set up before they are started.
+    The motion is that of `wearer`; its strides vary by `source`.
     """
 
     def __init__(
@@ -45,11 +49,15 @@ class GaitController(Node):
         counts_per_radian: float,
         wearer: WearerSettings = NOMINAL,
         source: random.Random | None = None,
+        foreign: Collection[int] = (),
     ) -> None:
         super().__init__(clock, bus, name, node_id, description)
         self.controller_state = ControllerState.IDLE
         self._counts_per_radian = counts_per_radian
         self._drives = [Seen(joint, clock) for joint in joints]
+        self._commissionings = {
+            node: Commissioning(clock, self.send, node, partial(self._start_node, node)) for node in foreign
+        }
         self._holder = 0
         self._since_ns = 0
         self._offsets = [0.0] * len(joints)
@@ -90,7 +98,7 @@ class GaitController(Node):
         self.generator.reset(self._shape())
 
     def _on_booted(self) -> None:
-        self.send(NMT_COB_ID, bytes([NmtService.START, 0]))
+        self._start_nodes()
         self._enter(NmtState.OPERATIONAL)
         self._go(ControllerState.STARTING)
 
@@ -102,7 +110,26 @@ class GaitController(Node):
             self._hold(node_id)
         if state == NmtState.INITIALISING:
             seen.state = None
-            self.send(NMT_COB_ID, bytes([NmtService.START, node_id]))
+            self._bring_up(node_id)
+
+    def _own_handlers(self) -> Iterable[tuple[int, Handler]]:
+        return [(SDO_RESPONSE + node, one.answered) for node, one in self._commissionings.items()]
+
+    def _start_nodes(self) -> None:
+        if not self._commissionings:
+            self._start_node(0)  # all at once
+        else:
+            for seen in self._drives:
+                self._bring_up(seen.node_id)
+
+    def _bring_up(self, node_id: int) -> None:
+        if node_id in self._commissionings:
+            self._commissionings[node_id].begin(self.dictionary.number(CYCLE_PERIOD) // 1000)
+        else:
+            self._start_node(node_id)
+
+    def _start_node(self, node_id: int) -> None:
+        self.send(NMT_COB_ID, bytes([NmtService.START, node_id]))
 
     def _heartbeat_lost(self, node_id: int) -> None:
         super()._heartbeat_lost(node_id)

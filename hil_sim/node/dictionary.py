@@ -12,6 +12,8 @@ from hil_sim.node.coding import Value as Value
 
 Key = tuple[int, int]
 
+IDENTITY = 0x1018
+
 _FIRST_OBJECT = 0x20  # below are data types, which only take room in a PDO
 
 
@@ -104,6 +106,14 @@ class Dictionary:
         dummies = [key for key in self._entries if key[0] < _FIRST_OBJECT]
         self.dummies = {key: self._entries.pop(key).data_type.bits for key in dummies}
         self._indices = frozenset(index for index, _ in self._entries)
+        self._identify(description)
+
+    def _identify(self, description: Description) -> None:
+        """Fill 1018h where only [DeviceInfo] says whose device it is."""
+        for subindex, number in ((1, description.vendor_id), (2, description.product_code)):
+            entry = self._entries.get((IDENTITY, subindex))
+            if entry is not None and number and not entry.value:
+                entry.default = entry.value = number
 
     def __getitem__(self, key: Key) -> Entry:
         return self._entries[key]

@@ -1,7 +1,7 @@
 """One CANopen device on the simulated bus: power, NMT, error control, and who gets which frame (CiA 301)."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus, Frame
@@ -33,6 +33,7 @@ class Node:
         self.clock = clock
         self.name = name
         self.node_id = node_id
+        self.description = description
         self.dictionary = dictionary = Dictionary(description)
         self.storage = Storage(dictionary)
         self.state = NmtState.INITIALISING
@@ -113,6 +114,10 @@ class Node:
     def _on_heartbeat(self, node_id: int, state: int) -> None:
         """Another node has booted (`state` 0) or shown its heartbeat."""
 
+    def _own_handlers(self) -> Iterable[tuple[int, Handler]]:
+        """More identifiers whose frames the profile wants."""
+        return ()
+
     def _on_communication_lost(self) -> None:
         """The bus is gone, or a life sign stayed away; the NMT state is still the one before."""
 
@@ -172,6 +177,7 @@ class Node:
             yield rpdo.cob_id, self._rpdo_handler(rpdo)
         for tpdo in self._pdos.sent:
             yield tpdo.cob_id, self._remote_handler(tpdo)
+        yield from self._own_handlers()
 
     def _sdo_handler(self, server: SdoServer) -> Handler:
         def handle(frame: Frame) -> None:

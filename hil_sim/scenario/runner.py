@@ -66,6 +66,7 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
         epoch_s=time.time(),
         sensors=script.sensors,
         person=script.subject,
+        drives=script.drives,
     )
     with ExitStack() as stack:
         robot.open()

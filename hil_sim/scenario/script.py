@@ -1,7 +1,7 @@
 """A scenario file: the robot, what happens to it and when, and what is expected (docs/bench.md).
 
-`[robot]` has scenario, seconds, seed, subject, imu and insole; each `[[at]]` a time and one thing that
-happens; each `[[expect]]` what is looked at, what it must be, and when.
+`[robot]` has scenario, seconds, seed, subject, imu, insole and drive; each `[[at]]` a time and one thing
+that happens; each `[[expect]]` what is looked at, what it must be, and when.
 """
 
 import tomllib
@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hil_sim import operator
+from hil_sim import operator, personality
 from hil_sim.errors import SimulatorError
-from hil_sim.exoskeleton import Scenario
+from hil_sim.exoskeleton import JOINTS, Scenario
 from hil_sim.scenario import expect_table
 from hil_sim.scenario.expectation import Expectation, When
 from hil_sim.scenario.table import ScenarioError, Table
@@ -48,6 +48,7 @@ class Script:
     seed: int = 0
     subject: int = 0
     sensors: SensorChoice = field(default_factory=SensorChoice)
+    drives: Mapping[str, Path] = field(default_factory=dict)
     lines: tuple[Line, ...] = ()
     expectations: tuple[Expectation, ...] = ()
 
@@ -63,7 +64,7 @@ def load(file: Path) -> Script:
     top = Table(str(file), values)
     top.only(("title", "robot", "at", "expect"))
     robot = Table(f"{file} [robot]", values.get("robot", {}))
-    robot.only(("scenario", "seconds", "seed", "subject", "imu", "insole"))
+    robot.only(("scenario", "seconds", "seed", "subject", "imu", "insole", "drive"))
     lines = tuple(_line(table) for table in _tables(top, "at"))
     expectations = tuple(one for table in _tables(top, "expect") for one in expect_table.read(table))
     least_s = _AFTER_S + max([0.0, *(line.time_s for line in lines), *map(_known_by, expectations)])
@@ -77,9 +78,22 @@ def load(file: Path) -> Script:
             robot.choice("imu", IMUS, SensorChoice().imu),
             robot.choice("insole", INSOLES, SensorChoice().insole),
         ),
+        drives=_drives(robot, file),
         lines=lines,
         expectations=expectations,
     )
+
+
+def _drives(robot: Table, file: Path) -> dict[str, Path]:
+    """`drive = "FILE"`, or a list of `"FILE"` and `"JOINT=FILE"`, beside the scenario's file."""
+    given = robot.values.get("drive", [])
+    words = [given] if isinstance(given, str) else given
+    if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+        raise robot.fail(f'drive = {given!r} is no file: write "FILE", or a list of "FILE" and "JOINT=FILE"')
+    try:
+        return personality.choose(words, JOINTS, file)
+    except SimulatorError as error:
+        raise robot.fail(str(error)) from error
 
 
 def _tables(top: Table, key: str) -> list[Table]:
