@@ -42,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
         "--dir",
         type=Path,
         metavar="DIR",
-        help="folder of the robot, and of gateway.log (default: one for now)",
+        help="of the robot and of gateway.log; a robot.toml there is used (default: a new one)",
     )
     parser.add_argument(
         "--speed",
