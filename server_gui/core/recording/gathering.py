@@ -1,0 +1,145 @@
+"""What comes from robots, gathered into runs and events: pure, for the recorder's thread."""
+
+import itertools
+import uuid
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from gateway.client import Batch
+from server_gui.core.recording.rows import Layout, Record, Run
+
+
+class EventKind(Enum):
+    """What an event of a recording tells."""
+
+    GAP = "gap"  # something was not seen: the link dropped, or notifications never came
+    DROPPED = "dropped"  # the robot threw rows away
+    LOST = "lost"  # this server threw rows away: its queue or its disk was full
+    NAME = "name"  # a robot calls itself by another name than the server's file, or by another robot's
+    JOURNAL_GAP = "journal_gap"  # entries of the robot's journal were never seen
+    MARKER = "marker"  # somebody marked this instant
+
+
+Name = tuple[str, str, int, Layout]  # session, connection, stream, columns
+
+
+@dataclass(frozen=True, slots=True)
+class Notification:
+    """A batch of a stream, and how its times relate to UTC."""
+
+    stream: int
+    batch: Batch
+    utc_offset_ns: int  # UTC minus the robot's monotonic clock
+    received_utc_ns: int
+
+
+class Gathering:
+    """One robot's telemetry between two commits, and what its connection is called.
+
+    The connection id is made here, anew for every link, so that a row is named once in the world whatever
+    numbers a robot gives its streams after a restart.
+    """
+
+    def __init__(self, robot: str) -> None:
+        self.robot = robot
+        self.session = ""
+        self.connection = uuid.uuid4().hex[:16]
+        self.units: dict[str, str] = {}
+        self._link: int | None = None
+        self._dropped: dict[int, int] = {}  # by stream, what the robot dropped until now
+        self._gathered: dict[Name, list[Notification]] = {}
+        self._layouts: dict[tuple[str, ...], Layout] = {}
+
+    def describe(self, units: dict[str, str]) -> None:
+        """Take the channels' units from now on."""
+        self.units = units
+        self._layouts.clear()
+
+    def take(self, new: Notification) -> list[Record]:
+        """Keep one notification; the events that it tells of: a new link, a gap, rows dropped."""
+        events = self._missing(new)
+        if new.batch.stamps_ns:
+            name = (self.session, self.connection, new.stream, self._layout(tuple(new.batch.columns)))
+            self._gathered.setdefault(name, []).append(new)
+        return events
+
+    def runs(self) -> list[Run]:
+        """Everything gathered, and begin anew."""
+        gathered, self._gathered = self._gathered, {}
+        return [self._run(*name, found) for name, found in gathered.items()]
+
+    def event(
+        self, kind: EventKind, text: str, utc_ns: int, stamp_ns: int | None = None, **data: Any
+    ) -> Record:
+        """Something that happened to this robot or its recording; `data` is what JSON can say."""
+        fields = {
+            "robot": self.robot,
+            "session": self.session,
+            "utc": utc_ns,
+            "stamp_ns": stamp_ns,
+            "connection": self.connection,
+            "kind": kind.value,
+            "text": text,
+            "data": msgspec.json.encode(data).decode(),
+        }
+        return Record("events", fields)
+
+    def _missing(self, new: Notification) -> list[Record]:
+        batch, events = new.batch, []
+        first_ns = batch.stamps_ns[0] if batch.stamps_ns else None
+        utc_ns = new.received_utc_ns if first_ns is None else first_ns + new.utc_offset_ns
+
+        def happened(kind: EventKind, text: str, **data: Any) -> None:
+            events.append(self.event(kind, text, utc_ns, first_ns, stream=new.stream, seq=batch.seq, **data))
+
+        if batch.link != self._link:
+            self._new_link(batch.link, happened)
+        if batch.missed:
+            happened(EventKind.GAP, f"{batch.missed} notifications never came", missed=batch.missed)
+        rows = batch.dropped - self._dropped.get(new.stream, 0)
+        if rows > 0:
+            happened(EventKind.DROPPED, f"the robot dropped {rows} rows: we read too slowly", rows=rows)
+        self._dropped[new.stream] = batch.dropped
+        return events
+
+    def _new_link(self, link: int, happened: Callable[[EventKind, str], None]) -> None:
+        if self._link is not None:
+            self.connection = uuid.uuid4().hex[:16]
+            happened(EventKind.GAP, "the link was made again; what was in between has not been seen")
+        self._link = link
+        self._dropped.clear()
+
+    def _layout(self, channels: tuple[str, ...]) -> Layout:
+        layout = self._layouts.get(channels)
+        if layout is None:
+            layout = Layout(channels, tuple(self.units.get(channel) for channel in channels))
+            self._layouts[channels] = layout
+        return layout
+
+    def _run(
+        self, session: str, connection: str, stream: int, layout: Layout, found: list[Notification]
+    ) -> Run:
+        batches = [new.batch for new in found]
+        counts = [len(batch.stamps_ns) for batch in batches]
+        columns = [_joined(batch.columns[name] for batch in batches) for name in layout.channels]
+        return Run(
+            self.robot,
+            session,
+            connection,
+            stream,
+            layout,
+            stamps_ns=np.array(_joined(batch.stamps_ns for batch in batches), np.int64),
+            seqs=np.repeat(np.array([batch.seq for batch in batches], np.int64), counts),
+            rows=np.concatenate([np.arange(count, dtype=np.int64) for count in counts]),
+            utc_offset_ns=np.repeat(np.array([new.utc_offset_ns for new in found], np.int64), counts),
+            values=np.array(columns, np.float64).reshape(len(columns), sum(counts)),  # None becomes NaN
+        )
+
+
+def _joined(parts: Iterable[list[Any]]) -> list[Any]:
+    return list(itertools.chain.from_iterable(parts))

@@ -1,0 +1,32 @@
+"""Which entries of a robot's journal are new: its tail is asked again and again."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from server_gui.core.recording.rows import JournalHead
+
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """Entries that follow the head; `missing` were written in between and can no longer be seen."""
+
+    entries: Sequence[Entry]
+    missing: int
+
+
+def news(entries: Sequence[Entry], head: JournalHead | None) -> News:
+    """What a tail (oldest first) says that was not known up to `head`.
+
+    A journal that does not hold the head, though it should, has been begun anew: then all of it is news.
+    """
+    if head is None or not entries:
+        return News(entries, 0)
+    first = entries[0]["n"]
+    if first > head.n:
+        return News(entries, first - head.n - 1)
+    later = [entry for entry in entries if entry["n"] > head.n]
+    same = any(entry["n"] == head.n and entry["hash"] == head.hash for entry in entries)
+    return News(later if same else entries, 0)

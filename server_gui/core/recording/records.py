@@ -1,0 +1,145 @@
+"""Sessions, labels and predictions: what people and models say of a recording, as rows for the store."""
+
+import time
+import uuid
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import msgspec
+
+from gateway.messages import ResourceSnapshot
+from server_gui.core.recording.rows import Record
+
+
+class Facts(msgspec.Struct, frozen=True):
+    """What was so when a session began.
+
+    `parameters` are values by name, `units` each channel's unit, `versions` software by name.
+    """
+
+    configuration_hash: str = ""
+    parameters: dict[str, float | int | None] = {}
+    units: dict[str, str] = {}
+    versions: dict[str, str] = {}
+    operator: str = ""
+    notes: str = ""
+
+
+class Session(msgspec.Struct, frozen=True):
+    """A stretch of one robot's recording. Of several rows with one name in the store, the newest holds."""
+
+    robot: str
+    name: str
+    began_utc_ns: int
+    facts: Facts
+    ended_utc_ns: int | None = None
+
+    def record(self) -> Record:
+        """As a row of the table `sessions`."""
+        facts = self.facts
+        fields = {
+            "robot": self.robot,
+            "session": self.name,
+            "utc": time.time_ns(),
+            "began": self.began_utc_ns,
+            "ended": self.ended_utc_ns,
+            "configuration_hash": facts.configuration_hash,
+            "parameters": _json(facts.parameters),
+            "units": _json(facts.units),
+            "versions": _json(facts.versions),
+            "operator": facts.operator,
+            "notes": facts.notes,
+        }
+        return Record("sessions", fields)
+
+    def ended(self) -> "Session":
+        """The same session, ended now."""
+        return msgspec.structs.replace(self, ended_utc_ns=time.time_ns())
+
+
+def begin(robot: str, facts: Facts) -> Session:
+    """A session that begins now; its name sorts by time."""
+    now_ns = time.time_ns()
+    name = f"{datetime.fromtimestamp(now_ns / 1e9, UTC):%Y%m%dT%H%M%SZ}-{uuid.uuid4().hex[:6]}"
+    return Session(robot, name, now_ns, facts)
+
+
+def label(
+    robot: str,
+    session: str,
+    text: str,
+    began_utc_ns: int,
+    ended_utc_ns: int,
+    author: str,
+    source: str = "person",
+) -> Record:
+    """A row of `labels`: what robot and wearer did from `began_utc_ns` to `ended_utc_ns`."""
+    fields = {
+        "robot": robot,
+        "session": session,
+        "utc": began_utc_ns,
+        "ended": ended_utc_ns,
+        "label": text,
+        "author": author,
+        "source": source,
+    }
+    return Record("labels", fields)
+
+
+def prediction(
+    robot: str, session: str, utc_ns: int, stamp_ns: int, model: str, probabilities: Mapping[str, float]
+) -> Record:
+    """A row of `predictions`: what `model` (name and version) made of the window that ended at `stamp_ns`."""
+    best = max(probabilities, key=probabilities.__getitem__)
+    fields = {
+        "robot": robot,
+        "session": session,
+        "utc": utc_ns,
+        "stamp_ns": stamp_ns,
+        "model": model,
+        "label": best,
+        "probability": probabilities[best],
+        "probabilities": _json(dict(probabilities)),
+    }
+    return Record("predictions", fields)
+
+
+def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot) -> Record:
+    """A row of `resources`: the robot's computer, with its processes."""
+    found = msgspec.to_builtins(snapshot)
+    cpu, memory, gateway = found["cpu"], found["memory"], found["gateway"]
+    more = {key: found[key] for key in ("disk", "network", "thermal", "kernel") if key in found}
+    fields = {
+        "robot": robot,
+        "session": session,
+        "utc": utc_ns,
+        "stamp_ns": found["stamp_ns"],
+        "cpu_percent": cpu["percent"],
+        "cpu_percent_per_core": cpu["per_core"],
+        "load": cpu["load"],
+        **{f"memory_{name}": value for name, value in memory.items()},
+        "gateway_cpu_percent": gateway["cpu_percent"],
+        "gateway_rss": gateway["rss_bytes"],
+        "processes": [{"cmdline": None, **process} for process in found.get("processes", ())],
+        "more": _json(more),
+    }
+    return Record("resources", fields)
+
+
+def journal(robot: str, entry: Mapping[str, Any]) -> Record:
+    """A row of `journal`: one entry of the robot's own journal, whole, with its hash."""
+    fields = {
+        "robot": robot,
+        "utc": entry.get("utc_ns"),
+        "n": entry["n"],
+        "hash": entry["hash"],
+        "who": entry.get("who"),
+        "what": entry.get("what"),
+        "entry": _json(dict(entry)),
+    }
+    return Record("journal", fields)
+
+
+def _json(value: dict[str, Any]) -> str:
+    return msgspec.json.encode(value).decode()

@@ -1,0 +1,74 @@
+"""What the spool keeps: runs of telemetry rows, and records of every other table."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+STAMP: Final = np.dtype("<i8")
+VALUE: Final = np.dtype("<f8")
+
+
+class Layout(msgspec.Struct, frozen=True):
+    """The columns of a run, in order: channel names, and their units as the robot describes them."""
+
+    channels: tuple[str, ...]
+    units: tuple[str | None, ...]  # None: the robot has not described this channel
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Consecutive rows of one stream with the same columns.
+
+    `stamps_ns` are on the robot's monotonic clock; add `utc_offset_ns` to come to UTC. A row is named by its
+    robot, connection, stream, `seqs[i]` (its notification) and `rows[i]` (its place in that). `values` has
+    one row a channel; NaN stands for null, which nothing else can: the wire has no NaN.
+    """
+
+    robot: str
+    session: str
+    connection: str
+    stream: int
+    layout: Layout
+    stamps_ns: Ints
+    seqs: Ints
+    rows: Ints
+    utc_offset_ns: Ints
+    values: Floats  # channels × rows
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+
+class Record(msgspec.Struct, frozen=True):
+    """One row of a table that is not telemetry; `fields` are that table's own columns."""
+
+    table: str
+    fields: dict[str, Any]
+
+
+class JournalHead(msgspec.Struct, frozen=True):
+    """The newest entry of a robot's journal that has been recorded: its number and hash."""
+
+    n: int
+    hash: str
+
+
+def pack(run: Run) -> bytes:
+    """Everything of a run that is not its name, as little-endian 8-byte numbers, column after column."""
+    keys = np.stack((run.stamps_ns, run.seqs, run.rows, run.utc_offset_ns)).astype(STAMP, copy=False)
+    return keys.tobytes() + run.values.astype(VALUE, copy=False).tobytes()
+
+
+def unpack(
+    robot: str, session: str, connection: str, stream: int, layout: Layout, count: int, data: bytes
+) -> Run:
+    """The run that was packed; its arrays are views of `data`."""
+    keys = np.frombuffer(data, STAMP, 4 * count).reshape(4, count)
+    values = np.frombuffer(data, VALUE, offset=4 * count * STAMP.itemsize)
+    shaped = values.reshape(len(layout.channels), count)
+    return Run(robot, session, connection, stream, layout, keys[0], keys[1], keys[2], keys[3], shaped)

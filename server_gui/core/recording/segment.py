@@ -1,0 +1,141 @@
+"""One file of the spool: a SQLite database that is written, then frozen, then only read."""
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
+
+SCHEMA: Final = """
+CREATE TABLE IF NOT EXISTS layout (id INTEGER PRIMARY KEY, description BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS run (
+    robot TEXT NOT NULL, connection TEXT NOT NULL, stream INTEGER NOT NULL,
+    seq INTEGER NOT NULL, row INTEGER NOT NULL, -- of the first of its rows
+    rows INTEGER NOT NULL, session TEXT NOT NULL, layout INTEGER NOT NULL, data BLOB NOT NULL,
+    PRIMARY KEY (robot, connection, stream, seq, row)
+);
+CREATE TABLE IF NOT EXISTS record (number INTEGER PRIMARY KEY, content BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL);
+"""
+SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
+
+_encoder = msgspec.msgpack.Encoder()
+_layout_decoder = msgspec.msgpack.Decoder(Layout)
+_record_decoder = msgspec.msgpack.Decoder(Record)
+
+
+class Segment:
+    """A database of the spool, for one thread at a time."""
+
+    def __init__(self, path: Path, number: int) -> None:
+        self.path = path
+        self.number = number
+        self.rows = 0
+        try:
+            self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+            # WAL with FULL: a commit has returned only when the log is on the disk.
+            self._database.execute("PRAGMA journal_mode=WAL")
+            self._database.execute("PRAGMA synchronous=FULL")
+            self._database.executescript(SCHEMA)
+            self._layouts: dict[Layout, int] = {
+                _layout_decoder.decode(description): number
+                for number, description in self._database.execute("SELECT id, description FROM layout")
+            }
+            self.rows = self._count()
+        except sqlite3.Error as error:
+            raise SpoolUnusable(
+                f"the spool's file {path} cannot be opened: {error}; move it away to go on without its rows"
+            ) from error
+
+    def _count(self) -> int:
+        runs = self._database.execute("SELECT coalesce(sum(rows), 0) FROM run").fetchone()[0]
+        return int(runs + self._database.execute("SELECT count(*) FROM record").fetchone()[0])
+
+    def append(
+        self, runs: Sequence[Run], records: Sequence[Record], heads: Mapping[str, JournalHead]
+    ) -> None:
+        """Add all in one transaction; on the disk when this returns. `heads` replace those of their robots.
+
+        Raises:
+            sqlite3.Error: nothing was added.
+
+        """
+        with self._transaction():
+            self._database.executemany(
+                "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", [self._line(run) for run in runs]
+            )
+            self._database.executemany(
+                "INSERT INTO record (content) VALUES (?)",
+                [(_encoder.encode(record),) for record in records],
+            )
+            self._database.executemany(
+                "INSERT OR REPLACE INTO journal_head VALUES (?, ?, ?)",
+                [(robot, head.n, head.hash) for robot, head in heads.items()],
+            )
+        self.rows += sum(map(len, runs)) + len(records)
+
+    def _line(self, run: Run) -> tuple[object, ...]:
+        first = (int(run.seqs[0]), int(run.rows[0]))
+        name = (run.robot, run.connection, run.stream, *first)
+        return (*name, len(run), run.session, self._layout(run.layout), pack(run))
+
+    def _layout(self, layout: Layout) -> int:
+        number = self._layouts.get(layout)
+        if number is None:
+            number = len(self._layouts) + 1
+            self._database.execute("INSERT INTO layout VALUES (?, ?)", (number, _encoder.encode(layout)))
+            self._layouts[layout] = number
+        return number
+
+    @contextlib.contextmanager
+    def _transaction(self) -> Iterator[None]:
+        known = dict(self._layouts)
+        try:
+            self._database.execute("BEGIN IMMEDIATE")
+            yield
+            self._database.execute("COMMIT")
+        except BaseException:
+            self._layouts = known
+            with contextlib.suppress(sqlite3.Error):
+                self._database.execute("ROLLBACK")
+            raise
+
+    def runs(self) -> Iterator[Run]:
+        """Every run, robot by robot, each in the order in which it was recorded."""
+        layouts = {number: layout for layout, number in self._layouts.items()}
+        found = self._database.execute(
+            "SELECT robot, session, connection, stream, layout, rows, data FROM run ORDER BY robot, rowid"
+        )
+        for robot, session, connection, stream, layout, count, data in found:
+            yield unpack(robot, session, connection, stream, layouts[layout], count, data)
+
+    def records(self) -> Iterator[Record]:
+        """Every record, in the order in which it was recorded."""
+        for (content,) in self._database.execute("SELECT content FROM record ORDER BY number"):
+            yield _record_decoder.decode(content)
+
+    def heads(self) -> dict[str, JournalHead]:
+        """The newest journal entry of each robot that is known here."""
+        found = self._database.execute("SELECT robot, n, hash FROM journal_head")
+        return {robot: JournalHead(n, digest) for robot, n, digest in found}
+
+    def close(self) -> None:
+        """Let go of the file; SQLite brings its log home."""
+        self._database.close()
+
+    @staticmethod
+    def remove(path: Path) -> None:
+        """Delete the database's files."""
+        for suffix in SUFFIXES:
+            path.with_name(path.name + suffix).unlink(missing_ok=True)
+
+    @staticmethod
+    def size_bytes(path: Path) -> int:
+        """What the database's files take on the disk."""
+        found = (path.with_name(path.name + suffix) for suffix in SUFFIXES)
+        return sum(file.stat().st_size for file in found if file.exists())

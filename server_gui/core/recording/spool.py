@@ -1,0 +1,241 @@
+"""The spool: a folder where everything recorded is safe on this disk until it is in the store.
+
+`00000007.db` is a segment; the highest number is written, all others are frozen, and a segment's number is
+the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in the store and goes when room
+is needed. The highest number is never removed, so that no number is given twice.
+"""
+
+import fcntl
+import os
+import re
+import shutil
+import sqlite3
+import time
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Final, Self
+
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.rows import JournalHead, Record, Run
+from server_gui.core.recording.segment import Segment
+
+RESERVE_BYTES: Final = 1 << 30  # what the disk must have left for recording to go on
+KEEP_BYTES: Final = 4 << 30  # uploaded segments that stay as a second copy, while there is room
+_NAME: Final = re.compile(r"(\d{8})(\.uploaded)?\.db")
+
+
+def default_folder() -> Path:
+    """Under the user's own state (XDG base directories)."""
+    state = os.environ.get("XDG_STATE_HOME")
+    return (Path(state) if state else Path.home() / ".local" / "state") / "gwrms" / "spool"
+
+
+def _free_bytes(folder: Path) -> int:
+    return shutil.disk_usage(folder).free
+
+
+class Spool:
+    """One server's spool; use it as a context manager.
+
+    `append` and `freeze` belong to one thread, the recorder's. Everything else may be called from others.
+
+    Raises:
+        SpoolUnusable: the folder cannot be used, or another process uses it.
+
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        reserve_bytes: int = RESERVE_BYTES,
+        keep_bytes: int = KEEP_BYTES,
+        free_bytes: Callable[[Path], int] = _free_bytes,
+    ) -> None:
+        self.folder = folder
+        self._reserve_bytes = reserve_bytes
+        self._keep_bytes = keep_bytes
+        self._free_bytes = free_bytes
+        self._lock = _take(folder)
+        try:
+            self.id = self._identify()
+            self._heads = self._known_heads()
+            self._began_ns: int | None = None
+            self._current = self._resume()
+        except BaseException:
+            self._lock.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the folder; what is in it stays. Idempotent."""
+        self._current.close()
+        self._lock.close()
+
+    # --- the recorder's thread
+
+    def append(
+        self, runs: Sequence[Run], records: Sequence[Record], heads: Mapping[str, JournalHead] | None = None
+    ) -> None:
+        """Keep all of this or nothing; safe from now on when this returns.
+
+        Raises:
+            SpoolUnusable: nothing was kept; the message says why.
+
+        """
+        try:
+            self._current.append(runs, records, heads or {})
+        except sqlite3.Error as error:
+            raise SpoolUnusable(f"the spool {self.folder} cannot be written: {error}") from error
+        self._heads.update(heads or {})
+        if self._began_ns is None and self._current.rows:
+            self._began_ns = time.monotonic_ns()
+
+    @property
+    def rows(self) -> int:
+        """Rows in the segment that is being written."""
+        return self._current.rows
+
+    @property
+    def age_s(self) -> float:
+        """How long the first row in the segment that is being written has been there."""
+        return 0.0 if self._began_ns is None else (time.monotonic_ns() - self._began_ns) / 1e9
+
+    @property
+    def heads(self) -> Mapping[str, JournalHead]:
+        """Up to where each robot's journal has been recorded."""
+        return self._heads
+
+    def freeze(self) -> None:
+        """End the segment that is being written, if there is anything in it; it waits for upload then.
+
+        Raises:
+            SpoolUnusable: a new segment cannot be made; the old one is written on.
+
+        """
+        if self._current.rows:
+            following = self._begin(self._current.number + 1)
+            self._current.close()
+            self._current = following
+
+    # --- any thread
+
+    def waiting(self) -> list[int]:
+        """Segments that are frozen and not uploaded, oldest first."""
+        return [
+            number for number, uploaded in self._segments() if not uploaded and number != self._current.number
+        ]
+
+    def read(self, number: int) -> Segment:
+        """A frozen segment; close it after use."""
+        return Segment(self._path(number), number)
+
+    def uploaded(self, number: int) -> None:
+        """The segment is in the store, durably: it may go when room is needed."""
+        self._path(number).rename(self._path(number, uploaded=True))
+        _sync(self.folder)
+
+    def backlog_bytes(self) -> int:
+        """What waits for upload, with what is being written."""
+        numbers = [number for number, uploaded in self._segments() if not uploaded]
+        return sum(Segment.size_bytes(self._path(number)) for number in numbers)
+
+    def make_room(self) -> bool:
+        """Remove the oldest uploaded segments as far as needed; False where the disk is still nearly full."""
+        paths = [self._path(number, uploaded=True) for number, uploaded in self._segments() if uploaded]
+        kept = sum(map(Segment.size_bytes, paths))
+        for path in paths:
+            if kept <= self._keep_bytes and self._roomy():
+                break
+            kept -= Segment.size_bytes(path)
+            Segment.remove(path)
+        return self._roomy()
+
+    def _roomy(self) -> bool:
+        return self._free_bytes(self.folder) >= self._reserve_bytes
+
+    # --- files
+
+    def _path(self, number: int, uploaded: bool = False) -> Path:
+        return self.folder / f"{number:08}{'.uploaded' if uploaded else ''}.db"
+
+    def _segments(self) -> list[tuple[int, bool]]:
+        names = (_NAME.fullmatch(path.name) for path in self.folder.iterdir())
+        return sorted((int(found[1]), bool(found[2])) for found in names if found)
+
+    def _identify(self) -> str:
+        """The name of this spool at the store, given once."""
+        file = self.folder / "id"
+        if not file.exists():
+            draft = file.with_name("id.draft")
+            with draft.open("w") as out:
+                out.write(f"{uuid.uuid4()}\n")
+                out.flush()
+                os.fsync(out.fileno())
+            draft.rename(file)
+            _sync(self.folder)
+        return file.read_text().strip()
+
+    def _known_heads(self) -> dict[str, JournalHead]:
+        heads: dict[str, JournalHead] = {}
+        # Each begins with what the ones before it knew; the newest may have been cut off at its making.
+        for number, uploaded in self._segments()[-2:]:
+            segment = Segment(self._path(number, uploaded), number)
+            heads |= segment.heads()
+            segment.close()
+        return heads
+
+    def _resume(self) -> Segment:
+        """The segment to write now: a new one, unless the newest is still empty."""
+        newest, uploaded = self._segments()[-1] if self._segments() else (0, True)
+        if uploaded:
+            return self._begin(newest + 1)
+        segment = self._begin(newest)
+        if not segment.rows:
+            return segment
+        segment.close()
+        return self._begin(newest + 1)
+
+    def _begin(self, number: int) -> Segment:
+        segment = Segment(self._path(number), number)
+        try:
+            segment.append((), (), self._heads)
+        except sqlite3.Error as error:
+            segment.close()
+            raise SpoolUnusable(f"the spool {self.folder} cannot be written: {error}") from error
+        _sync(self.folder)
+        self._began_ns = None
+        return segment
+
+
+def _take(folder: Path) -> IO[bytes]:
+    """The folder's lock, which ends with the process, however that ends."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "lock").open("ab")
+    except OSError as error:
+        raise SpoolUnusable(
+            f"the spool's folder {folder} cannot be used: {error.strerror or error}; "
+            'give another one with spool = "…" in [recorder] of the server\'s file'
+        ) from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        lock.close()
+        raise SpoolUnusable(
+            f"another server records into {folder}; end it first, or give this one another folder"
+        ) from error
+    return lock
+
+
+def _sync(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

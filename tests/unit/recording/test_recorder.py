@@ -1,0 +1,258 @@
+"""The recorder: everything, never decimated; what is lost is told; nobody waits for the disk."""
+
+import collections
+import json
+import math
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from gateway.client import Batch
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.recorder import AGAIN_S, Alarm, AlarmKind, Recorder, RecorderSettings
+from server_gui.core.recording.records import Facts, label
+from server_gui.core.recording.rows import JournalHead, Record, Run
+from server_gui.core.recording.spool import Spool
+from tests.unit.recording.robots import CHANNELS, batch, description, stamp_ns, value
+
+WAIT_S = 20.0
+
+
+@pytest.fixture
+def spool(tmp_path: Path) -> Iterator[Spool]:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as opened:
+        yield opened
+
+
+def kept(spool: Spool) -> tuple[list[Run], list[Record]]:
+    """Everything in the frozen segments."""
+    runs: list[Run] = []
+    records: list[Record] = []
+    for number in spool.waiting():
+        segment = spool.read(number)
+        runs += segment.runs()
+        records += segment.records()
+        segment.close()
+    return runs, records
+
+
+def rows(runs: Sequence[Run]) -> list[tuple[str, str, int, int, int]]:
+    return [
+        (run.robot, run.connection, run.stream, int(seq), int(row))
+        for run in runs
+        for seq, row in zip(run.seqs, run.rows, strict=True)
+    ]
+
+
+def events(spool: Spool, *kinds: str) -> list[dict[str, object]]:
+    return [
+        record.fields
+        for record in kept(spool)[1]
+        if record.table == "events" and record.fields["kind"] in kinds
+    ]
+
+
+def test_every_row_of_every_robot_is_kept_with_its_values(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for robot in ("exo-01", "exo-02"):
+            recorder.describe(robot, description(robot))
+            for seq in range(20):
+                recorder.record(robot, 4, batch(seq, rows=3, missing=CHANNELS[1:2]))
+    runs, _ = kept(spool)
+    found = rows(runs)
+    assert len(found) == len(set(found)) == 2 * 20 * 3
+    assert runs[0].layout.channels == CHANNELS
+    assert runs[0].layout.units == ("rad", "rad/s", "rad")
+    for run in runs:
+        for i, (seq, row) in enumerate(zip(run.seqs, run.rows, strict=True)):
+            assert run.stamps_ns[i] == stamp_ns(seq, row)
+            assert run.values[0, i] == value(seq, row, 0)
+            assert math.isnan(run.values[1, i])
+            assert run.values[2, i] == value(seq, row, 2)
+
+
+def test_acknowledged_means_on_the_disk(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        number = recorder.record("exo-01", 1, batch(0))
+        assert recorder.flush(WAIT_S)
+        assert recorder.acknowledged >= number
+        assert recorder.state.recorded >= 1
+        assert spool.rows >= 1
+
+
+def test_a_stream_that_changes_its_columns_goes_on_in_another_run(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+        recorder.record("exo-01", 1, batch(1, channels=CHANNELS[:1]))
+    assert sorted(run.layout.channels for run in kept(spool)[0]) == [CHANNELS[:1], CHANNELS]
+
+
+def test_a_new_link_is_a_new_connection_and_a_gap(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0, link=1))
+        recorder.record("exo-01", 1, batch(0, link=2))
+    runs, _ = kept(spool)
+    assert len({run.connection for run in runs}) == 2
+    (gap,) = events(spool, "gap")
+    assert gap["connection"] == next(run.connection for run in runs if run.connection != runs[0].connection)
+
+
+def test_missing_notifications_and_dropped_rows_are_events(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0, dropped=2))
+        recorder.record("exo-01", 1, batch(4, dropped=2, missed=3))
+        recorder.record("exo-01", 1, batch(5, dropped=9))
+    found = [(event["kind"], json.loads(str(event["data"]))) for event in events(spool, "gap", "dropped")]
+    assert found == [
+        ("dropped", {"stream": 1, "seq": 0, "rows": 2}),
+        ("gap", {"stream": 1, "seq": 4, "missed": 3}),
+        ("dropped", {"stream": 1, "seq": 5, "rows": 7}),
+    ]
+
+
+def test_times_in_utc_follow_the_clock_offset(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        first = batch(0)
+        recorder.record("exo-01", 1, first, clock_offset_ns=first.stamps_ns[0] - first.received_ns - 1_000)
+        recorder.record("exo-01", 1, batch(1), clock_offset_ns=None)
+    (run,) = kept(spool)[0]
+    assert len(set(run.utc_offset_ns)) == 2
+
+
+def test_a_session_begins_by_itself_and_ends_with_the_recorder(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+        recorder.begin("exo-01", Facts(operator="Ada", parameters={"gait.step_length": 0.4}))
+        recorder.record("exo-01", 1, batch(1))
+    runs, records = kept(spool)
+    sessions = [record.fields for record in records if record.table == "sessions"]
+    assert [(session["operator"], session["ended"] is not None) for session in sessions] == [
+        ("", False),
+        ("", True),
+        ("Ada", False),
+        ("Ada", True),
+    ]
+    assert [run.session for run in runs] == [sessions[0]["session"], sessions[2]["session"]]
+
+
+def test_a_name_that_differs_or_repeats_is_an_event(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.describe("left", description("exo"))
+        recorder.describe("exo", description("exo"))
+    assert [event["text"] for event in events(spool, "name")] == [
+        "left in the server's file calls itself exo",
+        "exo and left both call themselves exo",
+    ]
+
+
+def test_journal_entries_are_kept_once(spool: Spool) -> None:
+    entries = [{"n": n, "hash": f"h{n}", "utc_ns": n, "who": "ada", "what": "write"} for n in range(1, 8)]
+    with Recorder(spool) as recorder:
+        recorder.journal("exo-01", entries[:2])
+        recorder.journal("exo-01", entries[:3])
+        assert recorder.flush(WAIT_S)
+        recorder.journal("exo-01", entries[1:4])
+        recorder.journal("exo-01", entries[5:7])
+    numbers = [record.fields["n"] for record in kept(spool)[1] if record.table == "journal"]
+    assert numbers == [1, 2, 3, 4, 6, 7]
+    assert spool.heads["exo-01"] == JournalHead(7, "h7")
+    (gap,) = events(spool, "journal_gap")
+    assert json.loads(str(gap["data"])) == {"missing": 1}
+
+
+def test_markers_and_labels_are_kept(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.mark("exo-01", "stumbled", foot="left")
+        recorder.add(label("exo-01", "s", "walking", 1, 2, "ada"))
+    (marker,) = events(spool, "marker")
+    assert (marker["text"], json.loads(str(marker["data"]))) == ("stumbled", {"foot": "left"})
+    assert [record.fields["label"] for record in kept(spool)[1] if record.table == "labels"] == ["walking"]
+
+
+class StuckSpool(Spool):
+    """A spool whose disk answers only when it is let go, or refuses."""
+
+    def __init__(self, folder: Path) -> None:
+        self.let_go = threading.Event()
+        self.reached = threading.Event()
+        self.refusals = 0
+        super().__init__(folder, reserve_bytes=0)
+
+    def append(self, *args: object, **more: object) -> None:
+        self.reached.set()
+        self.let_go.wait(WAIT_S)
+        if self.refusals:
+            self.refusals -= 1
+            raise SpoolUnusable("the disk refuses")
+        super().append(*args, **more)  # type: ignore[arg-type]
+
+
+def test_nobody_waits_for_the_disk_and_an_overflow_is_counted_told_and_recorded(tmp_path: Path) -> None:
+    alarms: list[Alarm] = []
+    with StuckSpool(tmp_path) as spool:
+        with Recorder(spool, alarms.append, RecorderSettings(capacity=100)) as recorder:
+            recorder.record("exo-01", 1, batch(0))
+            assert spool.reached.wait(WAIT_S)
+            for seq in range(1, 151):
+                recorder.record("exo-01", 1, batch(seq))  # returns although the disk hangs
+            assert not spool.let_go.is_set()
+            assert recorder.state.lost == 50
+            spool.let_go.set()
+            assert recorder.flush(WAIT_S)
+            assert recorder.state.lost == 50
+        assert [alarm.kind for alarm in alarms] == [AlarmKind.OVERFLOW]
+        assert len(rows(kept(spool)[0])) == 101
+        (event,) = events(spool, "lost")
+        assert json.loads(str(event["data"])) == {"rows": 50}
+
+
+def test_what_the_disk_refused_is_tried_again(tmp_path: Path) -> None:
+    alarms: list[Alarm] = []
+    with StuckSpool(tmp_path) as spool:
+        spool.let_go.set()
+        spool.refusals = 1
+        with Recorder(spool, alarms.append) as recorder:
+            recorder.record("exo-01", 1, batch(0))
+            assert recorder.flush(WAIT_S + AGAIN_S)
+            assert recorder.state.alarms == ()
+        assert [(alarm.kind, alarm.text) for alarm in alarms] == [
+            (AlarmKind.SPOOL_FAILED, "the disk refuses")
+        ]
+        assert len(rows(kept(spool)[0])) == 1
+
+
+def test_a_nearly_full_disk_stops_recording_with_an_alarm_and_it_goes_on_when_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.core.recording.recorder.AGAIN_S", 0.0)
+    free = collections.deque([0])
+    alarms: list[Alarm] = []
+    with Spool(tmp_path, reserve_bytes=10, free_bytes=lambda folder: free[0]) as spool:
+        with Recorder(spool, alarms.append) as recorder:
+            recorder.record("exo-01", 1, batch(0))
+            assert recorder.flush(WAIT_S)
+            assert recorder.state.lost == 2  # the row, and the session that began with it
+            assert [alarm.kind for alarm in recorder.state.alarms] == [AlarmKind.DISK_FULL]
+            free[0] = 10
+            recorder.record("exo-01", 1, batch(1))
+            assert recorder.flush(WAIT_S)
+            assert recorder.state.alarms == ()
+        assert [alarm.kind for alarm in alarms] == [AlarmKind.DISK_FULL]
+        assert [row[3] for row in rows(kept(spool)[0])] == [1]
+        assert json.loads(str(events(spool, "lost")[0]["data"])) == {"rows": 2}
+
+
+def test_a_batch_is_frozen_when_it_is_long_enough(spool: Spool) -> None:
+    with Recorder(spool, settings=RecorderSettings(batch_rows=10)) as recorder:
+        recorder.record("exo-01", 1, batch(0, rows=12))
+        assert recorder.flush(WAIT_S)
+        assert spool.waiting() == [1]
+
+
+def test_a_notification_without_rows_still_tells_what_was_lost(spool: Spool) -> None:
+    empty = Batch([], {name: [] for name in CHANNELS}, 3, 5, 0, 1, 1)
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, empty)
+    assert len(events(spool, "dropped")) == 1

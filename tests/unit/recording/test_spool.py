@@ -1,0 +1,127 @@
+"""The spool: what was kept stays, in order, under numbers that are given once."""
+
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.rows import JournalHead, Layout, Record, Run
+from server_gui.core.recording.segment import Segment
+from server_gui.core.recording.spool import Spool
+
+LAYOUT = Layout(("left_knee.position", "trunk.tilt_forward"), ("rad", None))
+
+
+def run(robot: str = "exo-01", seq: int = 0, rows: int = 3) -> Run:
+    values = np.arange(2 * rows, dtype=np.float64).reshape(2, rows) + seq
+    values[1, 0] = np.nan
+    numbers = np.arange(rows, dtype=np.int64)
+    return Run(
+        robot, "s-1", "c-1", 1, LAYOUT, numbers + 10, numbers * 0 + seq, numbers, numbers * 0 + 7, values
+    )
+
+
+def runs(segment: Segment) -> list[Run]:
+    found = list(segment.runs())
+    segment.close()
+    return found
+
+
+def test_what_was_appended_is_read_as_it_was(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([run(), run("exo-02")], [Record("events", {"robot": "exo-01", "text": "é"})])
+        spool.freeze()
+        segment = spool.read(spool.waiting()[0])
+        assert list(segment.records()) == [Record("events", {"robot": "exo-01", "text": "é"})]
+        found = runs(segment)
+    assert [(read.robot, read.session, read.connection, read.stream) for read in found] == [
+        ("exo-01", "s-1", "c-1", 1),
+        ("exo-02", "s-1", "c-1", 1),
+    ]
+    for name in ("stamps_ns", "seqs", "rows", "utc_offset_ns", "values"):
+        np.testing.assert_array_equal(getattr(found[0], name), getattr(run(), name))
+    assert found[0].layout == LAYOUT
+
+
+def test_a_row_cannot_be_kept_twice(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([run()], [])
+        with pytest.raises(SpoolUnusable, match="UNIQUE"):
+            spool.append([run(seq=5), run()], [])
+        spool.freeze()
+        assert len(runs(spool.read(1))) == 1  # all or nothing
+
+
+def test_numbers_are_never_given_twice(tmp_path: Path) -> None:
+    for expected in (1, 2, 3):
+        with Spool(tmp_path, keep_bytes=0) as spool:
+            spool.append([run()], [])
+            spool.freeze()
+            assert spool.waiting() == [expected]
+            spool.uploaded(expected)
+            assert spool.make_room()
+            assert spool.waiting() == []
+
+
+def test_what_a_crash_left_waits_for_upload(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        name = spool.id
+        spool.append([run()], [])
+    with Spool(tmp_path) as spool:
+        assert spool.id == name
+        assert spool.waiting() == [1]
+        assert len(runs(spool.read(1))) == 1
+
+
+def test_oldest_uploaded_segments_go_first_and_others_never(tmp_path: Path) -> None:
+    free = 100
+    with Spool(tmp_path, reserve_bytes=100, free_bytes=lambda folder: free) as spool:
+        for seq in range(4):
+            spool.append([run(seq=seq)], [])
+            spool.freeze()
+        spool.uploaded(1)
+        spool.uploaded(2)
+        assert spool.make_room()
+        assert len(list(tmp_path.glob("*.uploaded.db"))) == 2  # room enough: they stay
+        free = 99
+        assert not spool.make_room()
+        assert list(tmp_path.glob("*.uploaded.db")) == []
+        assert spool.waiting() == [3, 4]
+
+
+def test_one_server_at_a_time(tmp_path: Path) -> None:
+    with Spool(tmp_path), pytest.raises(SpoolUnusable, match="another server records into"):
+        Spool(tmp_path)
+    Spool(tmp_path).close()
+
+
+def test_a_damaged_segment_is_named_with_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "00000001.db").write_bytes(b"not a database" * 100)
+    with pytest.raises(SpoolUnusable, match=r"00000001\.db cannot be opened.*move it away"):
+        Spool(tmp_path)
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(SpoolUnusable, match="cannot be used"):
+        Spool(tmp_path / "file" / "spool")
+
+
+def test_journal_heads_outlive_segments_and_crashes(tmp_path: Path) -> None:
+    with Spool(tmp_path, keep_bytes=0) as spool:
+        spool.append([], [Record("journal", {"n": 7})], {"exo-01": JournalHead(7, "abc")})
+        spool.freeze()
+        spool.uploaded(1)
+        spool.make_room()
+    Segment(tmp_path / "00000003.db", 3).close()  # a crash in the middle of making it
+    with Spool(tmp_path) as spool:
+        assert spool.heads == {"exo-01": JournalHead(7, "abc")}
+
+
+def test_every_commit_is_synchronised(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        database: sqlite3.Connection = spool._current._database
+        assert database.execute("PRAGMA synchronous").fetchone() == (2,)
+        assert database.execute("PRAGMA journal_mode").fetchone() == ("wal",)
