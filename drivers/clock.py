@@ -14,6 +14,7 @@ WINDOW = 60  # seconds of minima that the line is fitted to
 FEWEST = 3
 MOST_DRIFT = 0.05  # no counter is further off than this
 RESTARTED_NS = SECOND_NS  # a counter further than this from where it should be has begun anew
+STEPPED_NS = SECOND_NS // 4  # a counter that falls so far behind has stood still
 
 
 class DeviceClock:
@@ -21,6 +22,7 @@ class DeviceClock:
 
     def __init__(self, ticks_per_second: int, modulus: int) -> None:
         self.restarts = 0
+        self.steps = 0  # how often it stood still for a while
         self._ticks_per_second = ticks_per_second
         self._modulus = modulus
         self._last_ticks: int | None = None
@@ -98,11 +100,22 @@ class DeviceClock:
         """Keep the smallest offset of each second; at the second's end, fit the line anew."""
         second = self._device_ns // SECOND_NS
         if second != self._second and self._smallest is not None:
+            if self._has_stepped(*self._smallest):
+                self._minima.clear()
+                self.steps += 1
             self._minima.append(self._smallest)
             self._second, self._smallest = second, None
             self._fit()
         if self._smallest is None or offset_ns < self._smallest[1]:
             self._smallest = (self._device_ns, offset_ns)
+
+    def _has_stepped(self, at_ns: int, offset_ns: int) -> bool:
+        """Whether the counter stood still: a whole second in which nothing came near the line.
+
+        If it was the way that had been slow instead, the first frame that comes sooner corrects the line.
+        """
+        line_ns = self._offset_ns + round(self._drift * (at_ns - self._reference_ns))
+        return bool(self._minima) and offset_ns - line_ns > STEPPED_NS
 
     def _fit(self) -> None:
         count = len(self._minima)

@@ -118,3 +118,30 @@ def test_device_that_restarts_is_followed_and_counted() -> None:
     assert before is not None
     assert after is not None
     assert before < after <= 4 * SECOND_NS
+
+
+@pytest.mark.parametrize("pause_s", [0.05, 0.3, 0.9])
+def test_a_counter_that_stands_still_again_and_again_does_not_make_its_samples_old(pause_s: float) -> None:
+    """As of a device whose processor has too much to do; 0.9 s in every two."""
+    clock = DeviceClock(MICROSECONDS, 1 << 32)
+    ages_s, paused_s = [], 0.0
+    for number in range(200 * 120):
+        if number % 400 == 0:
+            paused_s += pause_s
+        received_ns = round((1000 + number / 200 + paused_s) * 1e9)
+        stamp = clock.stamp(number * 5000, received_ns)
+        assert stamp is not None
+        ages_s.append((received_ns - stamp) / 1e9)
+    assert max(ages_s) < 0.3 + 2 * pause_s
+    assert clock.steps > 0 or pause_s < 0.1
+
+
+def test_a_reader_that_was_slow_for_seconds_does_not_move_the_line() -> None:
+    clock = DeviceClock(MICROSECONDS, 1 << 32)
+    for number in range(200 * 40):
+        true_s = 1000 + number / 200
+        slow_s = 0.6 if 10 < true_s - 1000 < 13 else 0.0
+        stamp = clock.stamp(number * 5000, round((true_s + slow_s) * 1e9))
+        assert stamp is not None
+        if true_s > 1014:
+            assert abs(stamp / 1e9 - true_s) < 0.02
