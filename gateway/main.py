@@ -23,6 +23,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "restore": ("gateway.cli.storage:restore", "give a device its defaults back"),
     "journal": ("gateway.cli.journal:main", "who did what to the robot; is the record whole"),
     "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
+    "reset": ("gateway.cli.reset:main", "end a held stop: every drive switched off, none enabled"),
+    "enable": ("gateway.cli.enable:main", "enable drives, as the master of a bench"),
     "eds": ("eds.cli:main", "what an EDS or DCF file says, and what is wrong with it"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),

@@ -45,6 +45,12 @@ interface = "virtual"           # python-can's bus within one process
 channel = "{channel}"
 """
 
+_SOCKETCAN = """\
+[can.main]                      # one CAN bus; its name is what `bus = …` below refers to
+interface = "socketcan"         # Linux's own CAN interfaces
+channel = "{channel}"               # as `ip link` calls it
+"""
+
 _FIRST_JOINT = """
 [joint.{name}]
 bus = "main"                    # the [can.…] table it is wired to
@@ -72,16 +78,32 @@ rated_torque = 40.0             # N·m at the joint, where 6076h does not say it
 rated_current = 5.0             # A, where 6075h does not
 """
 
-_DEVICES = """
+_NOT_SIMULATED = """
+# Not simulated, so nobody here knows them: {names}. docs/joints.md tells how to describe them.
+"""
+
+_CONTROLLER_TABLE = """
 [device.{controller}]                   # any other CANopen device that has parameters
 bus = "main"
 node_id = {controller_node}
 eds = "{controller_eds}"
 
-{sensors}
+[stop]                          # what a stop does beside the quick stop of every drive
+timeout_s = 2.5                 # within which it is answered, whatever the drives do
+fallback = []                   # what follows where a quick stop is not confirmed: "disable_voltage" (the
+                                # joint goes limp under its wearer), and last "nmt_stop" (never confirmed)
+[[stop.controller]]             # who commands the drives is stopped too: an object, and the value that does
+component = "{controller}"
+object = "0x2000:0"             # the gait controller's command: 0 stop, 1 start
+value = 0
+"""
+
+_PARAMETERS_NOTE = """
 # Parameters: what may be changed, within which limits. The name before the dot is the component it belongs
 # to. The stricter of these limits and those of the EDS counts.
+"""
 
+_CONTROLLER_PARAMETERS = """
 [parameter."gait.step_length"]  # heel to heel of the other foot: more makes the hips swing further
 object = "0x2001:0"             # index and sub-index in the device's dictionary
 unit = "m"
@@ -159,22 +181,35 @@ def virtual_bus(channel: str) -> str:
     return _VIRTUAL.format(channel=channel)
 
 
+def socketcan_bus(interface: str) -> str:
+    """The bus's table where it is a Linux CAN interface."""
+    return _SOCKETCAN.format(channel=interface)
+
+
 def text(folder: Path, bus: str, robot: Exoskeleton) -> str:
     """The file for the simulator in `folder` (absolute), with the tables of its bus and its sensors."""
-    templates = (_FIRST_JOINT, *[_JOINT] * (len(robot.drives) - 1))
+    drives = robot.simulated_drives
+    templates = (_FIRST_JOINT, *[_JOINT] * (len(drives) - 1))
+    led = CONTROLLER not in robot.without
     return "".join(
         (
             _HEAD.format(path=folder / "robot.toml", bus=bus),
-            *map(_joint, templates, robot.drives.values()),
-            _DEVICES.format(
-                sensors=tables(robot.sensors.choice, folder),
-                controller=CONTROLLER,
-                controller_node=CONTROLLER_NODE,
-                controller_eds=CONTROLLER_EDS,
-            ),
+            *map(_joint, templates, drives),
+            _NOT_SIMULATED.format(names=", ".join(sorted(robot.without))) if robot.without else "",
+            _controller_table() if led else "",
+            "\n",
+            tables(robot.sensors.choice, folder),
+            _PARAMETERS_NOTE,
+            _CONTROLLER_PARAMETERS if led else "",
             _JOINT_PARAMETERS_NOTE,
-            *map(_joint_parameters, robot.drives.values()),
+            *map(_joint_parameters, drives),
         )
+    )
+
+
+def _controller_table() -> str:
+    return _CONTROLLER_TABLE.format(
+        controller=CONTROLLER, controller_node=CONTROLLER_NODE, controller_eds=CONTROLLER_EDS
     )
 
 

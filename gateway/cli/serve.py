@@ -27,7 +27,7 @@ _EPILOG = """\
 When ready it prints `listening on HOST:PORT` on standard output. Ask it by hand:
   printf '{"jsonrpc":"2.0","id":1,"method":"component.snapshot"}\\n' | nc 127.0.0.1 7420
 
-SIGINT and SIGTERM end it cleanly. A stop that is held ends with this process.
+SIGINT and SIGTERM end it cleanly. A stop stays held, also over its end and restart: gwrms reset.
 
 Anybody who can connect can stop the robot and change its parameters: listen on
 127.0.0.1, or on a network of which you know every computer.

@@ -14,7 +14,8 @@ def main(argv: list[str]) -> int:
     """Run `gwrms stop`; 0 only when every drive has confirmed."""
     made = parser(
         "stop",
-        "Quick stop on every drive. Needs no lease. Exit status 0 only when every drive has confirmed.",
+        "Quick stop on every drive, held until gwrms reset. Needs no lease.\n"
+        "Exit status 0 only when every drive has confirmed, and every controller of the robot's file.",
         WARNING,
     )
     made.add_argument("--reason", default="gwrms stop", help="what the robot's journal shall say")
@@ -33,14 +34,19 @@ def main(argv: list[str]) -> int:
 
 
 def _text(stopped: Stopped) -> str:
-    held = "The stop is held until it is reset.\n" if stopped.held else ""
-    return table(("DRIVE", "STOP"), stopped.drives.items()) + f"\n{held}{WARNING}\n"
+    outcomes = {**stopped.drives, **stopped.controllers}
+    rows = [(name, outcome, stopped.fallbacks.get(name, "")) for name, outcome in outcomes.items()]
+    held = "The stop is held until it is reset (gwrms reset).\n" if stopped.held else ""
+    return table(("DRIVE", "STOP", ""), rows) + f"\n{held}{WARNING}\n"
 
 
 def _verdict(stopped: Stopped) -> int:
-    missing = [name for name, outcome in stopped.drives.items() if outcome != "confirmed"]
+    outcomes = {**stopped.drives, **stopped.controllers}
+    missing = [name for name, outcome in outcomes.items() if outcome != "confirmed"]
     if not stopped.drives:
         warn("stop", "NOT CONFIRMED: the robot has no drive that can be stopped")
     elif missing:
         warn("stop", f"NOT CONFIRMED by {', '.join(missing)}: take it that they still move")
+    if stopped.problem is not None:
+        warn("stop", stopped.problem)
     return 0 if stopped.drives and not missing else 1

@@ -13,9 +13,11 @@ from gateway.client.subscription import Batch
 from gateway.messages import (
     Confirmed,
     Description,
+    Enabled,
     JournalEntries,
     ModuleName,
     ParameterValues,
+    Reset,
     ResourceSnapshot,
     ResourceSnapshotParams,
     Reverted,
@@ -178,6 +180,24 @@ class Robot:
     def stop(self, reason: str) -> Stopped:
         """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed."""
         return self._wait(self._client.stop(reason))
+
+    def reset(self) -> Reset:
+        """Take the lease, end a held stop, give the lease back; look at `held` and `problems`."""
+
+        async def reset() -> Reset:
+            async with self._client.writing():
+                return await self._client.reset()
+
+        return self._wait(reset())
+
+    def enable(self, *joints: str) -> Enabled:
+        """Take the lease, enable drives (globs; none means all), give it back; look at `problems`."""
+
+        async def enable() -> Enabled:
+            async with self._client.writing():
+                return await self._client.enable(*joints)
+
+        return self._wait(enable())
 
     def _wait(self, work: Coroutine[Any, Any, Result]) -> Result:
         future = asyncio.run_coroutine_threadsafe(work, self._loop)

@@ -14,6 +14,8 @@ from gateway.messages import (
     Confirmed,
     Description,
     Done,
+    Enabled,
+    EnableParams,
     JournalEntries,
     Lease,
     ModuleName,
@@ -22,6 +24,7 @@ from gateway.messages import (
     ParameterWriteParams,
     Params,
     ReleaseParams,
+    Reset,
     ResourceSnapshot,
     ResourceSnapshotParams,
     Reverted,
@@ -39,6 +42,7 @@ from gateway.messages import (
 WRITE_TIMEOUT_S = 30.0  # a transaction over several drives, verified and perhaps rolled back
 STORE_TIMEOUT_S = 120.0  # devices write their memory, and are compared before and after
 STOP_TIMEOUT_S = 5.0
+LEADING_TIMEOUT_S = 30.0  # drives are led from state to state, each confirmed
 LEASE_MARGIN_S = 30.0
 LONGEST_LEASE_S = 300.0
 
@@ -197,3 +201,18 @@ class Client:
 
         """
         return await self.link.call("robot.stop", StopParams(reason), Stopped, STOP_TIMEOUT_S)
+
+    async def reset(self) -> Reset:
+        """End a held stop: every drive led to switch on disabled, never further. Needs the lease.
+
+        Look at `held`: the stop stays where it is not known of every drive that it cannot move.
+        """
+        return await self.link.call("robot.reset", Params(), Reset, LEADING_TIMEOUT_S)
+
+    async def enable(self, *joints: str) -> Enabled:
+        """Enable drives (globs; none means all), as the master of their bus. Needs the lease.
+
+        Look at `problems`: where there are any, what was begun has been stopped again.
+        """
+        params = EnableParams(list(joints) or None)
+        return await self.link.call("robot.enable", params, Enabled, LEADING_TIMEOUT_S)

@@ -3,10 +3,11 @@
 Started as `python -m tests.bench._bus`, it is a socketcand server: its first line says on which port. Each
 drive's TPDO is sent in turn, at the rate that the first line of its standard input says, and SDO is answered
 meanwhile. On standard output it tells of each controlword `word NODE CONTROLWORD NS`, stamped when its bytes
-were read, on the monotonic clock that all processes of a machine share. The line `trip NODE POSITION` sends one
-TPDO with that position (counts), and is answered by `trip NODE POSITION NS`.
+were read, on the monotonic clock that all processes of a machine share. The line `trip NODE POSITION` sends
+one TPDO with that position (counts), and is answered by `trip NODE POSITION NS`.
 """
 
+import contextlib
 import os
 import select
 import socket
@@ -64,10 +65,7 @@ class Bus:
 
     def hear(self) -> bool:
         """Take what has come; false at the end."""
-        try:
-            data = self._wire.recv(65536)
-        except ConnectionResetError:
-            data = b""
+        data = self._wire.recv(65536)
         stamp_ns = time.monotonic_ns()
         *messages, self._rest = (self._rest + data).split(b">")
         for message in messages:
@@ -118,4 +116,5 @@ def accept() -> socket.socket:
 
 
 if __name__ == "__main__":
-    Bus(accept()).run(float(sys.stdin.readline()))
+    with contextlib.suppress(ConnectionError):  # the client has gone
+        Bus(accept()).run(float(sys.stdin.readline()))

@@ -1,0 +1,35 @@
+"""`gwrms reset`: ends a held stop."""
+
+from gateway.cli.reach import parser, reach
+from gateway.cli.text import say, say_json, table, warn
+from gateway.messages import Reset
+
+EPILOG = """Each drive is led to "switch on disabled": one that moves is stopped before, a fault is reset, and
+one that held its position lets go of it. Nothing is enabled: that is the controller's part, or
+gwrms enable's. A drive that does not get there is named; the stop stays held unless it is known
+of every drive that its motor has no current."""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms reset`; 0 only when no stop is held any more and every drive is where it should be."""
+    made = parser("reset", "End a held stop: every drive switched off, none enabled.", EPILOG)
+    arguments = made.parse_args(argv)
+    with reach(arguments, "reset") as robot:
+        reset = robot.reset()
+    if arguments.json:
+        say_json(reset)
+    else:
+        say(_text(reset))
+    return _verdict(reset)
+
+
+def _text(reset: Reset) -> str:
+    rows = [(name, state, reset.problems.get(name, "")) for name, state in reset.drives.items()]
+    held = "The stop is STILL HELD." if reset.held else "No stop is held."
+    return table(("DRIVE", "STATE", "PROBLEM"), rows) + f"\n{held}\n"
+
+
+def _verdict(reset: Reset) -> int:
+    if reset.problems:
+        warn("reset", f"not every drive is switched off: {', '.join(reset.problems)}")
+    return 1 if reset.held or reset.problems else 0
