@@ -51,6 +51,8 @@ class DeviceClock:
         offset_ns = received_ns - self._device_ns
         predicted_ns = self._predict(self._device_ns)
         if offset_ns < predicted_ns:  # it came sooner than the line allows: the line was too high
+            if predicted_ns - offset_ns > STEPPED_NS:
+                self._minima.clear()  # they are of a way that was slow for seconds
             self._offset_ns -= predicted_ns - offset_ns
             predicted_ns = offset_ns
         self._note(offset_ns)
