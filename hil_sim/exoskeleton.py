@@ -2,7 +2,7 @@
 
 import math
 import random
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from enum import StrEnum
 from pathlib import Path
 
@@ -13,10 +13,12 @@ from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock, Event
 from hil_sim.controller import GaitController
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
+from hil_sim.errors import SimulatorError
 from hil_sim.gait.posture import STANDING
 from hil_sim.gait.subject import subject
 from hil_sim.gait.timetable import Entry, timetable
 from hil_sim.gait.wearer import Wearer
+from hil_sim.node.node import Node
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 
 JOINTS = {"left_hip": 1, "left_knee": 2, "left_ankle": 3, "right_hip": 4, "right_knee": 5, "right_ankle": 6}
@@ -49,9 +51,11 @@ class Exoskeleton:
     """A robot and its wearer in simulated time; the same arguments give the same frames and bytes.
 
     The wearer is the subject of number `person`. `drives` gives joints another EDS or DCF than our own
-    drive's. What is in `measured` is called after each cycle of the sensors.
+    drive's. The nodes named in `without` are somebody else's and never switched on. What is in `measured` is
+    called after each cycle of the sensors.
 
-    Raises `hil_sim.errors.SimulatorError` for a file that cannot be used.
+    Raises `hil_sim.errors.SimulatorError` for a file that cannot be used, and where the controller would lead
+    a drive that is not simulated.
     """
 
     def __init__(
@@ -61,7 +65,10 @@ class Exoskeleton:
         sensors: SensorChoice | None = None,
         person: int = 0,
         drives: Mapping[str, Path] | None = None,
+        without: Collection[str] = (),
     ) -> None:
+        _refuse_to_lead_others(without)
+        self.without = frozenset(without)
         self.seed = seed
         self.measured: list[Callable[[], None]] = []
         self.clock = Clock()
@@ -76,11 +83,23 @@ class Exoskeleton:
 
     def power_on(self) -> None:
         """Switch everything on: the nodes boot, the sensors send."""
-        for drive in self.drives.values():
+        for drive in self.simulated_drives:
             drive.power_on()
-        self.controller.power_on(100 * MILLISECOND_NS)
+        if CONTROLLER not in self.without:
+            self.controller.power_on(100 * MILLISECOND_NS)
         self.clock.every(PERIOD_NS, self._measure)
         self._go_on()
+
+    @property
+    def simulated_drives(self) -> list[JointDrive]:
+        """Those that are not left out."""
+        return [drive for name, drive in self.drives.items() if name not in self.without]
+
+    @property
+    def nodes(self) -> list[Node]:
+        """Every CANopen device that is simulated."""
+        controller = [] if CONTROLLER in self.without else [self.controller]
+        return [*self.simulated_drives, *controller, *self.sensors.nodes]
 
     def follow(self, entries: Iterable[Entry]) -> None:
         """Do from now on what this timetable says, instead of the scenario."""
@@ -128,3 +147,13 @@ class Exoskeleton:
         self.sensors.measure(*self.wearer.feet(now_s), self.wearer.trunk(now_s))
         for watch in self.measured:
             watch()
+
+
+def _refuse_to_lead_others(without: Collection[str]) -> None:
+    """A controller that enables drives may only do so to simulated ones."""
+    joints = [name for name in JOINTS if name in without]
+    if joints and CONTROLLER not in without:
+        raise SimulatorError(
+            f"the simulated gait controller would enable and move a {joints[0]} that is not simulated: "
+            f"leave {CONTROLLER} out too"
+        )

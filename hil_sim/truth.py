@@ -3,7 +3,8 @@
 The first line is an object: its `columns` and `units` say what each following line, an array, holds. A line
 is taken whenever the serial sensors measure, 100 times a second. `simulated_ns` counts from switching on,
 `monotonic_ns` is this computer's monotonic clock when the line was written, the clock of a gateway's stamps.
-What is not there is null: the phase of a leg that does not step, the centre of pressure of an unloaded foot.
+What is not there is null: the phase of a leg that does not step, the centre of pressure of an unloaded foot,
+a joint that is not simulated.
 """
 
 import json
@@ -83,13 +84,13 @@ class TruthFile:
         robot, generator = self._robot, self._robot.controller.generator
         now_s = robot.clock.now_s
         feet, trunk = robot.wearer.feet(now_s), robot.wearer.trunk(now_s)
-        joints = [drive.joint for drive in robot.drives.values()]
+        joints = [None if name in robot.without else drive.joint for name, drive in robot.drives.items()]
         numbers = [
             *self._phases(),
             generator.shape.step_length,
             generator.shape.cycle_time,
-            *(joint.position for joint in joints),
-            *(joint.velocity for joint in joints),
+            *(None if joint is None else joint.position for joint in joints),
+            *(None if joint is None else joint.velocity for joint in joints),
             *(value for foot in feet for value in _loaded(foot)),
             robot.wearer.support(),
             *(trunk.roll, trunk.pitch, trunk.yaw),

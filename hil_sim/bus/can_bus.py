@@ -64,12 +64,14 @@ class CanBus:
     """A bus that carries one frame at a time.
 
     A frame reaches every receiver but its sender, in the order in which frames win arbitration, at the moment
-    its last bit is over. Receivers get the frame and who sent it. `disturbances` may stand in the way.
+    its last bit is over; at once with `carries_at_once`, where a real bus behind a bridge gives frames their
+    time. Receivers get the frame and who sent it. `disturbances` may stand in the way.
     """
 
     def __init__(self, clock: Clock, bitrate: int = 1_000_000) -> None:
         self.clock = clock
         self.bitrate = bitrate
+        self.carries_at_once = False
         self.frames_carried = 0
         self.busy_ns = 0
         self.disturbances: list[Disturbance] = []
@@ -126,7 +128,9 @@ class CanBus:
         duration_ns = round(bits * SECOND_NS / self.bitrate)
         self.busy_ns += duration_ns
         self._transmitting = True
-        self.clock.after(duration_ns, self._destroy if destroyed else self._finish)
+        self.clock.after(
+            0 if self.carries_at_once else duration_ns, self._destroy if destroyed else self._finish
+        )
 
     def _finish(self) -> None:
         if self._on_wire is not None:

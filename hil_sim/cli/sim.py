@@ -1,6 +1,7 @@
 """`gwrms sim`: the simulated robot as a process of its own."""
 
 import argparse
+import fnmatch
 import json
 import math
 import signal
@@ -12,7 +13,7 @@ from types import FrameType
 from hil_sim import personality
 from hil_sim.cli import run
 from hil_sim.cli.arguments import speed
-from hil_sim.exoskeleton import JOINTS, Scenario
+from hil_sim.exoskeleton import CONTROLLER, JOINTS, Scenario
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
@@ -35,6 +36,16 @@ what is in DIR
   stored           what the drives have stored (1010h), for the next start
   hub.port         TCP port of the bus: python-can's "socketcand" interface at 127.0.0.1, channel "sim"
   The same DIR keeps the same port and paths from start to start, also after a crash. One simulator at a time.
+
+the bus
+  --bus hub        a hub for any number of programs on this machine, at the simulated bit rate of 1 Mbit/s
+  --bus socketcan:NAME
+                   a CAN interface of Linux, virtual or a real adapter, beside whatever else is there. Order
+                   and time of the frames are then those of that bus, and error frames are not simulated. Who
+                   has a node id of a simulated one is looked for first and watched for later: then the
+                   simulator ends. When the interface goes, it says so, and waits until it is back.
+  --without NODES  leaves nodes to somebody else: real drives, another controller. The simulated controller
+                   enables drives, and leads simulated ones only: without a joint goes without gait
 
 scenarios
   walk             stands up straight, then walks; three seconds after the start it walks evenly
@@ -89,6 +100,24 @@ def _seconds(text: str) -> float:
     return value
 
 
+def _interface(text: str) -> str | None:
+    kind, _, name = text.partition(":")
+    if text != "hub" and not (kind == "socketcan" and name):
+        raise argparse.ArgumentTypeError(
+            f"{text} is no bus: give hub, or socketcan:NAME as in socketcan:can0"
+        )
+    return name or None
+
+
+def _nodes(text: str) -> list[str]:
+    nodes = (*JOINTS, CONTROLLER)
+    left_out = [name for pattern in text.split(",") for name in fnmatch.filter(nodes, pattern.strip())]
+    for pattern in text.split(","):
+        if not fnmatch.filter(nodes, pattern.strip()):
+            raise argparse.ArgumentTypeError(f"there is no {pattern.strip()!r}: {', '.join(nodes)}")
+    return left_out
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms sim",
@@ -98,6 +127,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; made if needed"
+    )
+    parser.add_argument(
+        "--bus",
+        type=_interface,
+        metavar="BUS",
+        help="hub (default), or socketcan:NAME for the CAN interface NAME of this computer",
+    )
+    parser.add_argument(
+        "--without",
+        type=_nodes,
+        default=[],
+        metavar="NODES",
+        help="joints, and gait, that are not simulated; with commas between them, * for any letters",
     )
     parser.add_argument(
         "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
@@ -158,6 +200,10 @@ def _drives(words: list[str]) -> dict[str, Path]:
     return personality.choose(words, JOINTS, Path.cwd() / "here")
 
 
+def _say(sentence: str) -> None:
+    sys.stderr.write(f"gwrms sim: {sentence}\n")
+
+
 def main(argv: list[str]) -> int:
     """Run the simulator; returns the exit code."""
     if argv[:1] == ["run"]:
@@ -176,6 +222,9 @@ def main(argv: list[str]) -> int:
         person=arguments.subject,
         truth=arguments.truth,
         drives=_drives(arguments.drive) or script.drives,
+        interface=arguments.bus,
+        say=_say,
+        without=arguments.without,
     )
 
     def end(_signal: int, _frame: FrameType | None) -> None:
@@ -186,7 +235,7 @@ def main(argv: list[str]) -> int:
         robot.open()
         schedule(script.lines, robot)
         if not robot.config_is_ours:
-            sys.stderr.write(f"gwrms sim: kept {robot.config} as it is; delete it to have it written anew\n")
+            _say(f"kept {robot.config} as it is; delete it to have it written anew")
         sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")
         sys.stdout.flush()
         robot.run(arguments.seconds)

@@ -66,6 +66,8 @@ class Faults:
 
         """
         fault, device, values = check_fault(name, on, for_s, params or {})
+        if device in self._robot.without:
+            raise FaultRefused(f"{device} is not simulated here: {name} can only be on what is")
         if (name, device) in self._running:
             raise FaultRefused(f"{name} is already on {device}; clear it first")
         self._begun += 1

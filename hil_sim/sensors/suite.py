@@ -8,6 +8,7 @@ import eds
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock
 from hil_sim.gait.wearer import Foot, Trunk
+from hil_sim.node.node import Node
 from hil_sim.sensors import cia410, insole_cobs, insole_csv, insole_frame
 from hil_sim.sensors.bno08x_rvc import BNO08X_RVC
 from hil_sim.sensors.cia410 import Inclinometer
@@ -72,6 +73,11 @@ class SensorSuite:
         self._senders = [self._serial(INSOLES[choice.insole][0], name, seed) for name in FEET]
         self._imu = TrunkImu(self.imu_faults, random.Random(f"{seed} {TRUNK}"))
         self._trunk = self._trunk_sensor(choice.imu, bus, seed)
+
+    @property
+    def nodes(self) -> list[Node]:
+        """Those that are CANopen devices."""
+        return [self._trunk] if isinstance(self._trunk, Node) else []
 
     def measure(self, left: Foot, right: Foot, trunk: Trunk) -> None:
         """One cycle of every sensor, a time after the last one."""
