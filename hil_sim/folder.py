@@ -1,15 +1,13 @@
 """The simulator's folder: one simulator at a time, and what must stay the same from start to start."""
 
 import fcntl
+from collections.abc import Mapping
 from pathlib import Path
 from typing import IO
 
-from hil_sim import robot_file
 from hil_sim.errors import SimulatorError
-from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.node.memory import FileMemory
 from hil_sim.node.node import Node
-from hil_sim.sensors.tables import companions
 
 
 class Folder:
@@ -58,17 +56,17 @@ class Folder:
         if port != self.hub_port():
             self._port_file.write_text(f"{port}\n", encoding="ascii")
 
-    def write_config(self, bus: str, robot: Exoskeleton) -> bool:
-        """Write robot.toml with the table of its `bus`, unless there is one: whoever edited it keeps that.
+    def write_config(self, text: str, companions: Mapping[str, str]) -> bool:
+        """Write robot.toml, and what it names beside it, unless there is one: whoever edited it keeps that.
 
-        Says whether the file was written; what it names is written beside it.
+        Says whether the files were written.
         """
         try:
             with self.config.open("x", encoding="utf-8") as file:
-                file.write(robot_file.text(self.path, bus, robot))
+                file.write(text)
         except FileExistsError:
             return False
-        for name, content in companions(robot.sensors.choice).items():
+        for name, content in companions.items():
             (self.path / name).write_text(content, encoding="utf-8")
         return True
 
