@@ -1,10 +1,11 @@
 """The simulated robot with its doors open: bus by hub or virtual channel, sensors on pseudo-terminals."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
 from hil_sim import robot_file
+from hil_sim.bus.socketcan import SocketCanBridge
 from hil_sim.control_socket import ControlSocket
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
@@ -24,8 +25,9 @@ class SimulatedRobot(Housing):
             bus = can.Bus(interface="virtual", channel="bench")
 
     The wearer is subject `person`; the ground truth is written to `truth`; `drives` names the files of joints
-    with other drives than ours. `faults` and `operator` belong to the thread that runs it; others use the
-    control socket in the folder. For the rest see `Housing`.
+    with other drives than ours. With `interface` the bus is that CAN interface of Linux, and `say` is told
+    when it goes and comes back; the nodes in `without` are not simulated. `faults` and `operator` belong to
+    the thread that runs it; others use the control socket in the folder. For the rest see `Housing`.
     """
 
     def __init__(
@@ -40,12 +42,17 @@ class SimulatedRobot(Housing):
         person: int = 0,
         truth: Path | None = None,
         drives: Mapping[str, Path] | None = None,
+        interface: str | None = None,
+        say: Callable[[str], object] = lambda _: None,
+        without: Collection[str] = (),
     ) -> None:
-        self.exoskeleton = Exoskeleton(scenario, seed, sensors, person, drives)
+        self.exoskeleton = Exoskeleton(scenario, seed, sensors, person, drives, without)
         super().__init__(folder, self.exoskeleton.bus, virtual_channel, speed, epoch_s)
         self.faults = Faults(self.exoskeleton, self.folder.path, seed)
         self.operator = Operator(self.exoskeleton, self.faults)
         self._truth = truth
+        self._interface = interface
+        self._say = say
 
     def _config_text(self, bus: str) -> str:
         return robot_file.text(self.folder.path, bus, self.exoskeleton)
@@ -53,8 +60,16 @@ class SimulatedRobot(Housing):
     def _companions(self) -> Mapping[str, str]:
         return companions(self.exoskeleton.sensors.choice)
 
+    def _open_bus(self, loop: Loop, closing: ExitStack) -> str:
+        if self._interface is None:
+            return super()._open_bus(loop, closing)
+        nodes = {node.node_id: node.name for node in self.exoskeleton.nodes}
+        bridge = SocketCanBridge(loop, self.exoskeleton.bus, self._interface, nodes, self._say)
+        closing.callback(bridge.close)
+        return robot_file.socketcan_bus(self._interface)
+
     def _furnish(self, loop: Loop, closing: ExitStack) -> None:
-        for drive in self.exoskeleton.drives.values():
+        for drive in self.exoskeleton.simulated_drives:
             drive.storage.memory = self.folder.memory(drive)
         for name, line in self.exoskeleton.sensors.lines.items():
             line.port = SerialPort(self.folder.link(name), line.baudrate)
