@@ -1,4 +1,4 @@
-"""The simulated robot with its doors open: bus by hub or virtual channel, sensors on pseudo-terminals."""
+"""The simulated robot with its doors open: bus by hub, interface or channel, sensors on pseudo-terminals."""
 
 from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
