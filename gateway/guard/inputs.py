@@ -54,8 +54,9 @@ class LevelWatcher(Watcher):
         self._seen_ns = stamp_ns
         number = self._measure(stamp_ns, value)
         over = self._band.left(number, tripped=self.state is State.TRIPPED)
-        if not over and self.state > State.CLEARED and time.monotonic_ns() - stamp_ns > self._stale_ns:
-            return  # late is not live: it ends nothing
+        late = time.monotonic_ns() - stamp_ns > self._stale_ns
+        if late and not over and self.state in (State.BLIND, State.TRIPPED):
+            return  # it is not live, and ends nothing
         self.judge(stamp_ns, over, lambda: f"{number:.4g}{self._unit}, {self.rule.words}", self._for_ns)
 
     def look(self, now_ns: int) -> int:

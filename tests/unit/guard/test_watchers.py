@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
 WATCHING, CLEARED, BLIND, TRIPPED = State.WATCHING, State.CLEARED, State.BLIND, State.TRIPPED
 MS, S = 1_000_000, 1_000_000_000
 STALE_NS = 500 * MS
+BEGAN_NS = 300 * MS
 
 
 @pytest.fixture
@@ -104,7 +106,7 @@ class TestLevel:
         watcher.see(now_ns, 1.0)
         due_ns = watcher.look(now_ns + STALE_NS)
         assert (watcher.state, due_ns) == (WATCHING, now_ns + STALE_NS + 1)
-        watcher.look(due_ns)
+        assert watcher.look(due_ns) == due_ns + AGAIN_NS
         watcher.look(due_ns + 1)
         assert [(one.state, one.acts) for one in changes] == [(BLIND, False)]
         assert changes[0].reason == "knee.current: no value for 0.50 s"
@@ -120,6 +122,20 @@ class TestLevel:
         watcher.see(STALE_NS, value)
         watcher.look(STALE_NS + 1)
         assert watcher.state is BLIND
+
+    @pytest.mark.parametrize(("age_ns", "state"), [(STALE_NS, WATCHING), (STALE_NS + 1, BLIND)])
+    def test_a_value_is_late_when_it_is_older_than_it_may_be(
+        self,
+        changed: Callable[[Watcher, Change], None],
+        monkeypatch: pytest.MonkeyPatch,
+        age_ns: int,
+        state: State,
+    ) -> None:
+        monkeypatch.setattr("gateway.guard.inputs.time", SimpleNamespace(monotonic_ns=lambda: 100 * S))
+        watcher = level(changed)
+        watcher.look(100 * S)
+        watcher.see(100 * S - age_ns, 1.0)
+        assert watcher.state is state
 
     def test_a_value_that_comes_late_does_not_count_as_seen_but_one_that_is_too_much_does(
         self, changed: Callable[[Watcher, Change], None]
@@ -193,7 +209,7 @@ class TestSilence:
     @pytest.fixture
     def watcher(self, life: Life, changed: Callable[[Watcher, Change], None]) -> SilenceWatcher:
         rule = SilenceRule(watch="node_lost", clear_s=0.2)
-        return SilenceWatcher(rule, "knee", 0, changed, life.pulse)
+        return SilenceWatcher(rule, "knee", BEGAN_NS, changed, life.pulse)
 
     def test_it_trips_when_the_time_is_over_and_not_before(
         self, watcher: SilenceWatcher, life: Life, changes: list[Change]
@@ -211,8 +227,9 @@ class TestSilence:
         watcher.look(2 * S)
         for at_ms, state in ((0, TRIPPED), (100, TRIPPED), (199, TRIPPED), (200, CLEARED)):
             life.last_ns = 3 * S + at_ms * MS
-            assert watcher.look(life.last_ns) - life.last_ns <= max(AGAIN_NS, 250 * MS + 1)
+            again_ns = watcher.look(life.last_ns) - life.last_ns
             assert watcher.state is state
+            assert again_ns == (AGAIN_NS if state is TRIPPED else 250 * MS + 1)
 
     def test_a_bus_that_goes_makes_it_lost_as_silence_does(self, watcher: SilenceWatcher, life: Life) -> None:
         life.last_ns = S
@@ -226,9 +243,10 @@ class TestSilence:
     def test_one_that_was_never_heard_is_blind_and_not_lost(
         self, watcher: SilenceWatcher, life: Life, changes: list[Change]
     ) -> None:
-        watcher.look(GRACE_NS)
+        due_ns = BEGAN_NS + GRACE_NS
+        assert watcher.look(due_ns) == due_ns + AGAIN_NS
         assert watcher.state is WATCHING
-        watcher.look(GRACE_NS + 1)
+        watcher.look(due_ns + 1)
         assert [(one.state, one.reason) for one in changes] == [(BLIND, "knee: has not been heard yet")]
         life.last_ns = 5 * S
         watcher.look(5 * S)
@@ -254,7 +272,7 @@ class TestEmcy:
     def make(self, life: Life, changed: Callable[[Watcher, Change], None]) -> Callable[..., EmcyWatcher]:
         def make(*codes: str) -> EmcyWatcher:
             rule = EmcyRule(watch="emcy", codes=codes or None, clear_s=0.2)
-            return EmcyWatcher(rule, "knee", 0, changed, life.pulse, None)
+            return EmcyWatcher(rule, "knee", BEGAN_NS, changed, life.pulse, None)
 
         return make
 
@@ -319,11 +337,9 @@ class TestEmcy:
     def test_a_silent_node_may_have_any_emergency(self, make: Callable[..., EmcyWatcher], life: Life) -> None:
         watcher = make()
         life.last_ns = S
-        for at_ns, state in (
-            (GRACE_NS, WATCHING),
-            (GRACE_NS + 1, BLIND),
-        ):
-            watcher.look(at_ns)
+        due_ns = BEGAN_NS + GRACE_NS
+        for at_ns, state in ((due_ns, WATCHING), (due_ns + 1, BLIND)):
+            assert watcher.look(at_ns) == at_ns + AGAIN_NS
             assert watcher.state is state
         life.last_ns = 5 * S
         watcher.look(5 * S + 250 * MS)
@@ -337,6 +353,6 @@ def test_what_cannot_be_watched_is_blind_at_once_and_says_why(
 ) -> None:
     rule = LevelRule(watch="temperature", above=80.0)
     watcher = UnseenWatcher(rule, "knee", 0, changed, "has no temperature")
-    watcher.look(1)
+    assert watcher.look(1) == 1 + GRACE_NS
     watcher.look(2)
     assert [(one.state, one.reason) for one in changes] == [(BLIND, "knee: has no temperature")]

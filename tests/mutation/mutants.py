@@ -1,0 +1,145 @@
+"""Mutants of one module, each with one comparison, sign or condition changed, and the tests to fail it.
+
+`python -m tests.mutation.mutants MODULE TEST …` prints the mutants that no test has noticed, one a line. Each
+lives in a process of its own, forked before the module was imported.
+"""
+
+import ast
+import copy
+import importlib
+import importlib.abc
+import importlib.machinery
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import ModuleType
+
+import canopen  # noqa: F401 - what takes long is imported once, here, and not in every child
+import hypothesis  # noqa: F401
+import psutil  # noqa: F401
+import pytest
+
+# Hypothesis was imported before pytest could look at it.
+_OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
+MOST_S = 60  # a mutant that makes a test hang is noticed too
+# What each operator becomes: where there is a boundary, its neighbour there, which is the hardest to notice.
+_COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
+_ARITHMETIC: dict[type[ast.operator], type[ast.operator]] = {ast.Add: ast.Sub, ast.Sub: ast.Add}
+_LOGIC: dict[type[ast.boolop], type[ast.boolop]] = {ast.And: ast.Or, ast.Or: ast.And}
+
+
+def mutants(tree: ast.Module) -> Iterator[tuple[str, ast.Module]]:
+    """Each mutant and what was changed where, in words."""
+    for number, node in enumerate(ast.walk(tree)):
+        for change in range(_changes(node)):
+            mutant = copy.deepcopy(tree)
+            changed = next(one for at, one in enumerate(ast.walk(mutant)) if at == number)
+            before = ast.unparse(changed)
+            _mutate(changed, change)
+            yield f"line {getattr(node, 'lineno', '?')}: {before} → {ast.unparse(changed)}", mutant
+
+
+def _changes(node: ast.AST) -> int:
+    """In how many ways a node can be changed."""
+    if isinstance(node, ast.Compare):
+        return len(node.ops)
+    return int(
+        (isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC)
+        or isinstance(node, ast.BoolOp)
+        or (isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub))
+    )
+
+
+def _mutate(node: ast.AST, change: int) -> None:
+    if isinstance(node, ast.Compare):
+        node.ops[change] = _COMPARISONS[type(node.ops[change])]()
+    elif isinstance(node, ast.BinOp):
+        node.op = _ARITHMETIC[type(node.op)]()
+    elif isinstance(node, ast.BoolOp):
+        node.op = _LOGIC[type(node.op)]()
+    elif isinstance(node, ast.UnaryOp):
+        node.op = ast.UAdd() if isinstance(node.op, ast.USub) else ast.Not()
+        if isinstance(node.op, ast.Not):
+            node.operand = ast.UnaryOp(ast.Not(), node.operand)
+
+
+class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Gives the mutant to whoever imports the module."""
+
+    def __init__(self, name: str, tree: ast.Module, path: str) -> None:
+        self._name = name
+        self._code = compile(ast.fix_missing_locations(tree), path, "exec")
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        return importlib.util.spec_from_loader(name, self) if name == self._name else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        exec(self._code, vars(module))  # our own code, changed in one place
+
+
+def start(name: str, tree: ast.Module, path: str, tests: Sequence[str]) -> int:
+    """Run the tests in a child, with this in place of the module; its id. It ends with 0 if they pass."""
+    child = os.fork()
+    if child == 0:
+        signal.alarm(MOST_S)
+        silence = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silence, 1)
+        os.dup2(silence, 2)
+        sys.meta_path.insert(0, _Finder(name, tree, path))
+        os._exit(pytest.main([*_OPTIONS, *tests]))
+    return child
+
+
+def survivors(name: str, tests: Sequence[str]) -> list[str]:
+    """The mutants of a module that no test notices; in a process of its own."""
+    command = [sys.executable, "-m", "tests.mutation.mutants", name, *tests]
+    shown = subprocess.run(command, capture_output=True, text=True, check=False)
+    if shown.returncode:
+        raise RuntimeError(shown.stderr)
+    return shown.stdout.splitlines()
+
+
+def main(name: str, *tests: str) -> None:
+    """Print what survives; the module as it is must pass, or nothing is shown by a failure."""
+    spec = importlib.util.find_spec(name)
+    if spec is None or spec.origin is None:
+        raise SystemExit(f"there is no module {name}")
+    tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    if os.waitpid(start(name, tree, spec.origin, tests), 0)[1]:
+        raise SystemExit(f"{', '.join(tests)}: do not pass with {name} as it is")
+    running: dict[int, str] = {}
+    for what, mutant in mutants(tree):
+        if len(running) >= (os.cpu_count() or 1):
+            _tell_next(running)
+        running[start(name, mutant, spec.origin, tests)] = what
+    while running:
+        _tell_next(running)
+
+
+def _tell_next(running: dict[int, str]) -> None:
+    """Wait for one child, and print its mutant if it survived."""
+    child, status = os.wait()
+    what = running.pop(child)
+    if status == 0:
+        sys.stdout.write(f"{what}\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

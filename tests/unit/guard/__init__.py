@@ -1,0 +1,1 @@
+"""Unit tests of the guard's parts that need no gateway."""
