@@ -25,6 +25,7 @@ class DeviceClock:
         self.steps = 0  # how often it stood still for a while
         self._ticks_per_second = ticks_per_second
         self._modulus = modulus
+        self._half = modulus // 2
         self._last_ticks: int | None = None
         self._last_received_ns = 0
         self._stamp_ns = 0
@@ -48,15 +49,17 @@ class DeviceClock:
         """
         if not self._advance(ticks, received_ns):
             return None
-        offset_ns = received_ns - self._device_ns
-        predicted_ns = self._predict(self._device_ns)
+        device_ns = self._device_ns
+        offset_ns = received_ns - device_ns
+        predicted_ns = self._predict(device_ns)
         if offset_ns < predicted_ns:  # it came sooner than the line allows: the line was too high
             if predicted_ns - offset_ns > STEPPED_NS:
                 self._minima.clear()  # they are of a way that was slow for seconds
             self._offset_ns -= predicted_ns - offset_ns
             predicted_ns = offset_ns
         self._note(offset_ns)
-        self._stamp_ns = max(self._stamp_ns + 1, min(self._device_ns + predicted_ns, received_ns))
+        stamp_ns = device_ns + predicted_ns
+        self._stamp_ns = stamp_ns if stamp_ns > self._stamp_ns else self._stamp_ns + 1
         return self._stamp_ns
 
     def _forget(self) -> None:
@@ -78,7 +81,8 @@ class DeviceClock:
         step = (ticks - self._last_ticks) % self._modulus
         # Whole turns of the counter that passed unseen; −1 for a frame from before the last.
         expected = elapsed_ns * self._ticks_per_second // SECOND_NS
-        step += self._modulus * round((expected - step) / self._modulus)
+        if abs(expected - step) > self._half:
+            step += self._modulus * round((expected - step) / self._modulus)
         step_ns = step * SECOND_NS // self._ticks_per_second
         if abs(step_ns - elapsed_ns) > RESTARTED_NS:
             self.restarts += 1
@@ -116,8 +120,7 @@ class DeviceClock:
 
         If it was the way that had been slow instead, the first frame that comes sooner corrects the line.
         """
-        line_ns = self._offset_ns + round(self._drift * (at_ns - self._reference_ns))
-        return bool(self._minima) and offset_ns - line_ns > STEPPED_NS
+        return bool(self._minima) and offset_ns - self._predict(at_ns) > STEPPED_NS
 
     def _fit(self) -> None:
         count = len(self._minima)

@@ -1,6 +1,6 @@
 """One serial port with one format on it, shared by every component whose frames come over it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, TypeVar
 
 from drivers.identify import recognise
@@ -18,7 +18,9 @@ SILENCE_S = 1.0  # a sensor that streams says something within this time
 class User(Protocol[Listening]):
     """A component that takes frames; called in the port's thread."""
 
-    def received(self, frame: Listening, stamp_ns: int) -> None: ...
+    def received(self, frames: Sequence[Listening], stamp_ns: int) -> None:
+        """The frames, one or more, that one read has completed."""
+        ...
 
     def disconnected(self) -> None: ...
 
@@ -91,11 +93,10 @@ class Line(Generic[F]):
     def _received(self, data: bytes, stamp_ns: int) -> None:
         self._last_byte_ns = stamp_ns
         frames = self.parser.feed(data)
-        if frames:
-            self._unread, self._unread_tail = 0, b""
-        else:
+        if not frames:
             self._unread += len(data)
             self._unread_tail = (self._unread_tail + data)[-TAIL:]
-        for frame in frames:
-            for user in self._users:
-                user.received(frame, stamp_ns)
+            return
+        self._unread, self._unread_tail = 0, b""
+        for user in self._users:
+            user.received(frames, stamp_ns)

@@ -57,6 +57,7 @@ class FrameScanner(Generic[F]):
     """
 
     sync = b""  # what every frame begins with
+    constant_length = 0  # of every frame, where all are equally long
     idle = b""  # bytes between frames that mean nothing and are not counted as dropped
 
     def __init__(self) -> None:
@@ -71,7 +72,7 @@ class FrameScanner(Generic[F]):
         """The frames that `data` completes, in the order of the stream."""
         self._buffer += data
         frames: list[F] = []
-        while (found := self._first_complete()) is not None:
+        while (found := self._in_step() or self._first_complete()) is not None:
             start, end = found
             frame = self._decode(bytes(self._buffer[start:end]))
             if frame is None:
@@ -108,6 +109,20 @@ class FrameScanner(Generic[F]):
     def _find(self, buffer: bytearray, start: int, end: int) -> int:
         """Where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
         return buffer.find(self.sync, start, end + len(self.sync) - 1)
+
+    def _in_step(self) -> tuple[int, int] | None:
+        """The frame that begins where the last one ended, if no other could end before it: the usual case."""
+        start, buffer = self._begin, self._buffer
+        if self._candidates or self._searched != start or not buffer.startswith(self.sync, start):
+            return None
+        end = start + (self.constant_length or self._length(buffer, start))
+        if not start < end <= len(buffer):
+            return None
+        if not self.constant_length and self._find(buffer, start + 1, end) >= 0:
+            return None
+        self._candidates.append(start)
+        self._searched = start + 1
+        return start, end
 
     def _first_complete(self) -> tuple[int, int] | None:
         """Start and end of the candidate that ends first, if any has ended."""
@@ -177,7 +192,10 @@ class Sequence:
 
     def is_late(self, number: int) -> bool:
         """Whether the frame is a repetition or older than one before it; counts what `number` shows."""
-        step = 1 if self._newest is None else self._step(self._newest, number)
+        if self._newest is None or number == (self._newest + 1) % self._modulus:  # as it mostly is
+            self._newest, self._late_run = number, 0
+            return False
+        step = self._step(self._newest, number)
         if step <= 0 and not self._begins_anew(number):
             self._counters.out_of_order += 1
             return True

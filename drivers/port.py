@@ -104,7 +104,8 @@ class SerialPort:
         poll.register(descriptor, select.POLLIN)
         poll.register(self._wake, select.POLLIN)
         while True:
-            if any(ready == self._wake for ready, _ in poll.poll()):
+            ready = poll.poll()
+            if len(ready) > 1 or ready[0][0] == self._wake:  # of two, one is the order to stop
                 return True
             try:
                 data = os.read(descriptor, READ_SIZE)

@@ -87,7 +87,11 @@ class _Average:
         self.sums: list[float] | None = None
         self.frames = 0
 
-    def received(self, frame: InsoleFrame, _stamp_ns: int) -> None:
+    def received(self, frames: Sequence[InsoleFrame], _stamp_ns: int) -> None:
+        for frame in frames:
+            self._add(frame)
+
+    def _add(self, frame: InsoleFrame) -> None:
         wanted = frame.foot is None or self._foot in (None, frame.foot)
         if not wanted or len(frame.cells) != self._cells or frame.calibrated:
             return

@@ -34,6 +34,7 @@ class Bno08xRvcParser(FrameScanner[ImuFrame]):
     """Parser of `bno08x-rvc`."""
 
     sync = b"\xaa\xaa"
+    constant_length = LENGTH
 
     def __init__(self) -> None:
         super().__init__()

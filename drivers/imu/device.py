@@ -1,9 +1,10 @@
 """A trunk IMU on a serial port."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from drivers.imu.formats import FORMATS
-from drivers.imu.frame import ImuFrame
+from drivers.imu.frame import ImuFrame, moments
 from drivers.imu.settings import ImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.line import Line
@@ -33,8 +34,12 @@ class Imu(TrunkImu):
         counters = self.line.parser.counters.as_dict() | {"reconnects": self.line.reconnects}
         return self._quality(now_ns, self.line.problem(now_ns), counters)
 
-    def received(self, frame: ImuFrame, stamp_ns: int) -> None:
-        """A frame of the line; called in the port's thread."""
+    def received(self, frames: Sequence[ImuFrame], stamp_ns: int) -> None:
+        """Frames of the line; called in the port's thread."""
+        for moment in frames if len(frames) == 1 else moments(frames):
+            self._received(moment, stamp_ns)
+
+    def _received(self, frame: ImuFrame, stamp_ns: int) -> None:
         if frame.late:
             return
         if self._clock is not None and frame.ticks is not None:

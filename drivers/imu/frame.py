@@ -1,5 +1,7 @@
 """What any IMU format gives: one frame, in SI, in the sensor's own axes."""
 
+from collections.abc import Sequence
+
 import msgspec
 
 from drivers.imu.rotation import Quaternion, Vector
@@ -26,6 +28,46 @@ class ImuFrame(msgspec.Struct, frozen=True):
     ticks: int | None = None  # the device's clock, in its own unit
     late: bool = False  # repeated, or older than a frame before it
     more: More = {}
+
+
+def moments(frames: Sequence[ImuFrame]) -> list[ImuFrame]:
+    """Frames that came together, those of one moment made one.
+
+    A device that tells a moment in several frames sends each kind once: a kind that comes again begins the
+    next moment.
+    """
+    found: list[list[ImuFrame]] = []
+    kinds: set[str] = set()
+    for frame in frames:
+        if not found or frame.kind in kinds:
+            found.append([])
+            kinds.clear()
+        found[-1].append(frame)
+        kinds.add(frame.kind)
+    return [group[0] if len(group) == 1 else _together(group) for group in found]
+
+
+def _together(group: list[ImuFrame]) -> ImuFrame:
+    """What frames of different kinds say that a trunk needs; where two say the same, the later one counts."""
+    acceleration = rate = angles = orientation = temperature = None
+    z_down = False
+    for frame in group:
+        acceleration = frame.acceleration or acceleration
+        rate = frame.angular_velocity or rate
+        angles = frame.roll_pitch_yaw or angles
+        orientation = frame.orientation or orientation
+        temperature = temperature if frame.temperature is None else frame.temperature
+        z_down = z_down or frame.z_down
+    return ImuFrame(
+        group[0].kind,
+        acceleration=acceleration,
+        angular_velocity=rate,
+        roll_pitch_yaw=angles,
+        orientation=orientation,
+        z_down=z_down,
+        temperature=temperature,
+        ticks=group[0].ticks,
+    )
 
 
 _PARTS = {

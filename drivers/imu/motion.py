@@ -106,8 +106,7 @@ class TrunkMotion:
         """The stream begins anew."""
         self._filter.restart()
         self.recent.clear()
-        self._device_attitude_ns: int | None = None
-        self._began_ns: int | None = None
+        self._raw_from_ns: int | None = None  # when a device without attitude is known to have none to send
 
     def felt(self, frame: ImuFrame, stamp_ns: int) -> Felt:
         """What `frame`, taken at `stamp_ns`, says of the trunk."""
@@ -140,27 +139,23 @@ class TrunkMotion:
 
     def _world_from_sensor(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
         """Sensor to a world whose z points up: the device's own attitude, or the filter's."""
-        device = None if self._attitude == "filter" else self._device_attitude(frame)
-        if device is not None:
-            self._device_attitude_ns = stamp_ns
-            return device
-        if self._attitude == "device":
-            return None
-        filtered = self._filter.update(stamp_ns, frame.angular_velocity, frame.acceleration)
-        return filtered if self._attitude == "filter" or self._device_is_raw(stamp_ns) else None
+        if self._attitude != "filter":
+            if frame.orientation is not None or frame.roll_pitch_yaw is not None:
+                return self._device_attitude(frame, stamp_ns)
+            if self._raw_from_ns is None:
+                self._raw_from_ns = stamp_ns + RAW_AFTER_NS
+            if self._attitude == "device" or stamp_ns < self._raw_from_ns:
+                return None
+        return self._filter.update(stamp_ns, frame.angular_velocity, frame.acceleration)
 
-    def _device_is_raw(self, stamp_ns: int) -> bool:
-        """Whether the device has sent no attitude for so long that it has none to send."""
-        if self._began_ns is None:
-            self._began_ns = stamp_ns
-        return stamp_ns - max(self._began_ns, self._device_attitude_ns or 0) > RAW_AFTER_NS
-
-    def _device_attitude(self, frame: ImuFrame) -> Quaternion | None:
-        device = frame.orientation
-        if device is not None:
-            device = rotation.normalised(device)
+    def _device_attitude(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
+        """What the device says itself: its quaternion, else its angles."""
+        device: Quaternion | None = None
+        if frame.orientation is not None:
+            device = rotation.normalised(frame.orientation)
         elif frame.roll_pitch_yaw is not None:
             device = self._angles(*frame.roll_pitch_yaw)
-        if device is not None and frame.z_down:
-            return rotation.multiply(NWU_FROM_NED, device)
-        return device
+        if device is None:
+            return None
+        self._raw_from_ns = stamp_ns + RAW_AFTER_NS
+        return rotation.multiply(NWU_FROM_NED, device) if frame.z_down else device

@@ -1,6 +1,7 @@
 """Whether an IMU can be believed: against gravity, against itself, against what a trunk can do."""
 
 import math
+from collections import deque
 
 from drivers.imu.rotation import Vector
 
@@ -10,10 +11,9 @@ TIME_CONSTANT_S = 5.0
 DISAGREES = math.radians(6.0)
 SCALE = 0.25  # share by which the mean acceleration may differ from g
 FASTEST = 15.0  # rad/s; no trunk turns faster, not even in a fall
-TOO_FAST = 3  # frames in a period
-PERIOD_S = 10.0
+TOO_FAST, TOO_FAST_IN_S = 3, 10.0  # so many frames that are too fast, in so short a time
 FROZEN_S = 5.0
-PERIOD_NS = 19_000_000  # for slow means, faster frames are left out
+PERIOD_NS = 39_000_000  # for slow means, faster frames are left out
 
 
 class ImuCheck:
@@ -32,9 +32,7 @@ class ImuCheck:
         self._previous: Vector | None = None
         self._changed_ns = 0
         self._now_ns = 0
-        self._fast = 0
-        self._period_ns = 0
-        self._too_fast = False
+        self._fast_ns: deque[int] = deque(maxlen=TOO_FAST)  # when it was too fast
 
     def update(
         self, stamp_ns: int, acceleration: Vector | None, angular_velocity: Vector | None, up: Vector | None
@@ -51,15 +49,15 @@ class ImuCheck:
         if up is not None and stamp_ns - self._last_up_ns >= PERIOD_NS:
             self._up = _slow(self._up, up, (stamp_ns - self._last_up_ns) / 1e9)
             self._last_up_ns = stamp_ns
-        if angular_velocity is not None:
-            self._count_fast(stamp_ns, math.hypot(*angular_velocity) > FASTEST)
+        if angular_velocity is not None and math.hypot(*angular_velocity) > FASTEST:
+            self._fast_ns.append(stamp_ns)
 
     @property
     def problem(self) -> str | None:
         """What is wrong, with what to check."""
         if self._began_ns is None or self._now_ns - self._began_ns < SETTLED_S * 1e9:
             return None
-        if self._too_fast:
+        if len(self._fast_ns) == TOO_FAST and self._now_ns - self._fast_ns[0] < TOO_FAST_IN_S * 1e9:
             return (
                 f"{self._name} reports turns faster than {FASTEST:.0f} rad/s, which no trunk does: "
                 "check the range set in the device, and its wires for noise"
@@ -90,12 +88,6 @@ class ImuCheck:
                 "order is wrong, or it drifts; check `format`, or set attitude = 'filter'"
             )
         return None
-
-    def _count_fast(self, stamp_ns: int, fast: bool) -> None:
-        if stamp_ns - self._period_ns > PERIOD_S * 1e9:
-            self._too_fast, self._fast, self._period_ns = self._fast >= TOO_FAST, 0, stamp_ns
-        self._fast += fast
-        self._too_fast = self._too_fast or self._fast >= TOO_FAST
 
 
 def _slow(mean: Vector | None, value: Vector, step_s: float) -> Vector:

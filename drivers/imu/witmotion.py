@@ -7,13 +7,12 @@ moment comes in several frames. (WitMotion, "WIT standard communication protocol
 import math
 import struct
 
-import msgspec
-
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
 from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
 
 LENGTH = 11
+HEAD = 2  # bytes before the words
 STANDARD_GRAVITY = 9.80665
 FULL_SCALE = 32768
 ACCELERATION = 16 * STANDARD_GRAVITY / FULL_SCALE  # m/s² a count
@@ -34,6 +33,7 @@ class WitmotionParser(FrameScanner[ImuFrame]):
     """Parser of `witmotion`."""
 
     sync = b"\x55"
+    constant_length = LENGTH
 
     def _length(self, buffer: bytearray, start: int) -> int:
         if len(buffer) < start + 2:
@@ -41,39 +41,41 @@ class WitmotionParser(FrameScanner[ImuFrame]):
         return LENGTH if buffer[start + 1] in KINDS else IMPOSSIBLE
 
     def _decode(self, raw: bytes) -> ImuFrame | None:
+        if raw[1] not in KINDS:
+            return None
         if sum(raw[:10]) & 0xFF != raw[10]:
             self.counters.bad_checksums += 1
             return None
-        frame, saturated = decode(raw[1], raw[2:10])
+        frame, saturated = _decoded(raw[1], raw)
         self.counters.saturated += saturated
         return frame
 
 
-def decode(kind: int, data: bytes) -> tuple[ImuFrame, bool]:
-    """The frame of type `kind` with eight bytes of `data`, and whether a value is at the end of its range."""
+def _decoded(kind: int, raw: bytes) -> tuple[ImuFrame, bool]:
+    """The frame in `raw`, and whether a value is at the end of its range."""
     if kind == TIME:
-        return _time(data), False
-    a, b, c, last = _WORDS.unpack(data)
-    saturated = kind in (ACCELERATIONS, RATES) and not -32768 < min(a, b, c) <= max(a, b, c) < 32767
+        return _time(raw), False
+    a, b, c, last = _WORDS.unpack_from(raw, HEAD)
     if kind == QUATERNIONS:
         parts = (a * QUATERNION, b * QUATERNION, c * QUATERNION, last * QUATERNION)
         return ImuFrame("quaternion", orientation=parts), False
-    frame = vectors(kind, a, b, c)
+    measured = kind in (ACCELERATIONS, RATES)
+    frame = vectors(kind, a, b, c, last * CENTI if measured else None)
     if frame is None:
-        return ImuFrame(OTHERS[kind], more={"data": data.hex()}), False
-    if kind in (ACCELERATIONS, RATES):
-        frame = msgspec.structs.replace(frame, temperature=last * CENTI)
-    elif kind == ANGLES:
+        return ImuFrame(OTHERS[kind], more={"data": raw[HEAD:-1].hex()}), False
+    if kind == ANGLES:
         frame.more["version"] = last & 0xFFFF
-    return frame, saturated
+    return frame, measured and not -32768 < min(a, b, c) <= max(a, b, c) < 32767
 
 
-def vectors(kind: int, a: int, b: int, c: int) -> ImuFrame | None:
+def vectors(kind: int, a: int, b: int, c: int, temperature: float | None = None) -> ImuFrame | None:
     """The frame of three words, as serial and CAN variant share them; `None` for other types."""
     if kind == ACCELERATIONS:
-        return ImuFrame("acceleration", acceleration=_scaled(a, b, c, ACCELERATION))
+        scaled = _scaled(a, b, c, ACCELERATION)
+        return ImuFrame("acceleration", acceleration=scaled, temperature=temperature)
     if kind == RATES:
-        return ImuFrame("angular_velocity", angular_velocity=_scaled(a, b, c, RATE))
+        scaled = _scaled(a, b, c, RATE)
+        return ImuFrame("angular_velocity", angular_velocity=scaled, temperature=temperature)
     if kind == ANGLES:
         return ImuFrame("angle", roll_pitch_yaw=_scaled(a, b, c, ANGLE))
     if kind == MAGNETIC:  # the unit depends on the model's magnetometer
@@ -85,7 +87,7 @@ def _scaled(a: int, b: int, c: int, scale: float) -> Vector:
     return (a * scale, b * scale, c * scale)
 
 
-def _time(data: bytes) -> ImuFrame:
-    year, month, day, hour, minute, second, ms = _TIME.unpack(data)
+def _time(raw: bytes) -> ImuFrame:
+    year, month, day, hour, minute, second, ms = _TIME.unpack_from(raw, HEAD)
     parts = {"year": 2000 + year, "month": month, "day": day, "hour": hour, "minute": minute}
     return ImuFrame("time", more={**parts, "second": second + ms / 1000})

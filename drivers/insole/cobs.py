@@ -11,6 +11,7 @@ import binascii
 import struct
 
 from drivers.insole.frame import InsoleFrame
+from drivers.insole.layout import FEET
 from drivers.parsing import DelimitedParser, Sequence
 
 VERSION = 0x31
@@ -43,7 +44,7 @@ class InsoleCobsParser(DelimitedParser[InsoleFrame]):
 
     def __init__(self) -> None:
         super().__init__()
-        self._sequences = {foot: Sequence(self.counters, 1 << 16) for foot in ("left", "right")}
+        self._sequences = {foot: Sequence(self.counters, 1 << 16) for foot in FEET}
 
     def _restart(self) -> None:
         for sequence in self._sequences.values():
@@ -67,12 +68,15 @@ class InsoleCobsParser(DelimitedParser[InsoleFrame]):
     ) -> InsoleFrame:
         self.counters.saturated += bool(flags & SATURATED)
         calibrated, missing = bool(flags & CALIBRATED), bool(flags & MISSING)
-        scale = PASCAL_PER_COUNT if calibrated else 1.0
-        cells = tuple(None if missing and count == MISSING_CELL else count * scale for count in counts)
-        foot = "right" if flags & RIGHT else "left"
+        cells: tuple[float | None, ...] = counts
+        if missing:
+            cells = tuple(None if count == MISSING_CELL else count for count in counts)
+        if calibrated:
+            cells = tuple([None if cell is None else cell * PASCAL_PER_COUNT for cell in cells])
+        foot = FEET[flags & RIGHT]
         return InsoleFrame(
             cells=cells,
-            foot="right" if flags & RIGHT else "left",
+            foot=foot,
             calibrated=calibrated,
             bits=bits,
             saturated=bool(flags & SATURATED),

@@ -1,6 +1,6 @@
 """One foot's insole: frames of its line become pressure, force and centre of pressure."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from drivers.component import Kind
@@ -97,8 +97,12 @@ class Insole:
             problem = self.line.problem(now_ns) or self._fault or self._wrong_foot()
         return Quality(state, age_ms, problem, self._counters())
 
-    def received(self, frame: InsoleFrame, stamp_ns: int) -> None:
-        """A frame of the line; called in the port's thread."""
+    def received(self, frames: Sequence[InsoleFrame], stamp_ns: int) -> None:
+        """Frames of the line; called in the port's thread."""
+        for frame in frames:
+            self._take(frame, stamp_ns)
+
+    def _take(self, frame: InsoleFrame, stamp_ns: int) -> None:
         if frame.late:
             return
         if self.foot is not None and frame.foot is not None and frame.foot != self.foot:
@@ -129,9 +133,10 @@ class Insole:
         contact = self._stance.contact(load.force)
         others = None if self.other is None else self.other.latest.read(0, stamp_ns)[0]
         share = self._stance.share(load.force, others)
-        self.check.update(stamp_ns, pressures, load.force)
-        if self.other is not None:
-            self._check_against(self.other, stamp_ns, load.force, others)
+        if self.check.is_due(stamp_ns):
+            self.check.update(stamp_ns, pressures, load.force)
+            if self.other is not None:
+                self._check_against(self.other, stamp_ns, load.force, others)
         self.latest.update(stamp_ns, self._indices, (*load, *pressures, contact, share))
 
     def _check_against(

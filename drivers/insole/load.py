@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from operator import mul
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from drivers.insole.layout import Layout
 
@@ -20,9 +20,9 @@ UNKNOWN = Load(None, None, None)
 
 def load_of(pressures: Sequence[float | None], layout: Layout, force_threshold: float) -> Load:
     """Force Σ pᵢAᵢ and centre of pressure Σ rᵢpᵢAᵢ / Σ pᵢAᵢ of `pressures` (Pa, one for each cell)."""
-    known = [pressure for pressure in pressures if pressure is not None]
-    if len(known) != len(layout.cells) or len(known) != len(pressures):
+    if None in pressures or len(pressures) != len(layout.cells):
         return UNKNOWN
+    known = cast("Sequence[float]", pressures)
     force = sum(map(mul, known, layout.areas))
     if force < force_threshold:
         return Load(force, None, None)

@@ -5,13 +5,14 @@ Everything is judged over steps, so that standing, sitting and a foot in the air
 
 import math
 from collections.abc import Sequence
+from typing import cast
 
 STEPS = 10  # landings that make a window
 FORCE_SWING = 150.0  # N; a foot that steps loads and unloads by at least this
 DEAD_SHARE = 0.01  # of the hardest pressed cell
 LOW_PEAK, HIGH_PEAK = 200.0, 4000.0  # N under one foot of somebody who walks
 FROZEN_S = 10.0
-PERIOD_NS = 19_000_000  # a foot's load does not change faster
+PERIOD_NS = 39_000_000  # faster frames are left out: a foot's load does not change faster
 ALONE_S = 30.0
 JUMPS = 20  # in a window: a loose wire
 JUMP_SHARE = 0.5  # of the hardest pressed cell, from one frame to the next and back
@@ -62,27 +63,27 @@ class FootCheck:
         self._steps = StepDetector()
         self._window_problem: str | None = None
         self._frozen_since_ns: int | None = None
-        self._previous: tuple[float, ...] | None = None
-        self._before: tuple[float, ...] | None = None
+        self._previous: Sequence[float] | None = None
+        self._before: Sequence[float] | None = None
         self._last_ns = 0
-        self._low = self._high = [0.0] * self._cells
         self._force_low = self._force_high = 0.0
         self._clear_window()
 
+    def is_due(self, stamp_ns: int) -> bool:
+        """Whether a frame of this time is one to judge: no more than one each `PERIOD_NS` is."""
+        return not 0 <= stamp_ns - self._last_ns < PERIOD_NS
+
     def update(self, stamp_ns: int, pressures: Sequence[float | None], force: float | None) -> None:
-        """One frame; those that come faster than `PERIOD_NS` are left out."""
-        if 0 <= stamp_ns - self._last_ns < PERIOD_NS:
+        """One frame that is due."""
+        if force is None or None in pressures or len(pressures) != self._cells:
             return
-        known = tuple(pressure for pressure in pressures if pressure is not None)
-        if force is None or len(known) != self._cells:
-            return
+        known = cast("Sequence[float]", pressures)
         if known != self._previous or force <= 0.0:
             self._frozen_since_ns = stamp_ns
-        self._count_jumps(known)
-        self._before, self._previous, self._last_ns = self._previous, known, stamp_ns
-        self._low = list(map(min, self._low, known))
-        self._high = list(map(max, self._high, known))
-        self._force_low, self._force_high = min(self._force_low, force), max(self._force_high, force)
+        self._note(known)
+        self._before, self._previous, self._last_ns = self._previous or known, known, stamp_ns
+        self._force_low = min(self._force_low, force)
+        self._force_high = max(self._force_high, force)
         if self._steps.has_landed(stamp_ns, force):
             self._land()
 
@@ -120,12 +121,17 @@ class FootCheck:
                 return f"{self._name}: cell {cell} felt nothing over {STEPS} steps; check its wire and place"
         return None
 
-    def _count_jumps(self, known: tuple[float, ...]) -> None:
-        if self._before is None or self._previous is None:
-            return
-        limit = JUMP_SHARE * max(self._high)
-        for cell, (a, b, c) in enumerate(zip(self._before, self._previous, known, strict=True)):
-            if (b - a) * (c - b) < 0.0 and min(abs(b - a), abs(c - b)) > limit > 0.0:
+    def _note(self, known: Sequence[float]) -> None:
+        """Each cell's range in this window, and how often it went far away and came back."""
+        low, high = self._low, self._high
+        far = JUMP_SHARE * max(high)
+        earlier, last = self._before or known, self._previous or known
+        for cell, (a, b, c) in enumerate(zip(earlier, last, known, strict=True)):
+            if c < low[cell]:
+                low[cell] = c
+            if c > high[cell]:
+                high[cell] = c
+            if (b - a) * (c - b) < 0.0 and min(abs(b - a), abs(c - b)) > far > 0.0:
                 self._jumps[cell] += 1
 
     def _clear_window(self) -> None:
