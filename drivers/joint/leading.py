@@ -16,7 +16,7 @@ from drivers.joint.commands import WAY_DOWN, WAY_UP
 from drivers.joint.setpoint import hold_still
 
 LOOK_S = 0.01  # between two looks at the statusword
-AGAIN_S = 0.5  # before a step down that had no effect is tried again
+FAULT_RESET_S = 0.5  # between two attempts to reset a fault that stays
 STANDS_S, STANDS_COUNTS_SHARE = (
     0.05,
     1e-4,
@@ -65,8 +65,7 @@ class _Descent:
         self._axis = axis
         self._errand = errand
         self._led = Led(None, "it does not answer")
-        self._tried: DriveState | None = None
-        self._again_s = 0.0
+        self._fault_reset_s = 0.0  # when the next may be tried
 
     def run(self) -> Led:
         deadline = time.monotonic() + self._errand.timeout_s
@@ -91,16 +90,19 @@ class _Descent:
             return
         words = "no state of CiA 402" if state is None else state.words
         self._led = Led(state, f"it stays in {words}")
-        if state is not None and self._is_due(state):
-            self._tried, self._again_s = state, time.monotonic() + AGAIN_S
+        if state is not None and self._may_step(state):
             for controlword in WAY_DOWN.get(state, ()):
                 self._axis.command(controlword)
 
-    def _is_due(self, state: DriveState) -> bool:
-        """Not again too soon; and an axis that brakes is not let go limp."""
-        if state is self._tried and time.monotonic() < self._again_s:
-            return False
-        return state is not DriveState.QUICK_STOP_ACTIVE or self._stands()
+    def _may_step(self, state: DriveState) -> bool:
+        """An axis that brakes is not let go limp, and a fault is not reset again too soon."""
+        if state is DriveState.QUICK_STOP_ACTIVE:
+            return self._stands()
+        if state is DriveState.FAULT:
+            if time.monotonic() < self._fault_reset_s:
+                return False
+            self._fault_reset_s = time.monotonic() + FAULT_RESET_S
+        return True
 
     def _stands(self) -> bool:
         before = self._axis.position()

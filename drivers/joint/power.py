@@ -19,7 +19,7 @@ from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import StopRpdo, find_stop_rpdo
 
 TRANSITION_S = 3.0  # how long one step up may take: brakes open in it
-RESET_S = 5.0  # how long the whole way down may take
+RESET_S = 3.0  # how long the whole way down may take
 
 # What says that an axis whose voltage was disabled has none.
 _LIMP_STATES = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})

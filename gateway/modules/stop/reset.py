@@ -12,6 +12,7 @@ from gateway.loop import Loop
 from gateway.messages import Reset
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.hold import GATEWAY, Hold
+from gateway.modules.stop.target import Target, stop_all
 from gateway.records.journal import Journal
 from gateway.wire import Kind, refuse
 
@@ -29,12 +30,14 @@ class Resetter:
         loop: Loop,
         drives: Mapping[str, Drive],
         absent: Mapping[str, str],
+        controllers: Mapping[str, Target],
         hold: Hold,
         journal: Journal,
     ) -> None:
         self._loop = loop
         self._drives = drives
         self._absent = absent  # joints that could not be built, and why
+        self._controllers = controllers
         self._hold = hold
         self._journal = journal
 
@@ -47,8 +50,12 @@ class Resetter:
         """
         begun = self._hold.begun
         self._hold.asks_unseen = False  # or it would overtake the reset of a drive that only SDO shows
-        descents = back(self._loop, gather({name: _begin(drive) for name, drive in self._drives.items()}))
+        quiet = back(self._loop, gather(stop_all(self._controllers)))  # nobody shall command against it
+        descents = then(quiet, lambda _reports: back(self._loop, gather(self._descents())))
         return then(descents, lambda found: self._end(who, begun, found))
+
+    def _descents(self) -> "dict[str, Future[Led]]":
+        return {name: _begin(drive) for name, drive in self._drives.items()}
 
     def _end(self, who: str, begun: int, found: Found) -> "Future[Reset]":
         self._hold.asks_unseen = True

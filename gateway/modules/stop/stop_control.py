@@ -57,7 +57,9 @@ class StopControl:
         self._stop = Stop(
             loop, config.stop, stoppers, self._absent, self._controllers, self._hold, self._tell_fallback
         )
-        self._resetter = Resetter(loop, self.drives, self._absent, self._hold, self._journal)
+        self._resetter = Resetter(
+            loop, self.drives, self._absent, self._controllers.targets, self._hold, self._journal
+        )
 
     @property
     def held(self) -> bool:
