@@ -135,18 +135,26 @@ class CanBus:
     def _finish(self) -> None:
         if self._on_wire is not None:
             _, _, frame, sender = self._on_wire
-            self.frames_carried += 1
-            for participant, receive in tuple(self._receivers.items()):
-                if participant is not sender and self._reaches(frame, sender, participant):
-                    receive(frame, sender)
+            self.deliver(frame, sender)
         self._release()
+
+    def deliver(self, frame: Frame, sender: object) -> None:
+        """A frame has come over the wire: every receiver but its sender gets it."""
+        self.frames_carried += 1
+        for participant, receive in tuple(self._receivers.items()):
+            if participant is not sender and self._reaches(frame, sender, participant):
+                receive(frame, sender)
 
     def _reaches(self, frame: Frame, sender: object, receiver: object) -> bool:
         return all(disturbance.arrives(frame, sender, receiver) for disturbance in self.disturbances)
 
-    def _destroy(self) -> None:
+    def tell_error(self) -> None:
+        """There was an error frame on the wire."""
         for on_error in tuple(self._error_listeners.values()):
             on_error()
+
+    def _destroy(self) -> None:
+        self.tell_error()
         if self._on_wire is not None:
             heapq.heappush(self._pending, self._on_wire)
         self._release()

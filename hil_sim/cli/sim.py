@@ -2,17 +2,12 @@
 
 import argparse
 import fnmatch
-import json
-import math
-import signal
-import sys
 import time
 from pathlib import Path
-from types import FrameType
 
 from hil_sim import personality
-from hil_sim.cli import run
-from hil_sim.cli.arguments import speed
+from hil_sim.cli import replay, run, running
+from hil_sim.cli.arguments import seconds, speed
 from hil_sim.exoskeleton import CONTROLLER, JOINTS, Scenario
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
@@ -83,6 +78,10 @@ scenario files
   gwrms sim --script FILE   only lets happen what it says, for a gateway of your own
   Those in the folder scenarios/ are examples.
 
+recordings
+  gwrms sim --dir DIR --replay FILE …
+                            plays CAN logs and serial captures as a robot (--replay --help says more)
+
 output
   One line when the robot can be used: {"ready": true, "config": "DIR/robot.toml"}
   It runs until Ctrl-C, SIGTERM or N seconds. Exit code 0; 1 when it cannot run; 2 for wrong usage.
@@ -91,13 +90,6 @@ example
   gwrms sim --dir /tmp/robot &
   gwrms gateway /tmp/robot/robot.toml
 """
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not (math.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text} is no time: give seconds greater than 0")
-    return value
 
 
 def _interface(text: str) -> str | None:
@@ -149,7 +141,7 @@ def _parser() -> argparse.ArgumentParser:
         "--insole", choices=INSOLES, default=SensorChoice().insole, help="default: %(default)s"
     )
     parser.add_argument("--script", type=Path, metavar="FILE", help="a scenario file: what happens, and when")
-    parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds (default: run on)")
+    parser.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds (default: run on)")
     parser.add_argument(
         "--speed",
         type=speed,
@@ -200,14 +192,12 @@ def _drives(words: list[str]) -> dict[str, Path]:
     return personality.choose(words, JOINTS, Path.cwd() / "here")
 
 
-def _say(sentence: str) -> None:
-    sys.stderr.write(f"gwrms sim: {sentence}\n")
-
-
 def main(argv: list[str]) -> int:
     """Run the simulator; returns the exit code."""
     if argv[:1] == ["run"]:
         return run.main(argv[1:])
+    if any(word.startswith("--replay") for word in argv):
+        return replay.main(argv)
     try:
         arguments, script = _parse(argv)
     except SystemExit as leave:
@@ -223,24 +213,8 @@ def main(argv: list[str]) -> int:
         truth=arguments.truth,
         drives=_drives(arguments.drive) or script.drives,
         interface=arguments.bus,
-        say=_say,
+        say=running.say,
         without=arguments.without,
     )
 
-    def end(_signal: int, _frame: FrameType | None) -> None:
-        robot.stop()
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        robot.open()
-        schedule(script.lines, robot)
-        if not robot.config_is_ours:
-            _say(f"kept {robot.config} as it is; delete it to have it written anew")
-        sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")
-        sys.stdout.flush()
-        robot.run(arguments.seconds)
-    finally:
-        robot.close()
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    return 0
+    return running.run(robot, arguments.seconds, lambda: schedule(script.lines, robot))

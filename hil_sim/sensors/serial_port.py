@@ -10,8 +10,8 @@ from pathlib import Path
 
 _BACKLOG_BYTES = 2048  # what a reader that is absent or slow may find waiting; older bytes are dropped
 _NAMES = [name for name in dir(termios) if re.fullmatch(r"B[1-9]\d*", name)]
-_CODE_OF = {int(name[1:]): getattr(termios, name) for name in _NAMES}
-_BAUDRATE_OF = {code: baudrate for baudrate, code in _CODE_OF.items()}
+BAUDRATES = {int(name[1:]): getattr(termios, name) for name in _NAMES}  # the code of each standard one
+_BAUDRATE_OF = {code: baudrate for baudrate, code in BAUDRATES.items()}
 _INPUT_SPEED, _OUTPUT_SPEED = 4, 5  # places in what tcgetattr gives
 
 
@@ -43,7 +43,7 @@ class SerialPort:
             self._master, self._slave = os.openpty()
             tty.setraw(self._slave)
             attributes = termios.tcgetattr(self._slave)
-            attributes[_INPUT_SPEED] = attributes[_OUTPUT_SPEED] = _CODE_OF[self._own_baudrate]
+            attributes[_INPUT_SPEED] = attributes[_OUTPUT_SPEED] = BAUDRATES[self._own_baudrate]
             termios.tcsetattr(self._slave, termios.TCSANOW, attributes)
             os.set_blocking(self._master, False)
             _point(self.link, os.ttyname(self._slave))

@@ -1,0 +1,39 @@
+"""A robot as a process: opened, announced on standard output, run until a signal, closed."""
+
+import json
+import signal
+import sys
+from collections.abc import Callable
+from types import FrameType
+
+from hil_sim.housing import Housing
+
+
+def say(sentence: str) -> None:
+    """A word to whoever started it."""
+    sys.stderr.write(f"gwrms sim: {sentence}\n")
+
+
+def run(robot: Housing, seconds: float | None, prepare: Callable[[], None]) -> int:
+    """Run `robot` until SIGINT, SIGTERM or so many seconds; `prepare` is called when it is open.
+
+    Returns the exit code.
+    """
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        robot.stop()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        robot.open()
+        prepare()
+        if not robot.config_is_ours:
+            say(f"kept {robot.config} as it is; delete it to have it written anew")
+        sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")
+        sys.stdout.flush()
+        robot.run(seconds)
+    finally:
+        robot.close()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 0
