@@ -13,39 +13,9 @@ from drivers.joint import cia402, commands
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import Controlword
 from tests.mutation.tables import Mutant, added_mutants, mapping_mutants, set_mutants, unnoticed
+from tests.unit.joint.standard import LEAVES_BY_ITSELF, STATUSWORDS, S, after
 
-S = DriveState
-
-# CiA 402-2, table "command coding": mask and pattern of the controlword's bits 7, 3, 2, 1, 0.
-CODING = (
-    ("disable voltage", 0x82, 0x00),
-    ("quick stop", 0x86, 0x02),
-    ("shutdown", 0x87, 0x06),
-    ("switch on", 0x8F, 0x07),
-    ("enable operation", 0x8F, 0x0F),
-)
-# Figure "state machine": what each command makes of each state; where nothing stands, nothing happens. Some
-# drives take "enable operation" in READY TO SWITCH ON as transitions 3 and 4 in one.
-TRANSITIONS = {
-    "shutdown": {
-        S.SWITCH_ON_DISABLED: S.READY_TO_SWITCH_ON,
-        S.SWITCHED_ON: S.READY_TO_SWITCH_ON,
-        S.OPERATION_ENABLED: S.READY_TO_SWITCH_ON,
-    },
-    "switch on": {S.READY_TO_SWITCH_ON: S.SWITCHED_ON, S.OPERATION_ENABLED: S.SWITCHED_ON},
-    "enable operation": {S.READY_TO_SWITCH_ON: S.OPERATION_ENABLED, S.SWITCHED_ON: S.OPERATION_ENABLED},
-    "disable voltage": dict.fromkeys(
-        (S.READY_TO_SWITCH_ON, S.SWITCHED_ON, S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE), S.SWITCH_ON_DISABLED
-    ),
-    "quick stop": {
-        S.READY_TO_SWITCH_ON: S.SWITCH_ON_DISABLED,
-        S.SWITCHED_ON: S.SWITCH_ON_DISABLED,
-        S.OPERATION_ENABLED: S.QUICK_STOP_ACTIVE,
-    },
-    "fault reset": {S.FAULT: S.SWITCH_ON_DISABLED},
-}
 BITS_OF_COMMANDS = 0x008F
-LEAVES_BY_ITSELF = frozenset({S.NOT_READY_TO_SWITCH_ON, S.FAULT_REACTION_ACTIVE})
 # From the requirement: the words of a stop and of a reset, the states on the one way down and the one way up.
 STOP, FALLBACK = 0x0002, 0x0000
 DOWN = {
@@ -64,18 +34,6 @@ SHORTEST_DOWN = {
     S.SWITCH_ON_DISABLED: [],
 }
 UP = [S.SWITCH_ON_DISABLED, S.READY_TO_SWITCH_ON, S.SWITCHED_ON, S.OPERATION_ENABLED]
-
-
-def after(state: DriveState, controlword: int, before: int, stays: bool) -> DriveState:
-    """The state after a controlword; `before` is the one before it, `stays` where 605Ah is 5 to 8."""
-    if controlword & ~before & 0x80:
-        return TRANSITIONS["fault reset"].get(state, state)
-    for command, mask, pattern in CODING:
-        if controlword & mask == pattern:
-            if (command, state, stays) == ("enable operation", S.QUICK_STOP_ACTIVE, True):
-                return S.OPERATION_ENABLED  # 16
-            return TRANSITIONS[command].get(state, state)
-    return state
 
 
 @dataclass(frozen=True)
@@ -215,19 +173,6 @@ def of(field: str, mutants: Iterator[Mutant]) -> list[Mutant[Tables]]:  # type: 
 )
 def test_every_change_of_a_table_is_noticed(mutants: Callable[[], list[Mutant[Tables]]]) -> None:
     assert unnoticed(complaints, mutants()) == []
-
-
-# CiA 402-2, table "state coding": statusword bits 6, 5, 3, 2, 1, 0 as the standard prints them.
-STATUSWORDS = {
-    "x0xx0000": S.NOT_READY_TO_SWITCH_ON,
-    "x1xx0000": S.SWITCH_ON_DISABLED,
-    "x01x0001": S.READY_TO_SWITCH_ON,
-    "x01x0011": S.SWITCHED_ON,
-    "x01x0111": S.OPERATION_ENABLED,
-    "x00x0111": S.QUICK_STOP_ACTIVE,
-    "x0xx1111": S.FAULT_REACTION_ACTIVE,
-    "x0xx1000": S.FAULT,
-}
 
 
 def about_statuswords(coding: tuple[tuple[int, int, DriveState], ...]) -> Iterator[str]:
