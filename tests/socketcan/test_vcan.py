@@ -1,18 +1,21 @@
-"""A real SocketCAN interface: reading, filters, the link that goes down and comes back."""
+"""The drivers on a real SocketCAN interface: times, filters, error frames, losses, and a link that goes."""
 
-import fcntl
 import math
-import socket
 import struct
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import can
 import pytest
 
 import eds
+from drivers.bus import socketcan
 from drivers.bus.bus import BusUser, CanBus
+from drivers.bus.bus_state import BusState
 from drivers.bus.frames import EXTENDED
 from drivers.bus.netlink import read_link
 from drivers.bus.settings import CanSettings
@@ -20,33 +23,21 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
 from drivers.samples import State
+from tests.socketcan.link import NAME, needs_vcan, set_up
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.bus.waiting import WAIT_S, until
 from tests.unit.joint.conftest import drive_eds, drive_objects, tpdo
 from tests.unit.joint.test_drive import quality, read
 
-NAME = "vcan0"
-_SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 1
+HOUR_S = 3600.0
+LATE_NS = 500_000_000
+AWAY_NS = 60_000_000_000  # for so long a process may have had no processor between two looks at the clocks
 
-pytestmark = pytest.mark.skipif(
-    read_link(NAME) is None, reason=f"there is no {NAME} here; see tests/socketcan/uml"
+pytestmark = [needs_vcan, pytest.mark.usefixtures("link_is_up")]
+in_user_mode_linux = pytest.mark.skipif(
+    "User Mode Linux" not in Path("/proc/cpuinfo").read_text(encoding="utf-8"),
+    reason="this computer's clock is not ours to set",
 )
-
-
-def set_up(up: bool) -> None:
-    """`ip link set vcan0 up` or `down`."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
-        request = struct.pack("16sH14x", NAME.encode(), 0)
-        (flags,) = struct.unpack_from("H", fcntl.ioctl(control, _SIOCGIFFLAGS, request), 16)
-        flags = flags | _IFF_UP if up else flags & ~_IFF_UP
-        fcntl.ioctl(control, _SIOCSIFFLAGS, struct.pack("16sH14x", NAME.encode(), flags))
-
-
-@pytest.fixture(autouse=True)
-def link_is_up() -> Iterator[None]:
-    set_up(True)
-    yield
-    set_up(True)
 
 
 @pytest.fixture
@@ -54,48 +45,143 @@ def bus() -> CanBus:
     return CanBus("main", CanSettings(interface="socketcan", channel=NAME, bitrate=1_000_000))
 
 
-@pytest.fixture
-def peer() -> Iterator[can.BusABC]:
-    with can.Bus(channel=NAME, interface="socketcan") as peer:
-        yield peer
-
-
 class User(BusUser):
     ready = False
 
 
-def test_frames_come_with_the_kernels_time_on_the_monotonic_clock(bus: CanBus, peer: can.BusABC) -> None:
-    got: list[tuple[int, bytes]] = []
-    user = User()
-    bus.subscribe(0x181, lambda stamp_ns, data: got.append((stamp_ns, data)))
-    bus.subscribe(0x12345 | EXTENDED, lambda stamp_ns, data: got.append((stamp_ns, data)))
+@contextmanager
+def held(bus: CanBus, user: User | None = None) -> Iterator[User]:
+    """The bus, open."""
+    user = user or User()
     bus.hold(user)
     until(lambda: bus.opened)
-    before_ns = time.monotonic_ns()
-    peer.send(can.Message(arbitration_id=0x181, data=b"\x01\x02", is_extended_id=False))
-    peer.send(can.Message(arbitration_id=0x12345, data=b"\x03", is_extended_id=True))
-    until(lambda: len(got) == 2)
-    assert [data for _, data in got] == [b"\x01\x02", b"\x03"]
-    assert before_ns - 1_000_000 <= got[0][0] <= got[1][0] <= time.monotonic_ns()
+    yield user
     bus.release(user)
+
+
+class Reader:
+    """A handler that stands still, and with it the bus's thread, until it may `go_on`."""
+
+    def __init__(self) -> None:
+        self.stamps_ns: list[int] = []
+        self.go_on = threading.Event()
+
+    def __call__(self, stamp_ns: int, _data: bytes) -> None:
+        self.stamps_ns.append(stamp_ns)
+        self.go_on.wait(WAIT_S)
+
+
+def message(can_id: int, data: bytes = b"", extended: bool = False) -> can.Message:
+    return can.Message(arbitration_id=can_id, data=data, is_extended_id=extended)
+
+
+def test_frames_come_with_their_identifiers_and_data(bus: CanBus, peer: can.BusABC) -> None:
+    got: list[bytes] = []
+    bus.subscribe(0x181, lambda _, data: got.append(data))
+    bus.subscribe(0x12345 | EXTENDED, lambda _, data: got.append(data))
+    with held(bus):
+        peer.send(message(0x181, b"\x01\x02"))
+        peer.send(message(0x12345, b"\x03", extended=True))
+        until(lambda: len(got) == 2)
+    assert got == [b"\x01\x02", b"\x03"]
+
+
+def test_a_stamp_is_the_kernels_however_late_the_frame_is_read(bus: CanBus, peer: can.BusABC) -> None:
+    reader = Reader()
+    bus.subscribe(0x181, reader)
+    with held(bus):
+        peer.send(message(0x181))
+        until(lambda: reader.stamps_ns)
+        before_ns = time.monotonic_ns()
+        peer.send(message(0x181))
+        after_ns = time.monotonic_ns()
+        until(lambda: time.monotonic_ns() > after_ns + LATE_NS)
+        reader.go_on.set()
+        until(lambda: len(reader.stamps_ns) == 2)
+    assert before_ns - AWAY_NS < reader.stamps_ns[1] < after_ns + LATE_NS / 2
+
+
+@in_user_mode_linux
+@pytest.mark.parametrize("jump_s", [HOUR_S, -HOUR_S])
+def test_stamps_go_on_when_the_wall_clock_jumps(bus: CanBus, peer: can.BusABC, jump_s: float) -> None:
+    stamps_ns: list[int] = []
+    bus.subscribe(0x181, lambda stamp_ns, _: stamps_ns.append(stamp_ns))
+    with held(bus):
+        peer.send(message(0x181))
+        until(lambda: len(stamps_ns) == 1)
+        time.clock_settime(time.CLOCK_REALTIME, time.time() + jump_s)
+        before_ns = time.monotonic_ns()
+        peer.send(message(0x181))
+        until(lambda: len(stamps_ns) == 2)
+        time.clock_settime(time.CLOCK_REALTIME, time.time() - jump_s)
+    assert before_ns - AWAY_NS < stamps_ns[1] <= time.monotonic_ns()
 
 
 def test_the_kernel_keeps_what_nobody_asked_for(bus: CanBus, peer: can.BusABC) -> None:
-    user = User()
     got: list[bytes] = []
     bus.subscribe(0x182, lambda _, data: got.append(data))
-    bus.hold(user)
-    until(lambda: bus.opened)
-    peer.send(can.Message(arbitration_id=0x181, data=b"", is_extended_id=False))
-    until(lambda: 0x181 in bus.unclaimed)
-    user.ready = True
-    time.sleep(0.3)
-    frames = bus.frames
-    for can_id in (0x181, 0x183, 0x182):
-        peer.send(can.Message(arbitration_id=can_id, data=b"\x07", is_extended_id=False))
-    until(lambda: got)
-    assert bus.frames == frames + 1
-    bus.release(user)
+    with held(bus) as user:
+        peer.send(message(0x181))
+        until(lambda: 0x181 in bus.unclaimed)
+        user.ready = True
+        until(lambda: "182" in kernel_filters())
+        frames = bus.frames
+        for can_id in (0x181, 0x183, 0x182):
+            peer.send(message(can_id, b"\x07"))
+        until(lambda: got)
+        assert bus.frames == frames + 1
+
+
+def kernel_filters() -> set[str]:
+    """The 11-bit identifiers that the kernel passes to somebody by name."""
+    lines = Path("/proc/net/can/rcvlist_sff").read_text(encoding="ascii").splitlines()
+    return {line.split()[1] for line in lines if line.split()[:1] == [NAME]}
+
+
+def test_error_frames_tell_the_controllers_state(bus: CanBus, peer: can.BusABC) -> None:
+    controller, bus_off, restarted = 0x004, 0x040, 0x100  # <linux/can/error.h>
+    announced = [
+        (controller, b"\x00\x08", BusState.WARNING, "counts many errors"),
+        (controller, b"\x00\x20", BusState.PASSIVE, "error passive"),
+        (bus_off, b"", BusState.OFF, "bus off, no frame can pass"),
+        (restarted, b"", BusState.ACTIVE, None),
+    ]
+    with held(bus):
+        for error_class, data, state, words in announced:
+            peer.send(can.Message(arbitration_id=error_class, data=data.ljust(8, b"\0"), is_error_frame=True))
+            until(partial(is_in, bus, state))
+            assert words in (bus.trouble or "") if words else bus.trouble is None
+
+
+def is_in(bus: CanBus, state: BusState) -> bool:
+    return bus.state is state
+
+
+def test_what_the_kernel_had_no_room_for_is_counted(
+    bus: CanBus, peer: can.BusABC, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(socketcan, "RECEIVE_BUFFER", 4096)
+    reader, marks = Reader(), list[bytes]()
+    bus.subscribe(0x181, reader)
+    bus.subscribe(0x182, lambda _, data: marks.append(data))
+    with held(bus):
+        for _ in range(200):
+            peer.send(message(0x181, bytes(8)))
+        reader.go_on.set()
+        sent = 200
+        while not marks and sent < 300:  # the first one that comes tells of every frame before it
+            peer.send(message(0x182))
+            sent += 1
+            comes(lambda: marks)
+        assert bus.dropped > 0
+        assert bus.frames + bus.dropped == sent
+
+
+def comes(condition: Callable[[], object]) -> None:
+    """Give it a second to come true."""
+    end_s = time.monotonic() + 1.0
+    while not condition() and time.monotonic() < end_s:
+        time.sleep(0.002)
 
 
 def test_a_joint_lives_on_it_and_survives_the_link(bus: CanBus, tmp_path: Path) -> None:
