@@ -39,6 +39,8 @@ def gwrms(*arguments: str) -> subprocess.CompletedProcess[str]:
 class Bench:
     """A simulator and a gateway, each of which can be killed and started again."""
 
+    simulator_options: tuple[str, ...] = ()
+
     def __init__(self, folder: Path, processes: ExitStack) -> None:
         self.folder = folder
         self._processes = processes
@@ -47,7 +49,8 @@ class Bench:
         self.start_gateway()
 
     def start_simulator(self) -> None:
-        self.simulator = self._processes.enter_context(Child("simulator", ["sim", "--dir", str(self.folder)]))
+        arguments = ["sim", "--dir", str(self.folder), *self.simulator_options]
+        self.simulator = self._processes.enter_context(Child("simulator", arguments))
         ready = self.simulator.wait_ready(_json, DEADLINE_S, nothing)
         assert ready["ready"] is True
         self.config = Path(ready["config"])
