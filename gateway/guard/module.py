@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from gateway.registry import Context
     from gateway.session import Answer, Session
 
-LOOK_NS = (
-    250_000_000  # how often the loop looks at the latest; each watcher says when it wants to be looked at
-)
+LOOK_NS = 250_000_000  # how often the loop looks, where no watcher wants to be looked at sooner
 LEAST_S = 0.005
 _NO_STOP: Future[StopOutcome] = done(StopOutcome.UNCONFIRMED)
 

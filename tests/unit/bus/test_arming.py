@@ -96,7 +96,9 @@ def test_it_is_armed_only_when_it_has_heard_us_after_its_entry_was_written(
     monkeypatch.setattr("drivers.bus.cycles.Cycles.start", lambda _cycles: None)  # ours would come much later
     with bench({**consumer(0), **option(3)}) as found:
         until(lambda: found.arming.armed)
-        until(lambda: (0x764, b"\x05") in found.fake.seen)
+        later = time.monotonic() + 4 * armings.CHECK_S
+        until(lambda: time.monotonic() > later)
+        assert found.fake.seen.count((0x764, b"\x05")) == 1
         written = next(at for at, (_, data) in enumerate(found.fake.seen) if data[:4] == b"\x23\x16\x10\x01")
         assert found.fake.seen.index((0x764, b"\x05")) > written
 

@@ -52,6 +52,7 @@ def test_it_is_sent_in_either_role_and_ends_with_its_owner(bus: CanBus, wire: ca
     frames(wire)
     time.sleep(0.05)
     assert frames(wire) == []
+    assert not bus._handlers, "nobody listens for it any more"
 
 
 def test_it_ends_when_nobody_feeds_it(bus: CanBus, wire: can.BusABC, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -372,3 +372,20 @@ class TestOpen:
             works = True
             until(lambda: guard(client)["rules"], "it runs")
             assert guard(client)["problem"] is None
+
+    def test_a_stop_whose_reason_is_still_there_is_not_reset(self, serve: Serve, bench: Bench) -> None:
+        client = serve(LIMIT)
+        bend(bench, 2.5)
+        until(lambda: client.call("robot.describe")["stop"]["held"], "held")
+        client.call("control.acquire", ttl_s=60)
+        error = client.refused("robot.reset")
+        assert error.kind == "stopped"
+        assert "knees (left_knee.position: 2.5 rad" in str(error)
+        assert client.call("robot.describe")["stop"]["held"] is True
+
+        def well() -> bool:
+            bend(bench, 1.0)
+            return state(client, "knees") == "cleared"
+
+        until(well)
+        assert client.call("robot.reset")["held"] is False
