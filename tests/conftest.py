@@ -9,6 +9,14 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tests.stores import (  # noqa: F401  # fixtures, for every test
+    backend,
+    folder_url,
+    new_store_url,
+    store_libraries,
+    store_url,
+)
+
 
 def _descriptors() -> set[str]:
     open_files: set[str] = set()

@@ -10,6 +10,7 @@ from typing import Any, Final, Self
 
 from gateway.client import Batch
 from gateway.messages import Description, ResourceSnapshot
+from ml.store.tables import TABLES
 from server_gui.core.recording import records
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.gathering import EventKind, Gathering, Notification
@@ -158,7 +159,15 @@ class Recorder:
         return self._put(1, lambda: [self._known(robot).event(kind, text, utc_ns, **data)])
 
     def add(self, record: Record) -> int:
-        """Keep a row of any table: a label, a prediction."""
+        """Keep a row of any table: a label, a prediction.
+
+        Raises:
+            ValueError: there is no such table, or this is no row of it.
+
+        """
+        if record.table not in TABLES:
+            raise ValueError(f"there is no table {record.table}; there are {', '.join(TABLES)}")
+        TABLES[record.table].rows([record.fields])  # what the store would not take is refused here
         return self._put(1, lambda: [record])
 
     # --- how it goes

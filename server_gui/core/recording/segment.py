@@ -105,11 +105,18 @@ class Segment:
                 self._database.execute("ROLLBACK")
             raise
 
+    def layouts(self) -> list[tuple[str, Layout]]:
+        """Each robot with each of its layouts."""
+        layouts = {number: layout for layout, number in self._layouts.items()}
+        found = self._database.execute("SELECT DISTINCT robot, layout FROM run ORDER BY robot, layout")
+        return [(robot, layouts[layout]) for robot, layout in found]
+
     def runs(self) -> Iterator[Run]:
-        """Every run, robot by robot, each in the order in which it was recorded."""
+        """Every run: robot by robot, connection by connection, stream by stream, in the order of `seq`."""
         layouts = {number: layout for layout, number in self._layouts.items()}
         found = self._database.execute(
-            "SELECT robot, session, connection, stream, layout, rows, data FROM run ORDER BY robot, rowid"
+            "SELECT robot, session, connection, stream, layout, rows, data FROM run "
+            "ORDER BY robot, connection, stream, seq, row"
         )
         for robot, session, connection, stream, layout, count, data in found:
             yield unpack(robot, session, connection, stream, layouts[layout], count, data)
@@ -137,5 +144,8 @@ class Segment:
     @staticmethod
     def size_bytes(path: Path) -> int:
         """What the database's files take on the disk."""
-        found = (path.with_name(path.name + suffix) for suffix in SUFFIXES)
-        return sum(file.stat().st_size for file in found if file.exists())
+        size = 0
+        for suffix in SUFFIXES:
+            with contextlib.suppress(FileNotFoundError):  # SQLite removes its log when it is closed
+                size += path.with_name(path.name + suffix).stat().st_size
+        return size

@@ -92,11 +92,11 @@ def test_a_stream_that_changes_its_columns_goes_on_in_another_run(spool: Spool) 
 def test_a_new_link_is_a_new_connection_and_a_gap(spool: Spool) -> None:
     with Recorder(spool) as recorder:
         recorder.record("exo-01", 1, batch(0, link=1))
-        recorder.record("exo-01", 1, batch(0, link=2))
+        recorder.record("exo-01", 1, batch(0, rows=2, link=2))
     runs, _ = kept(spool)
     assert len({run.connection for run in runs}) == 2
     (gap,) = events(spool, "gap")
-    assert gap["connection"] == next(run.connection for run in runs if run.connection != runs[0].connection)
+    assert [gap["connection"]] == [run.connection for run in runs if len(run) == 2]
 
 
 def test_missing_notifications_and_dropped_rows_are_events(spool: Spool) -> None:

@@ -1,0 +1,103 @@
+"""What can go wrong with a store, and how the libraries' errors become these.
+
+StoreError
+├── NoSuchTable        nothing has been written to it yet, or not that version
+├── StoreRefused       the keys are wrong or may not do this; retrying is no use
+├── StoreUnreachable   no answer, or a server's own failure: try again later, nothing is done twice
+└── UnsafeStore        it cannot keep several writers apart
+
+A server's answer may quote keys and signatures, so it is never passed on: neither in our messages nor as
+the cause of our errors.
+"""
+
+import contextlib
+import re
+from collections.abc import Iterator
+from typing import Final
+
+import obstore.exceptions
+from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
+
+
+class StoreError(Exception):
+    """The store could not do what was asked."""
+
+
+class NoSuchTable(StoreError):
+    """The table, or that version of it, is not there."""
+
+
+class StoreRefused(StoreError):
+    """The store does not accept the keys, or they may not do this."""
+
+
+class StoreUnreachable(StoreError, ConnectionError):
+    """The store did not answer, or failed; nothing is done twice when it is tried again."""
+
+
+class UnsafeStore(StoreError):
+    """The store does not keep two writers from overwriting each other."""
+
+
+_REFUSED: Final = re.compile(r"401 Unauthorized|403 Forbidden|lacked the necessary privileges")
+_NO_TABLE: Final = re.compile(r"[Nn]ot a Delta table|[Nn]o files in log segment|LogSegment end version")
+_CODE: Final = re.compile(r"<Code>(\w+)</Code>|(\d{3} [A-Z][A-Za-z ]+)")
+_ANSWERED: Final = re.compile(r"status code|<\w|HTTP")
+_COLOUR: Final = re.compile(r"\x1b\[\d*m")
+_REASONS: Final = (
+    "Connection refused",
+    "dns error",
+    "timed out",
+    "timeout",
+    "connection closed",
+    "connection reset",
+    "No space left on device",
+    "Permission denied",
+    "Read-only file system",
+)
+_ADVICE: Final = {
+    StoreRefused: "check AWS_PROFILE, or AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, and what they may do",
+    StoreUnreachable: "check the network, AWS_ENDPOINT_URL and that the service runs",
+}
+LIBRARY_ERRORS: Final = (DeltaError, obstore.exceptions.BaseError, OSError, ValueError)
+
+
+@contextlib.contextmanager
+def translated(doing: str) -> Iterator[None]:
+    """Turn what the libraries raise within the block into our errors; `doing` names what and where.
+
+    A lost race (`CommitFailedError`) passes: who appends knows what to do about it.
+    """
+    try:
+        yield
+    except (StoreError, CommitFailedError):
+        raise
+    except LIBRARY_ERRORS as error:
+        kind = _kind(error)
+        advice = f"; {_ADVICE[kind]}" if kind in _ADVICE else ""
+        raise kind(f"{doing}: {_reason(error)}{advice}") from None
+
+
+def _kind(error: Exception) -> type[StoreError]:
+    text = str(error)
+    if isinstance(error, TableNotFoundError) or _NO_TABLE.search(text):
+        return NoSuchTable
+    if isinstance(error, PermissionError) or _REFUSED.search(text):
+        return StoreRefused
+    if (
+        isinstance(error, OSError | obstore.exceptions.GenericError)
+        or "HTTP error" in text
+        or "S3 error" in text
+    ):
+        return StoreUnreachable
+    return StoreError
+
+
+def _reason(error: Exception) -> str:
+    """The error in few words; what a server answered is reduced to its code."""
+    text = str(error)
+    found = [reason for reason in _REASONS if reason in text]
+    found += [next(filter(None, groups)) for groups in _CODE.findall(text)]
+    if not found and not _ANSWERED.search(text):
+        found = [_COLOUR.sub("", text).strip().partition("\n")[0][:200]]
+    return ", ".join(dict.fromkeys(found)) or type(error).__name__

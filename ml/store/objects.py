@@ -1,0 +1,97 @@
+"""Small objects of the store beside its tables, and how S3 is reached."""
+
+import configparser
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import obstore
+from obstore.exceptions import AlreadyExistsError, NotFoundError
+from obstore.store import ObjectStore, from_url
+
+from ml.store.errors import translated
+
+CONNECT_TIMEOUT: Final = "5s"
+TIMEOUT: Final = "60s"
+_CLIENT: Final = ("connect_timeout", "timeout", "allow_http")
+_RETRY: Final = {"max_retries": 3}
+_PROFILE: Final = {  # what a profile's lines are called in the libraries
+    "aws_access_key_id": "aws_access_key_id",
+    "aws_secret_access_key": "aws_secret_access_key",
+    "aws_session_token": "aws_session_token",
+    "region": "aws_region",
+    "endpoint_url": "aws_endpoint",
+}
+
+
+class Objects:
+    """Whole objects under a URL, read and written at once."""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        with translated(f"the store {url} cannot be opened"):
+            self._objects = _open(url)
+
+    def create(self, path: str, data: bytes) -> bool:
+        """Write an object that is not there yet; False where it is."""
+        with translated(f"{self.url}/{path} cannot be written"):
+            try:
+                obstore.put(self._objects, path, data, mode="create", use_multipart=False)
+            except AlreadyExistsError:
+                return False
+            return True
+
+    def read(self, path: str) -> bytes | None:
+        """An object's content, None where it is not there."""
+        with translated(f"{self.url}/{path} cannot be read"):
+            try:
+                return bytes(obstore.get(self._objects, path).bytes())
+            except (NotFoundError, FileNotFoundError):
+                return None
+
+    def names(self, folder: str) -> list[str]:
+        """Every object below a folder."""
+        with translated(f"{self.url}/{folder} cannot be listed"):
+            return sorted(found["path"] for chunk in obstore.list(self._objects, folder) for found in chunk)
+
+    def remove(self, path: str) -> None:
+        """Delete an object, if it is there."""
+        with translated(f"{self.url}/{path} cannot be removed"):
+            try:
+                obstore.delete(self._objects, path)
+            except (NotFoundError, FileNotFoundError):
+                return
+
+
+def s3_options() -> dict[str, str]:
+    """How S3 is reached: what the AWS environment says, and the profile where it has no keys."""
+    options = {"connect_timeout": CONNECT_TIMEOUT, "timeout": TIMEOUT} | _profile()
+    endpoint = os.environ.get("AWS_ENDPOINT_URL") or options.get("aws_endpoint", "")
+    return options | ({"allow_http": "true"} if endpoint.startswith("http://") else {})
+
+
+def _open(url: str) -> ObjectStore:
+    if url.startswith("file://"):
+        return from_url(url, mkdir=True)
+    options = s3_options()
+    client = {name: options.pop(name) for name in _CLIENT if name in options}
+    settings: dict[str, Any] = {"config": options, "client_options": client, "retry_config": _RETRY}
+    opened: ObjectStore = from_url(url, **settings)
+    return opened
+
+
+def _profile() -> dict[str, str]:
+    """Keys, region and endpoint of the AWS profile, where the environment itself has no keys."""
+    if "AWS_ACCESS_KEY_ID" in os.environ:
+        return {}
+    name = os.environ.get("AWS_PROFILE", "default")
+    found: dict[str, str] = {}
+    for variable, usual, section in (
+        ("AWS_CONFIG_FILE", "~/.aws/config", name if name == "default" else f"profile {name}"),
+        ("AWS_SHARED_CREDENTIALS_FILE", "~/.aws/credentials", name),
+    ):
+        profiles = configparser.ConfigParser(interpolation=None)
+        profiles.read(Path(os.environ.get(variable, usual)).expanduser())
+        if profiles.has_section(section):
+            found |= dict(profiles.items(section))
+    return {ours: found[theirs] for theirs, ours in _PROFILE.items() if theirs in found}

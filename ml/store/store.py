@@ -1,0 +1,236 @@
+"""A store by its URL: tables that are appended to exactly once, by several servers at a time."""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+import msgspec
+import pyarrow as pa
+import pyarrow.dataset
+from deltalake import (
+    ColumnProperties,
+    CommitProperties,
+    DeltaTable,
+    PostCommitHookProperties,
+    Transaction,
+    WriterProperties,
+    write_deltalake,
+)
+from deltalake.exceptions import CommitFailedError
+
+from ml.store import durable
+from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
+from ml.store.objects import Objects, s3_options
+from ml.store.probe import probe
+from ml.store.tables import Table
+
+ATTEMPTS: Final = 20  # races that an append may lose before it gives up
+CHECKPOINT_EVERY: Final = 50  # commits; a reader never replays more log than this
+ROW_GROUP: Final = 100_000  # rows that are read or left out together
+_ABOUT: Final = "store.json"
+FORMAT: Final = 1  # of the store as a whole
+# We make checkpoints ourselves, so that those in a folder are synchronised like everything else.
+_NO_HOOKS: Final = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
+
+Batches = Callable[[], Iterator[pa.RecordBatch]]
+
+
+class About(msgspec.Struct, frozen=True):
+    """What a store is, decided when it is first used."""
+
+    format: int = FORMAT
+    shards: int = 1  # of sharded tables; see docs/scale.md
+    several_writers: bool = True
+
+
+def default_url() -> str:
+    """Under the user's own data (XDG base directories)."""
+    data = os.environ.get("XDG_DATA_HOME")
+    folder = (Path(data) if data else Path.home() / ".local" / "share") / "gwrms" / "store"
+    return folder.as_uri()
+
+
+class Store:
+    """Tables under a `file://` or `s3://` URL; for one thread at a time.
+
+    `shards` and `several_writers` count when the store is first used, and are kept in it.
+
+    Raises:
+        UnsafeStore: it cannot keep several writers apart, and was not said to have one alone.
+        StoreError: it cannot be reached or used.
+
+    """
+
+    def __init__(self, url: str | None = None, shards: int = 1, several_writers: bool = True) -> None:
+        self.url = _checked(url or default_url())
+        self.folder = Path(urlsplit(self.url).path) if self.url.startswith("file://") else None
+        self.objects = Objects(self.url)
+        self.about = self._about(About(shards=shards, several_writers=several_writers))
+        if several_writers and not self.about.several_writers:
+            raise UnsafeStore(
+                f"the store {self.url} is for one writer alone: no other may open it for writing"
+            )
+        self._open: dict[str, DeltaTable] = {}
+
+    def append(
+        self, table: Table, location: str, schema: pa.Schema, batches: Batches, writer: str, sequence: int
+    ) -> bool:
+        """Append these batches as transaction `sequence` (1, 2, 3, …) of `writer`; False if it is there.
+
+        However often it is repeated, after whatever failure, the rows are there once; in a folder they are
+        synchronised when this returns. Columns that the table does not have are added to it.
+
+        Raises:
+            StoreError: it is not known whether they were appended; repeat it.
+
+        """
+        with translated(f"{self.url}/{location} cannot be written"):
+            for _ in range(ATTEMPTS):
+                delta = self._writable(table, location)
+                new = (delta.transaction_version(writer) or 0) < sequence
+                try:
+                    if new:
+                        self._write(delta, schema, batches(), Transaction(writer, sequence))
+                except CommitFailedError:
+                    continue  # another writer was faster, or we ourselves in an attempt that seemed to fail
+                finally:
+                    self._open.pop(location, None)
+                self._settle(location, delta, writer, sequence)
+                self._open[location] = delta
+                return new
+        raise StoreError(
+            f"{self.url}/{location} cannot be written: {ATTEMPTS} times another writer was faster"
+        )
+
+    def table(self, location: str, version: int | None = None) -> DeltaTable:
+        """The table as it is now, or was at `version`.
+
+        Raises:
+            NoSuchTable: nothing has been written there, or not that version.
+
+        """
+        with translated(f"{self.url}/{location}"):
+            return DeltaTable(self._uri(location), version=version, storage_options=self._options())
+
+    def dataset(self, location: str, version: int | None = None) -> pyarrow.dataset.Dataset:
+        """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
+        delta = self.table(location, version)
+        with translated(f"{self.url}/{location}"):
+            return delta.to_pyarrow_dataset()
+
+    def units(self, location: str) -> dict[str, str | None]:
+        """Each column's unit, None where none was given; nothing where there is no table yet."""
+        try:
+            delta = self._open.get(location) or self.table(location)
+        except NoSuchTable:
+            return {}
+        return {field.name: field.metadata.get("unit") for field in delta.schema().fields}
+
+    # --- inside
+
+    def _about(self, wanted: About) -> About:
+        """What the store is; a new one is probed first."""
+        data = self.objects.read(_ABOUT)
+        if data is None:
+            if self.folder is None and wanted.several_writers:
+                probe(self.objects)
+            if self.objects.create(_ABOUT, msgspec.json.encode(wanted)) and self.folder is not None:
+                durable.synchronise([self.folder / _ABOUT])
+            data = self.objects.read(_ABOUT) or b""
+        try:
+            about = msgspec.json.decode(data, type=About)
+        except msgspec.DecodeError as error:
+            raise StoreError(f"{self.url}/{_ABOUT} is damaged: {error}") from error
+        if about.format != FORMAT:
+            raise StoreError(f"the store {self.url} has format {about.format}; this GWRMS reads {FORMAT}")
+        return about
+
+    def _uri(self, location: str) -> str:
+        return f"{self.url}/{location}"
+
+    def _options(self) -> dict[str, str]:
+        return {} if self.folder is not None else s3_options()
+
+    def _writable(self, table: Table, location: str) -> DeltaTable:
+        delta = self._open.get(location)
+        if delta is not None:
+            return delta
+        try:
+            return self.table(location)
+        except NoSuchTable:
+            return self._create(table, location)
+
+    def _create(self, table: Table, location: str) -> DeltaTable:
+        delta = DeltaTable.create(
+            self._uri(location),
+            table.schema,
+            mode="ignore",
+            partition_by=list(table.partition_by),
+            description=table.meaning,
+            configuration={"delta.dataSkippingNumIndexedCols": str(table.indexed)},
+            storage_options=self._options(),
+        )
+        if self.folder is not None:
+            durable.synchronise((self.folder / location / durable.LOG).iterdir())
+        return delta
+
+    def _write(
+        self,
+        delta: DeltaTable,
+        schema: pa.Schema,
+        batches: Iterator[pa.RecordBatch],
+        transaction: Transaction,
+    ) -> None:
+        write_deltalake(
+            delta,
+            pa.RecordBatchReader.from_batches(schema, batches),
+            mode="append",
+            schema_mode="merge",
+            writer_properties=writer_properties(schema),
+            commit_properties=CommitProperties(app_transactions=[transaction]),
+            post_commithook_properties=_NO_HOOKS,
+        )
+
+    def _settle(self, location: str, delta: DeltaTable, writer: str, sequence: int) -> None:
+        """Make the commit last, and now and then spare readers the log before it."""
+        checkpoint = delta.version() % CHECKPOINT_EVERY == 0
+        if checkpoint:
+            delta.create_checkpoint()
+        if self.folder is not None:
+            durable.make_last(self.folder / location, writer, sequence)
+            if checkpoint:
+                log = self.folder / location / durable.LOG
+                durable.synchronise([*log.glob("*.checkpoint.parquet"), log / "_last_checkpoint"])
+
+
+def writer_properties(schema: pa.Schema) -> WriterProperties:
+    """How Parquet is written: measured in docs/adr/0008."""
+    plain = ColumnProperties(dictionary_enabled=False, statistics_enabled="CHUNK")
+    split = ColumnProperties(
+        dictionary_enabled=False, statistics_enabled="CHUNK", encoding="BYTE_STREAM_SPLIT"
+    )
+    numbers: dict[str, Any] = {field.name: split for field in schema if pa.types.is_float64(field.type)}
+    return WriterProperties(
+        compression="ZSTD",
+        compression_level=1,
+        max_row_group_size=ROW_GROUP,
+        default_column_properties=plain,
+        column_properties=numbers,
+    )
+
+
+def _checked(url: str) -> str:
+    """The URL without a slash at its end.
+
+    Raises:
+        StoreError: it is of another kind, or has credentials in it.
+
+    """
+    parts = urlsplit(url)
+    if parts.username or parts.password or parts.query:
+        raise StoreError("a store's URL has no keys in it: give them by the AWS environment or profile")
+    if parts.scheme not in {"file", "s3"} or (parts.scheme == "file" and parts.netloc):
+        raise StoreError(f"{url!r} is no store: use file:///folder or s3://bucket/prefix")
+    return url.rstrip("/")

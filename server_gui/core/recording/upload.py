@@ -1,0 +1,52 @@
+"""One frozen segment into the store, exactly once, whatever happened before."""
+
+import functools
+from collections import defaultdict
+from collections.abc import Iterator
+
+import pyarrow as pa
+
+from ml.store.store import Store
+from ml.store.tables import TABLES, TELEMETRY
+from server_gui.core.recording.columns import Columns
+from server_gui.core.recording.segment import Segment
+
+
+def upload(segment: Segment, spool: str, store: Store) -> None:
+    """Append everything in the segment to the store's tables.
+
+    Its number is the transaction's version in each table that it touches, and `spool` the writer's name.
+    Interrupted anywhere, it is simply called again.
+
+    Raises:
+        StoreError: it is not known what of it is in the store.
+
+    """
+    for location, robots in _robots(segment, store).items():
+        _telemetry(segment, spool, store, location, robots)
+    found = defaultdict(list)
+    for number, record in enumerate(segment.records()):
+        origin = {"spool": spool, "batch": segment.number, "number": number}
+        found[record.table].append(record.fields | origin)
+    for name, rows in found.items():
+        data = TABLES[name].rows(rows)
+        again = functools.partial(data.to_reader, None)
+        store.append(TABLES[name], name, data.schema, again, spool, segment.number)
+
+
+def _robots(segment: Segment, store: Store) -> dict[str, set[str]]:
+    """The robots whose rows go to each of the telemetry's locations."""
+    robots = defaultdict(set)
+    for robot, _ in segment.layouts():
+        robots[TELEMETRY.location(robot, store.about.shards)].add(robot)
+    return robots
+
+
+def _telemetry(segment: Segment, spool: str, store: Store, location: str, robots: set[str]) -> None:
+    layouts = (layout for robot, layout in segment.layouts() if robot in robots)
+    columns = Columns(layouts, store.units(location))
+
+    def batches() -> Iterator[pa.RecordBatch]:
+        return columns.batches(run for run in segment.runs() if run.robot in robots)
+
+    store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)

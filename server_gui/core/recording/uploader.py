@@ -1,0 +1,116 @@
+"""The uploader: a thread that brings frozen segments into the store, again and again until they are there."""
+
+import logging
+import sqlite3
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, Self
+
+from gateway.client.backoff import Backoff
+from ml.store.errors import StoreError
+from ml.store.store import Store
+from server_gui.core.recording.errors import RecordingError
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import upload
+
+log = logging.getLogger(__name__)
+
+LOOK_S: Final = 1.0  # between looks at the spool
+LONGEST_S: Final = 60.0  # between attempts on a store that cannot be reached
+
+
+@dataclass(frozen=True, slots=True)
+class UploaderState:
+    """How uploading goes; `problem` says in words why it does not, and ends with the next success."""
+
+    uploaded: int = 0  # segments since the start
+    waiting: int = 0  # segments that are frozen and not in the store
+    backlog_bytes: int = 0  # with what is being written
+    upload_s: float = 0.0  # how long the newest one took
+    problem: str | None = None
+
+
+class Uploader:
+    """Empties a spool into a store; use it as a context manager, which joins its thread.
+
+    `wanted` is asked before each segment: uploading may wait for a quiet hour, or for `now`. The store is
+    made by `connect` in the uploader's thread, and anew after whatever went wrong.
+    """
+
+    def __init__(
+        self, spool: Spool, connect: Callable[[], Store], wanted: Callable[[], bool] = lambda: True
+    ) -> None:
+        self.state = UploaderState()
+        self._spool = spool
+        self._connect = connect
+        self._wanted = wanted
+        self._store: Store | None = None
+        self._ending = threading.Event()
+        self._asked = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="uploader")
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End after the segment that is being uploaded, and join the thread. Idempotent."""
+        self._ending.set()
+        self._asked.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def now(self) -> None:
+        """Upload everything that waits, wanted or not."""
+        self._asked.set()
+
+    # --- the uploader's thread
+
+    def _run(self) -> None:
+        backoff = Backoff(LOOK_S, LONGEST_S)
+        asked = False
+        while not self._ending.is_set():
+            asked = asked or self._asked.is_set()
+            self._asked.clear()
+            if self._empty(asked):
+                asked = False
+                backoff.reset()
+            self._asked.wait(backoff.next_s())
+
+    def _empty(self, asked: bool) -> bool:
+        """Upload what waits; False where that failed."""
+        waiting = self._spool.waiting()
+        self._tell(waiting)
+        for done, number in enumerate(waiting, 1):
+            if self._ending.is_set() or not (asked or self._wanted()):
+                return True
+            try:
+                self._upload(number)
+            except (StoreError, RecordingError, sqlite3.Error) as error:
+                self._store = None
+                log.warning("upload of batch %d: %s", number, error)
+                self.state = replace(self.state, problem=str(error))
+                return False
+            self._tell(waiting[done:])
+        return True
+
+    def _upload(self, number: int) -> None:
+        began_s = time.monotonic()
+        self._store = self._store or self._connect()
+        segment = self._spool.read(number)
+        try:
+            upload(segment, self._spool.id, self._store)
+        finally:
+            segment.close()
+        self._spool.uploaded(number)
+        took_s = time.monotonic() - began_s
+        self.state = replace(self.state, uploaded=self.state.uploaded + 1, upload_s=took_s, problem=None)
+
+    def _tell(self, waiting: list[int]) -> None:
+        backlog = self._spool.backlog_bytes()
+        self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog)

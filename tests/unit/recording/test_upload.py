@@ -1,0 +1,181 @@
+"""From the spool to the store: every row once, as it was; problems are told, and end."""
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from gateway.messages import ResourceSnapshot
+from ml.store import Store, StoreUnreachable
+from ml.store.tables import TELEMETRY
+from server_gui.core.recording.columns import Columns
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.records import Facts, label, prediction
+from server_gui.core.recording.rows import Layout
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import upload
+from server_gui.core.recording.uploader import Uploader
+from tests.unit.recording.robots import CHANNELS, batch, description, stamp_ns, value
+
+WAIT_S = 30.0
+HERE = TELEMETRY.location("exo-01", 1)
+
+
+@pytest.fixture
+def spool(tmp_path: Path) -> Iterator[Spool]:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as opened:
+        yield opened
+
+
+def upload_all(spool: Spool, store: Store) -> None:
+    for number in spool.waiting():
+        segment = spool.read(number)
+        upload(segment, spool.id, store)
+        segment.close()
+
+
+def test_every_row_arrives_with_its_values_units_and_times(spool: Spool, store_url: str) -> None:
+    store = Store(store_url)
+    with Recorder(spool) as recorder:
+        recorder.describe("exo-01", description("exo-01"))
+        for seq in range(30):
+            sent = batch(seq, rows=2, missing=CHANNELS[1:2] if seq % 2 else ())
+            recorder.record("exo-01", 7, sent, clock_offset_ns=0)
+    upload_all(spool, store)
+    upload_all(spool, Store(store_url))  # all of it again
+    found = store.dataset(HERE).to_table()
+    assert found.num_rows == 60
+    for row in found.to_pylist():
+        seq, number = row["seq"], row["row"]
+        assert row["robot"] == "exo-01"
+        assert row["stream"] == 7
+        assert row["stamp_ns"] == stamp_ns(seq, number)
+        assert row["left_knee.position"] == value(seq, number, 0)
+        assert row["left_knee.velocity"] == (None if seq % 2 else value(seq, number, 1))
+    assert store.units(HERE)["left_knee.velocity"] == "rad/s"
+    between = found.column("utc").to_pylist()
+    apart = {(b - a).total_seconds() for a, b in zip(between, between[2:], strict=False)}
+    assert max(apart) == pytest.approx(0.01, abs=0.005)  # UTC goes as the robot's clock does
+
+
+def test_every_table_gets_its_rows_once(spool: Spool, store_url: str, snapshot: ResourceSnapshot) -> None:
+    store = Store(store_url)
+    with Recorder(spool) as recorder:
+        session = recorder.begin("exo-01", Facts(operator="Ada", units={"left_knee.position": "rad"}))
+        recorder.resources("exo-01", snapshot)
+        recorder.mark("exo-01", "stumbled")
+        recorder.journal(
+            "exo-01", [{"n": 1, "hash": "h", "utc_ns": 5_000, "who": "ada", "what": "write", "to": 3}]
+        )
+        recorder.add(label("exo-01", session, "walking", 1_000, 2_000, "ada"))
+        recorder.add(prediction("exo-01", session, 1_000, 7, "gait-3", {"walking": 0.75, "standing": 0.25}))
+    for _ in range(2):
+        upload_all(spool, store)
+    rows = {
+        name: store.dataset(name).to_table().to_pylist()
+        for name in ("sessions", "resources", "events", "journal", "labels", "predictions")
+    }
+    assert {name: len(found) for name, found in rows.items()} == Counter(rows.keys()) + Counter(["sessions"])
+    assert [row["ended"] is None for row in rows["sessions"]] == [True, False]
+    assert rows["resources"][0]["processes"][0]["memory_bytes"] == 4096
+    assert rows["events"][0]["text"] == "stumbled"
+    assert '"to":3' in rows["journal"][0]["entry"]
+    assert rows["labels"][0]["ended"].microsecond == 2
+    assert (rows["predictions"][0]["label"], rows["predictions"][0]["probability"]) == ("walking", 0.75)
+    assert {row["spool"] for found in rows.values() for row in found} == {spool.id}
+
+
+@pytest.fixture
+def snapshot() -> ResourceSnapshot:
+    found = {
+        "stamp_ns": 9,
+        "cpu": {"percent": 12.5, "per_core": [20.0, None], "load": [0.1, 0.2, 0.3]},
+        "memory": {"total": 10, "available": 6, "used": 4, "swap_used": 0},
+        "gateway": {"cpu_percent": None, "rss_bytes": 9000},
+        "processes": [{"pid": 1, "name": "init", "cpu_percent": 0.5, "memory_bytes": 4096}],
+    }
+    return msgspec.convert(found, ResourceSnapshot)
+
+
+def test_robots_are_spread_over_the_shards(spool: Spool, folder_url: str) -> None:
+    store = Store(folder_url, shards=3)
+    robots = [f"exo-{number}" for number in range(12)]
+    with Recorder(spool) as recorder:
+        for robot in robots:
+            recorder.record(robot, 1, batch(0))
+    upload_all(spool, store)
+    found = {
+        location: store.dataset(location).to_table(columns=["robot"]).column(0).to_pylist()
+        for location in TELEMETRY.locations(3)
+    }
+    assert sorted(robot for robots in found.values() for robot in robots) == sorted(robots)
+    assert all(TELEMETRY.location(robot, 3) == location for location in found for robot in found[location])
+
+
+def test_values_in_different_units_never_share_a_column(spool: Spool, folder_url: str) -> None:
+    store = Store(folder_url)
+    with Recorder(spool) as recorder:
+        recorder.describe("exo-01", description("exo-01"))
+        recorder.record("exo-01", 1, batch(0))
+    upload_all(spool, store)
+    columns = Columns([Layout(("left_knee.position", "left_knee.torque"), ("°", "N·m"))], store.units(HERE))
+    assert {"left_knee.position@°", "left_knee.torque"} <= set(columns.schema.names)
+    assert "left_knee.position" not in columns.schema.names
+
+
+def test_the_uploader_empties_the_spool(spool: Spool, store_url: str) -> None:
+    with Uploader(spool, lambda: Store(store_url)) as uploader:
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(0))
+        uploader.now()
+        until(lambda: uploader.state.uploaded == 1)
+        until(lambda: uploader.state.waiting == 0)
+        assert uploader.state.problem is None
+    assert spool.waiting() == []
+    assert Store(store_url).dataset(HERE).count_rows() == 1
+
+
+def test_a_store_that_cannot_be_reached_is_told_and_tried_again(spool: Spool, folder_url: str) -> None:
+    reachable = threading.Event()
+
+    def connect() -> Store:
+        if not reachable.is_set():
+            raise StoreUnreachable("no network")
+        return Store(folder_url)
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+    with Uploader(spool, connect) as uploader:
+        until(lambda: uploader.state.problem == "no network")
+        assert spool.waiting() == [1]
+        reachable.set()
+        uploader.now()
+        until(lambda: uploader.state.uploaded == 1)
+        assert uploader.state.problem is None
+
+
+def test_nothing_is_uploaded_before_it_is_wanted_unless_asked(spool: Spool, folder_url: str) -> None:
+    asked = threading.Event()
+
+    def wanted() -> bool:
+        asked.set()
+        return False
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+    with Uploader(spool, lambda: Store(folder_url), wanted) as uploader:
+        assert asked.wait(WAIT_S)
+        assert spool.waiting() == [1]
+        uploader.now()
+        until(lambda: uploader.state.uploaded == 1)
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < deadline_s, "it did not happen"
+        time.sleep(0.01)
