@@ -4,7 +4,7 @@ import bisect
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import msgspec
 
@@ -70,10 +70,16 @@ class Cells:
                 f"the calibration says nothing of cell {chosen.index(None)}: add [cell.N] or [default]"
             )
         self._laws = [_law(cell) for cell in cells]
-        self._ends = [_end(cell) for cell in cells]
+        self._lines = [_line(cell) for cell in cells] if all(cell.law == "linear" for cell in cells) else None
+        ends = [_end(cell) for cell in cells]
+        self._ends = ends if any(end is not None for end in ends) else []
 
     def pressures(self, counts: Sequence[float | None]) -> tuple[float | None, ...]:
         """Pa of each cell; `None` for a cell without counts."""
+        if self._lines is not None and None not in counts:
+            pairs = zip(cast("Sequence[float]", counts), self._lines, strict=True)
+            felt = [slope * count + offset for count, (slope, offset) in pairs]
+            return tuple([pascal if pascal > 0.0 else 0.0 for pascal in felt])
         return tuple(
             None if count is None else law(count) for count, law in zip(counts, self._laws, strict=True)
         )
@@ -81,7 +87,8 @@ class Cells:
     def saturated(self, counts: Sequence[float | None]) -> bool:
         """Whether a cell is at its end, so that it may carry more than it says."""
         return any(
-            count is not None and reached(count) for count, reached in zip(counts, self._ends, strict=True)
+            count is not None and reached is not None and reached(count)
+            for count, reached in zip(counts, self._ends, strict=False)
         )
 
 
@@ -110,17 +117,26 @@ def _law(cell: CellCalibration) -> Pressure:
         return lambda raw: _interpolated(cell.table, rising(raw) - tare)
     if cell.law == "power":
         return lambda raw: gain * max(0.0, rising(raw) - tare) ** exponent
-    if cell.polarity == "rising":
-        return lambda raw: gain * max(0.0, raw - tare)
-    return lambda raw: gain * max(0.0, rising(raw) - tare)
+    slope, offset = _line(cell)
+    return lambda raw: max(0.0, slope * raw + offset)
 
 
-def _end(cell: CellCalibration) -> Callable[[float], bool]:
+def _line(cell: CellCalibration) -> tuple[float, float]:
+    """Slope (Pa a raw count) and offset (Pa) of a linear cell, where it is loaded."""
+    if cell.polarity == "falling":
+        return -cell.gain, cell.gain * ((cell.full_scale or 0.0) - cell.tare)
+    return cell.gain, -cell.gain * cell.tare
+
+
+def _end(cell: CellCalibration) -> Callable[[float], bool] | None:
+    """Whether a raw count is at the cell's end; `None` for a cell whose end nobody knows."""
     rising = loaded_counts(cell)
     ends = [] if cell.saturation is None else [cell.saturation]
     if cell.table:
         ends.append(cell.table[-1][0] + cell.tare)
-    end = min(ends, default=float("inf"))
+    if not ends:
+        return None
+    end = min(ends)
     return lambda raw: rising(raw) >= end
 
 

@@ -5,7 +5,7 @@ import sys
 import time
 
 from tests.unit.imu.encode import witmotion
-from tests.unit.insole.encode import CALIBRATED, RIGHT, cobs_frame
+from tests.unit.insole.encode import RIGHT, cobs_frame
 
 RATE_HZ = 200
 
@@ -16,7 +16,7 @@ def main() -> None:
     began = time.monotonic()
     for number in range(RATE_HZ * seconds):
         time.sleep(max(0.0, began + number / RATE_HZ - time.monotonic()))
-        for descriptor, flags in ((left, CALIBRATED), (right, CALIBRATED | RIGHT)):
+        for descriptor, flags in ((left, 0), (right, RIGHT)):
             sent_us = time.monotonic_ns() // 1000 & 0xFFFFFFFF
             cells = [sent_us & 0xFFFF, sent_us >> 16, *(100 + (number + cell) % 50 for cell in range(14))]
             os.write(descriptor, cobs_frame(cells, flags=flags, sequence=number, time_us=number * 5000))

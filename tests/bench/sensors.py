@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module, util
 from pathlib import Path
@@ -26,8 +26,10 @@ from drivers.insole import layout as layouts
 from drivers.insole.cobs import InsoleCobsParser
 from drivers.insole.device import Insole, pair
 from drivers.insole.formats import parser_maker
+from drivers.insole.layout import FEET
 from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
+from drivers.parsing import Counters
 from drivers.samples import Sample
 from tests.unit.imu import encode as imu
 from tests.unit.insole.encode import cobs_frame, eighteen_cell_frame
@@ -36,6 +38,7 @@ FRAMES = 4000
 CHUNK = 64  # bytes a read, as USB adapters give them
 ROUNDS = 5
 SECONDS = 10
+PASCAL_PER_COUNT = 100.0
 MOST_CPU, MOST_LATENCY_MS = 0.03, 2.0
 
 Read = Callable[[bytes], int]
@@ -49,13 +52,19 @@ def main() -> int:
         costs = [_cost(data, read) for read in (ours, *others)]
         cells = [f"{cost:10.2f}" if cost is not None else f"{'–':>10}" for cost in costs]
         sys.stdout.write(f"{name:<14}{''.join(cells)}\n")
-    parsing, _ = _live(_lines)
-    whole, latencies = _live(_components)
-    p50, p99 = (latencies[round(share * (len(latencies) - 1))] for share in (0.5, 0.99))
     sys.stdout.write(
-        f"\ntwo insoles and an IMU at 200 Hz over pseudo-terminals, {SECONDS} s, share of one core:\n"
-        f"  reading and parsing                       {parsing:.2%} (limit {MOST_CPU:.0%})\n"
-        f"  … and clocks, pressure, force, tilt, checks {whole:.2%}\n"
+        f"\ntwo 16-cell insoles and an IMU at 200 Hz over pseudo-terminals, {SECONDS} s each, "
+        "share of one core:\n"
+    )
+    reading, parsing, whole = (_live(make) for make in (_reading, _parsing, _components))
+    latencies: list[float] = []
+    _live(_components, _Latencies(latencies))
+    p50, p99 = (sorted(latencies)[round(share * (len(latencies) - 1))] for share in (0.5, 0.99))
+    sys.stdout.write(
+        f"  waking up and reading                      {reading:.2%}\n"
+        f"  … and parsing                              {parsing:.2%}  (limit {MOST_CPU:.0%})\n"
+        f"  … and clock, calibration, force, centre of\n"
+        f"    pressure, tilt, checks, latest values    {whole:.2%}\n"
         f"bytes → latest value: p50 {p50:.2f} ms, p99 {p99:.2f} ms of {len(latencies)} "
         f"(limit {MOST_LATENCY_MS} ms)\n"
     )
@@ -278,51 +287,75 @@ class _Nobody:
     def disconnected(self) -> None: ...
 
 
-Live = list[Insole | Imu] | list[_Nobody]
-Make = Callable[[list[str], Callable[[Sample], None]], Live]
+class _Nothing:
+    """A parser that finds nothing."""
+
+    def __init__(self) -> None:
+        self.counters = Counters()
+
+    def feed(self, data: bytes) -> list[object]:
+        return []
+
+    def finish(self) -> list[object]:
+        return []
 
 
-def _lines(ports: list[str], _: Callable[[Sample], None]) -> Live:
+class _Latencies:
+    """Listens to insoles whose first two cells say when their frame was sent (µs), in ms."""
+
+    def __init__(self, found: list[float]) -> None:
+        self._found = found
+
+    def __call__(self, sample: Sample) -> None:
+        now_us = time.monotonic_ns() // 1000 & 0xFFFFFFFF
+        low, high = sample.values[3] or 0.0, sample.values[4] or 0.0
+        sent_us = round(low / PASCAL_PER_COUNT) | round(high / PASCAL_PER_COUNT) << 16
+        self._found.append(((now_us - sent_us) & 0xFFFFFFFF) / 1e3)
+
+
+Live = Sequence[Insole | Imu | _Nobody]
+Make = Callable[[Path, list[str]], Live]
+
+
+def _reading(_: Path, ports: list[str]) -> Live:
+    return [_Nobody(Line(port, 115200, "none", _Nothing)) for port in ports]
+
+
+def _parsing(_: Path, ports: list[str]) -> Live:
     left, right, trunk = ports
     insoles = [Line(port, 230400, "insole-cobs", InsoleCobsParser) for port in (left, right)]
     return [*map(_Nobody, insoles), _Nobody(Line(trunk, 115200, "witmotion", WitmotionParser))]
 
 
-def _components(ports: list[str], note: Callable[[Sample], None]) -> Live:
-    sides = zip(("left", "right"), ports, strict=False)
-    insoles = [Insole(f"{side}_insole", InsoleSettings(port=port)) for side, port in sides]
-    pair(insoles)
-    for insole in insoles:
-        insole.latest.subscribe(note)
-    components: list[Insole | Imu] = [*insoles, Imu("trunk", ImuSettings(port=ports[2]))]
-    return components
+def _components(folder: Path, ports: list[str]) -> Live:
+    (folder / "cells.toml").write_text(f"[default]\ngain = {PASCAL_PER_COUNT}\n", encoding="ascii")
+    settings = [InsoleSettings(port=port, calibration="cells.toml") for port in ports[:2]]
+    left, right = (
+        Insole(f"{side}_insole", one, beside=folder) for side, one in zip(FEET, settings, strict=True)
+    )
+    pair([left, right])
+    return [left, right, Imu("trunk", ImuSettings(port=ports[2]))]
 
 
-def _live(make: Make) -> tuple[float, list[float]]:
-    """CPU share of the serial threads, and sorted latencies in ms, with real ports and threads."""
-    latencies: list[float] = []
-
-    def note(sample: Sample) -> None:
-        now_us = time.monotonic_ns() // 1000 & 0xFFFFFFFF
-        low, high = sample.values[3] or 0.0, sample.values[4] or 0.0
-        latencies.append(((now_us - (round(low / 100) | round(high / 100) << 16)) & 0xFFFFFFFF) / 1e3)
-
-    with tempfile.TemporaryDirectory() as folder, _terminals(Path(folder)) as ports:
-        users = make([path for _, path in ports], note)
+def _live(make: Make, listener: Callable[[Sample], None] | None = None) -> float:
+    """CPU share of the serial threads, with real ports and threads."""
+    with tempfile.TemporaryDirectory() as name, _terminals(Path(name)) as ports:
+        users = make(Path(name), [path for _, path in ports])
         for user in users:
+            if listener is not None and isinstance(user, Insole):
+                user.latest.subscribe(listener)
             user.start()
         try:
-            spent = _spent(users, [master for master, _ in ports])
+            return _spent(users, [master for master, _ in ports]) / SECONDS
         finally:
             for user in users:
                 user.stop()
-    return spent / SECONDS, sorted(latencies)
 
 
 def _spent(users: Live, masters: list[int]) -> float:
     """CPU seconds of the serial threads while the sender sends."""
     deadline = time.monotonic() + 10
-    while any(user.line.problem(time.monotonic_ns()) for user in users):
+    while any("opened" in (user.line.problem(time.monotonic_ns()) or "") for user in users):
         if time.monotonic() > deadline:
             raise RuntimeError("the pseudo-terminals did not open")
         time.sleep(0.01)
