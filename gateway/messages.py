@@ -286,8 +286,8 @@ class MemoryUse(Struct, frozen=True):
     swap_used: int
 
 
-class ProcessUse(Struct, frozen=True):
-    """One process; `cpu_percent` is of one core, `memory_bytes` its resident set."""
+class ProcessUse(Struct, frozen=True, gc=False):  # there are many of them
+    """One process; `name` is the kernel's, `cpu_percent` of one core, `memory_bytes` its resident set."""
 
     pid: int
     name: str
@@ -317,13 +317,24 @@ class NetworkUse(Struct, frozen=True):
     sent_bytes_per_s: float | None
 
 
+class Throttling(Struct, frozen=True):
+    """How far the cores are held back, as far as the system tells."""
+
+    events: int | None  # times that a core was too hot since boot, summed over the cores
+    cooling: dict[str, float]  # cooling device of the processor → share of the most that it can hold back
+    frequency: list[float | None]  # of each group of cores that share one: share of its highest
+
+
 class KernelFacts(Struct, frozen=True):
-    """The operating system's kernel."""
+    """The operating system's kernel, and its clocks; `None` is not known."""
 
     system: str
     release: str
     version: str
     preempt_rt: bool | None
+    clocksource: str | None = None  # what the monotonic clock counts by
+    monotonic_resolution_ns: int | None = None
+    utc_synchronised: bool | None = None
 
 
 class ResourceSnapshot(Struct, frozen=True):
@@ -337,6 +348,7 @@ class ResourceSnapshot(Struct, frozen=True):
     disk: DiskUse | UnsetType = UNSET
     network: NetworkUse | UnsetType = UNSET
     thermal: dict[str, float | None] | UnsetType = UNSET  # sensor → °C
+    throttling: Throttling | UnsetType = UNSET  # comes with `thermal`
     kernel: KernelFacts | UnsetType = UNSET
 
 

@@ -92,7 +92,7 @@ def _facts(snapshot: ResourceSnapshot) -> Iterator[tuple[str, str]]:
     yield "memory", f"{used} used of {total}, {available} available, swap {size(memory.swap_used)}"
     yield "gateway", f"{percent(snapshot.gateway.cpu_percent)} of a core, {size(snapshot.gateway.rss_bytes)}"
     # What --include asked for, as the robot names it.
-    for name in ("disk", "network", "thermal", "kernel"):
+    for name in ("disk", "network", "thermal", "throttling", "kernel"):
         found = getattr(snapshot, name)
         if found is not msgspec.UNSET:
             known = msgspec.to_builtins(found).items()

@@ -101,13 +101,18 @@ class ResourceModule:
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.snapshot": self._snapshot}
 
     def start(self) -> None:
-        from gateway.modules.host import Host  # psutil is loaded with the first question
+        from gateway.modules.host import Host  # how it measures is loaded with the first question
 
         self._host = Host()
         self._source = HostSource(self._context, self._host)
 
     def stop(self) -> None:
         self._source.close()
+        self._host.close()
+
+    def meter(self) -> "Meter":
+        """For another asker, whose percentages are since its own last look."""
+        return self._host.meter()
 
     def selections(self) -> list[Selection]:
         return [whole(self._source)]
@@ -116,7 +121,7 @@ class ResourceModule:
         """A snapshot whose percentages are since this connection last called `method`."""
         meter = self._meters.get((session, method))
         if meter is None:
-            meter = self._meters[session, method] = self._host.meter()
+            meter = self._meters[session, method] = self.meter()
             session.on_close(lambda: self._forget(session, method))
         return meter.snapshot(params)
 
