@@ -184,3 +184,96 @@ def test_a_write_may_be_given_more_time_than_others(worker: SdoWorker, device: D
     later.join()
     assert device.commands() == ["23 1010", "23 1010"]  # the second is the timer's
     assert device.channel.counters.timeouts == 0
+
+
+STOP = bytes.fromhex("2B 40 60 00 02 00 00 00")
+
+
+def stop(worker: SdoWorker, *, wake: bool = True) -> Future[None]:
+    def job(sdo: SdoChannel) -> None:
+        sdo.download(0x6040, 0, b"\x02\x00")
+
+    return worker.submit(job, urgent=True, ahead=STOP, wake=wake)
+
+
+def test_a_request_ahead_is_sent_by_who_asks_and_only_once(worker: SdoWorker, device: Device) -> None:
+    device.deaf_to[0x1000] = 1
+    device.channel.timeout_s = WAIT_S
+    slow = upload(worker, 0x1000)
+    assert device.asked.wait(WAIT_S)
+    stopped = stop(worker, wake=False)
+    assert device.commands()[:3] == [
+        "40 1000",
+        "80 1000",
+        "2B 6040",
+    ]  # sent, woken or not
+    worker.wake()
+    stopped.result(WAIT_S)
+    assert slow.result(WAIT_S)[:2] == b"\x00\x10"
+    assert device.commands() == ["40 1000", "80 1000", "2B 6040", "40 1000"]
+
+
+def test_the_answer_to_a_request_ahead_is_not_lost_to_the_job_it_interrupts(
+    worker: SdoWorker, device: Device
+) -> None:
+    """The device answers before the interrupted job looks into its inbox."""
+    device.channel.timeout_s = WAIT_S
+    for _ in range(20):
+        device.deaf_to[0x1000] = 1
+        device.asked.clear()
+        slow = upload(worker, 0x1000)
+        assert device.asked.wait(WAIT_S)
+        stop(worker).result(WAIT_S)
+        slow.result(WAIT_S)
+    assert device.channel.counters.timeouts == 0
+    assert device.commands().count("2B 6040") == 20
+
+
+def test_nothing_of_the_interrupted_job_follows_a_request_ahead(worker: SdoWorker, device: Device) -> None:
+    """Between its requests a job is not waiting: its next one must not go out behind a stop."""
+    begun, go_on = threading.Event(), threading.Event()
+
+    def job(sdo: SdoChannel) -> None:
+        if not begun.is_set():
+            begun.set()
+            assert go_on.wait(WAIT_S)
+        sdo.upload(0x1001, 0)
+
+    running = worker.submit(job)
+    assert begun.wait(WAIT_S)
+    stopped = stop(worker)
+    go_on.set()
+    stopped.result(WAIT_S)
+    running.result(WAIT_S)
+    assert device.commands() == ["2B 6040", "40 1001"]
+
+
+def test_a_second_urgent_job_does_not_disturb_the_first(worker: SdoWorker, device: Device) -> None:
+    device.deaf_to[0x6041] = 1
+    device.channel.timeout_s = 0.2
+    first = upload(worker, 0x6041, urgent=True)
+    assert device.asked.wait(WAIT_S)
+    stop(worker).result(WAIT_S)
+    first.result(WAIT_S)
+    assert device.commands() == ["40 6041", "80 6041", "40 6041", "2B 6040"]
+
+
+def test_a_request_ahead_of_a_worker_that_ended_is_not_taken_for_sent_later(device: Device) -> None:
+    worker = SdoWorker(device.channel)
+    worker.start()
+    device.deaf_to[0x6040] = 1
+    device.channel.timeout_s = WAIT_S
+    left = stop(worker)
+    assert device.asked.wait(WAIT_S)
+    worker.stop()
+    with pytest.raises(Unavailable):
+        left.result(WAIT_S)
+    worker.start()
+    stop(worker).result(WAIT_S)
+    worker.stop()
+    assert device.commands().count("2B 6040") == 2
+
+
+def test_what_was_written_last_is_known(worker: SdoWorker, device: Device) -> None:
+    worker.submit(lambda sdo: sdo.download(0x6065, 0, b"\x01\x02")).result(WAIT_S)
+    assert device.channel.written == {(0x6065, 0): b"\x01\x02"}
