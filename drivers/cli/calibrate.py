@@ -6,17 +6,21 @@ import math
 import sys
 import threading
 import time
+import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import msgspec
 
+from drivers.bus.bus import CanBus
+from drivers.bus.settings import CanSettings
 from drivers.cli.sensor import run_parsed
-from drivers.errors import Unavailable
+from drivers.errors import SettingsError, Unavailable
 from drivers.imu import zero
+from drivers.imu.build import AnyImu, build_imu
 from drivers.imu.device import Imu
 from drivers.imu.formats import FORMATS as IMU_FORMATS
-from drivers.imu.settings import ImuSettings
+from drivers.imu.settings import ImuSettings, kind_of
 from drivers.insole import fit as fitting
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import CellCalibration, loaded_counts
@@ -65,7 +69,8 @@ def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Names
 def _imu_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
         "Takes the present posture as upright and writes it. Stand upright and still; name the file in "
-        "[imu.NAME] as `zero`."
+        "[imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], "
+        "also for an IMU on a CAN bus."
     )
     parser.add_argument(
         "--format", choices=tuple(IMU_FORMATS), default="witmotion", help="default: %(default)s"
@@ -131,9 +136,7 @@ def _insole(options: argparse.Namespace) -> int:
 
 
 def _imu(options: argparse.Namespace) -> int:
-    settings = {"port": options.port, "baudrate": options.baud, "format": options.format}
-    settings |= {"mounting": options.mounting} | ({"axes": options.axes} if options.axes else {})
-    imu = Imu("trunk", msgspec.convert(settings, ImuSettings))
+    imu = _imu_in_file(options.port) or _imu_on_port(options)
     imu.start()
     try:
         threading.Event().wait(AVERAGE_S)
@@ -146,6 +149,35 @@ def _imu(options: argparse.Namespace) -> int:
     angle = math.degrees(2 * math.acos(min(1.0, abs(measured[0]))))
     _say(f"upright is {angle:.1f}° from how the IMU is mounted")
     return _write(options.write, zero.text(measured, _now()))
+
+
+def _imu_on_port(options: argparse.Namespace) -> Imu:
+    settings = {"port": options.port, "baudrate": options.baud, "format": options.format}
+    settings |= {"mounting": options.mounting} | ({"axes": options.axes} if options.axes else {})
+    return Imu("trunk", msgspec.convert(settings, ImuSettings))
+
+
+def _imu_in_file(where: str) -> AnyImu | None:
+    """The IMU at `ROBOT.toml:NAME`, with no zero yet; `None` for a port.
+
+    Raises:
+        SettingsError: the file or its table cannot be used.
+
+    """
+    file, colon, name = where.rpartition(":")
+    if not (colon and file.endswith(".toml")):
+        return None
+    try:
+        tables = tomllib.loads(Path(file).read_text(encoding="utf-8"))
+        table = tables["imu"][name]
+        settings = msgspec.structs.replace(msgspec.convert(table, kind_of(table)), zero=None)
+        bus = table.get("bus")
+        buses = {} if bus is None else {bus: CanBus(bus, CanSettings.from_table(tables["can"][bus]))}
+    except KeyError as error:
+        raise SettingsError(f"{file} has no table of the name {error}, which [imu.{name}] needs") from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        raise SettingsError(f"{file}: {error}") from error
+    return build_imu(name, settings, buses, Path(file))
 
 
 def _average(line: Line[InsoleFrame], foot: str | None, cells: int) -> list[float]:

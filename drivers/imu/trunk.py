@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.component import Kind
-from drivers.freshness import Freshness
+from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
 from drivers.imu.formats import Conventions
 from drivers.imu.frame import ImuFrame
@@ -78,7 +78,7 @@ class TrunkImu:
     def _quality(self, now_ns: int, silence: str | None, counters: Mapping[str, int]) -> Quality:
         """`silence` is why nothing comes, in words; it matters only where nothing comes."""
         state, age_ms = self._freshness.state(now_ns)
-        problem = self.check.problem if state is State.OK else silence
+        problem = self.check.problem if state is State.OK else silence or silence_text(age_ms)
         if state is State.OK and problem is not None:
             state = State.FAULT
         return Quality(state, age_ms, problem, {**counters, "stale": self._freshness.stale})

@@ -10,10 +10,9 @@ from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.component import Component, Kind
 from drivers.errors import DriverError
-from drivers.imu.can_device import CanImu
-from drivers.imu.device import Imu
+from drivers.imu.build import build_imu
 from drivers.imu.inclinometer import Inclinometer
-from drivers.imu.settings import CanImuSettings, ImuSettings, InclinometerSettings, MountedSettings
+from drivers.imu.settings import MountedSettings
 from drivers.insole.device import Insole, line_for, pair
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.drive import JointDrive
@@ -85,15 +84,10 @@ def _insole(
 
 def _imu(robot: Robot, path: Path, name: str, settings: MountedSettings) -> Callable[[], Component]:
     def build() -> Component:
-        if isinstance(settings, ImuSettings):
-            return Imu(name, settings, path.parent)
-        if isinstance(settings, CanImuSettings):
-            return CanImu(name, settings, robot.buses[settings.bus], path.parent)
-        if not isinstance(settings, InclinometerSettings):
-            raise TypeError(f"no driver for {type(settings).__name__}")
-        description = eds.load(eds.locate(settings.eds, path), settings.node_id)
-        robot.descriptions[name] = description
-        return Inclinometer(name, settings, robot.buses[settings.bus], description, path.parent)
+        imu = build_imu(name, settings, robot.buses, path)
+        if isinstance(imu, Inclinometer):
+            robot.descriptions[name] = imu.node.description
+        return imu
 
     return build
 

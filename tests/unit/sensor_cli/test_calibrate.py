@@ -1,18 +1,21 @@
 """`gwrms calibrate`: known loads give back the gain they were made with, and nothing is written unasked."""
 
 import io
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from drivers.cli import calibrate
-from drivers.errors import Unavailable
+from drivers.errors import SettingsError, Unavailable
 from drivers.imu import zero
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import CellCalibration, Cells, load
 from drivers.insole.fit import BadFit, Load, fit, text
+from tests.unit.bus.fake_node import FakeNode
 from tests.unit.imu.encode import witmotion
+from tests.unit.imu.test_inclinometer import device as inclinometer
 from tests.unit.insole.encode import Sender
 from tests.unit.port.terminals import Terminal
 from tests.unit.sensor_cli.test_sensor import Talking
@@ -127,6 +130,39 @@ def test_zero_of_an_imu_is_written(
         assert calibrate.main(["imu", str(terminal.path), "--write", str(file)]) == 0
     assert "6.0°" in capsys.readouterr().out
     assert zero.load(file)[0] < 1.0
+
+
+def test_zero_of_an_imu_in_the_robots_file_needs_nothing_said_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(monkeypatch, "y")
+    robot, file = tmp_path / "robot.toml", tmp_path / "trunk.zero.toml"
+    robot.write_text(
+        f'[can.main]\ninterface = "virtual"\nchannel = "{tmp_path}"\n'
+        '[imu.trunk]\nbus = "main"\nnode_id = 20\nzero = "trunk.zero.toml"\npoll_hz = 50\n'
+    )
+    with FakeNode(str(tmp_path), 20, inclinometer(longitudinal=600, lateral=0)):
+        assert calibrate.main(["imu", f"{robot}:trunk", "--write", str(file)]) == 0
+    assert "6.0°" in capsys.readouterr().out
+    assert math.degrees(2 * math.acos(zero.load(file)[0])) == pytest.approx(6.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (None, "No such file"),
+        ("[imu", "robot.toml: "),
+        ("[imu.other]", "no table of the name 'trunk'"),
+        ('[imu.trunk]\nbus = "main"\ncan_id = 80', "no table of the name 'can'"),
+        ('[imu.trunk]\nformat = "xsens"', "missing required field `port`"),
+    ],
+)
+def test_a_robots_file_without_the_imu_is_named(tmp_path: Path, text: str | None, says: str) -> None:
+    robot = tmp_path / "robot.toml"
+    if text is not None:
+        robot.write_text(text)
+    with pytest.raises(SettingsError, match=says):
+        calibrate.main(["imu", f"{robot}:trunk", "--write", str(tmp_path / "zero.toml")])
 
 
 def test_usage(capsys: pytest.CaptureFixture[str]) -> None:
