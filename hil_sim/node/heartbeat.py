@@ -76,15 +76,10 @@ class HeartbeatConsumer:
         self._lost.clear()
 
     def received(self, node_id: int) -> None:
-        timer = self._timers.pop(node_id, None)
-        if timer is not None:
-            timer.cancel()
+        self._forget(node_id)
         time_ns = self.times_ns().get(node_id)
         if time_ns is not None:
             self._timers[node_id] = self._clock.after(time_ns, lambda: self._expire(node_id))
-        if node_id in self._lost:
-            self._lost.discard(node_id)
-            self._on_back(node_id)
 
     def _expire(self, node_id: int) -> None:
         del self._timers[node_id]
@@ -102,10 +97,13 @@ class HeartbeatConsumer:
         return check
 
     def _forget(self, node_id: int) -> None:
-        """Watching a node with another time begins with its next heartbeat."""
+        """Watch a node no more, until its next heartbeat; it is missed no more either."""
         timer = self._timers.pop(node_id, None)
         if timer is not None:
             timer.cancel()
+        if node_id in self._lost:
+            self._lost.discard(node_id)
+            self._on_back(node_id)
 
 
 def _watched(value: int) -> tuple[int, int]:

@@ -155,7 +155,7 @@ class Node:
 
     def _receive(self, frame: Frame, _sender: object) -> None:
         if not frame.extended:
-            for handle in tuple(self._handlers.get(frame.cob_id, ())):
+            for handle in self._handlers.get(frame.cob_id, ()):
                 handle(frame)
 
     def _listen(self) -> None:

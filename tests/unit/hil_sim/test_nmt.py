@@ -132,6 +132,12 @@ def test_power_off_is_silence_and_power_on_boots(bench: Bench) -> None:
     assert bench.of(0x700 + NODE) == [b"\x00"]
 
 
+def test_a_device_that_loses_power_in_the_middle_of_an_answer_does_not_answer(bench: Bench) -> None:
+    bench.boot()
+    bench.drive.dictionary[0x6072, 0].on_write = lambda _: bench.drive.power_off()
+    assert bench.sdo("2B 72 60 00 E8 03 00 00") is None
+
+
 @pytest.mark.parametrize(("startup", "state"), [(0x0, 5), (0x4, 127), (0x1, 127), (0x8, 5)])
 def test_1f80h_lets_a_device_start_itself(tmp_path: Path, startup: int, state: int) -> None:
     file = communication().add(0x1F80, None, UNSIGNED32, startup).write(tmp_path)

@@ -84,6 +84,15 @@ def test_a_heartbeat_that_comes_back_ends_the_error_and_is_watched_again(device:
     assert len(device.of(EMCY)) == 3
 
 
+def test_a_node_that_is_watched_no_more_is_missed_no_more(device: DeviceBench) -> None:
+    watch(device, 1, 16, 100)
+    device.send(0x710, "05")
+    device.run(150)
+    assert watch(device, 1, 16, 0) == "ok"
+    assert device.of(EMCY)[1:] == [bytes(8)]
+    assert device.read(0x1001) == 0
+
+
 def test_a_remote_frame_to_another_node_is_no_heartbeat(device: DeviceBench) -> None:
     watch(device, 1, 16, 100)
     device.ask(0x710)

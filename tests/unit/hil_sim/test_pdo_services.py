@@ -188,11 +188,14 @@ def test_the_event_timer_counts_from_the_last_pdo(tmp_path: Path) -> None:
     assert all(gap <= 50.5 for gap in gaps)  # and the timer begins with it
 
 
-def test_the_event_timer_does_not_concern_synchronous_pdos(tmp_path: Path) -> None:
-    bench = started(tmp_path, 1)
+@pytest.mark.parametrize(("kind", "sent"), [(0, 0), (1, 1)])
+def test_the_event_timer_does_not_concern_synchronous_pdos(tmp_path: Path, kind: int, sent: int) -> None:
+    bench = started(tmp_path, kind)
     bench.write(0x1800, 5, 10, 2)
     bench.run(100)
     assert bench.of(TPDO) == []
+    bench.send(0x080)
+    assert len(bench.of(TPDO)) == sent
 
 
 def test_an_rpdo_that_does_not_come_in_time_is_an_emergency(tmp_path: Path) -> None:

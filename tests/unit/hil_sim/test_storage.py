@@ -118,6 +118,18 @@ def test_values_outlive_the_simulator(tmp_path: Path) -> None:
     assert values(bench(tmp_path)) == [0, 1, 1]
 
 
+def test_a_new_file_takes_the_place_of_the_old_one_at_once(tmp_path: Path) -> None:
+    device = bench(tmp_path)
+    device.write(0x1010, 1, SAVE, 4)
+    path = tmp_path / "memory" / "device.json"
+    before = path.read_text(encoding="utf-8")
+    with path.open(encoding="utf-8") as reader:  # whoever has the old one open, has it whole
+        change(device, 300)
+        device.write(0x1010, 1, SAVE, 4)
+        assert reader.read() == before != path.read_text(encoding="utf-8")
+    assert [file.name for file in path.parent.iterdir()] == ["device.json"]
+
+
 def test_another_device_begins_with_its_own_defaults(tmp_path: Path) -> None:
     first = bench(tmp_path)
     change(first, 300)
