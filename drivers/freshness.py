@@ -3,6 +3,11 @@
 from drivers.samples import State
 
 
+def silence_text(age_ms: float | None) -> str:
+    """What there is to say of a silence whose cause nobody knows."""
+    return "no sample has come yet" if age_ms is None else f"no new sample for {age_ms / 1000:.1f} s"
+
+
 class Freshness:
     """Turns silence into `stale`, then `lost`; counts how often it was silent for too long."""
 

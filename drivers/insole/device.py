@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drivers.component import Kind
 from drivers.errors import SettingsError
-from drivers.freshness import Freshness
+from drivers.freshness import Freshness, silence_text
 from drivers.insole import calibration as calibrations
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
@@ -94,7 +94,8 @@ class Insole:
         if state is State.OK and problem is not None:
             state = State.FAULT
         elif state is not State.OK:
-            problem = self.line.problem(now_ns) or self._fault or self._wrong_foot()
+            silence = self.line.problem(now_ns) or self._fault or self._wrong_foot()
+            problem = silence or silence_text(age_ms)
         return Quality(state, age_ms, problem, self._counters())
 
     def received(self, frames: Sequence[InsoleFrame], stamp_ns: int) -> None:
