@@ -127,9 +127,8 @@ class Spool:
 
     def waiting(self) -> list[int]:
         """Segments that are frozen and not uploaded, oldest first."""
-        return [
-            number for number, uploaded in self._segments() if not uploaded and number != self._current.number
-        ]
+        written = self._current.number  # a higher one may be in the making
+        return [number for number, uploaded in self._segments() if not uploaded and number < written]
 
     def read(self, number: int) -> Segment:
         """A frozen segment; close it after use."""

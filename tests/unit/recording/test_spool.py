@@ -91,6 +91,24 @@ def test_oldest_uploaded_segments_go_first_and_others_never(tmp_path: Path) -> N
         assert spool.waiting() == [3, 4]
 
 
+def test_a_segment_in_the_making_does_not_wait_for_upload(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[list[int]] = []
+    with Spool(tmp_path) as spool:
+        spool.append([run()], [])
+        current = spool._current
+
+        def close() -> None:
+            seen.append(spool.waiting())
+            Segment.close(current)
+
+        monkeypatch.setattr(current, "close", close)
+        spool.freeze()
+        assert seen == [[]]  # both files are there, and neither is frozen yet
+        assert spool.waiting() == [1]
+
+
 def test_one_server_at_a_time(tmp_path: Path) -> None:
     with Spool(tmp_path), pytest.raises(SpoolUnusable, match="another server records into"):
         Spool(tmp_path)

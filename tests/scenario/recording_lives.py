@@ -1,0 +1,56 @@
+"""`python -m tests.scenario.recording_lives SPOOL URL LIVES SEED`: a recording, killed again and again.
+
+Each life is a fork of this process with a recorder and an uploader at work, ended by SIGKILL at a random
+moment. What was acknowledged is printed, a number a line; each number was recorded as a value of its own.
+"""
+
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+
+from ml.store import Store
+from server_gui.core.recording.recorder import Recorder, RecorderSettings
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.uploader import Uploader
+from tests.unit.recording.robots import batch
+
+ROBOT = "exo-01"
+PER_LIFE = 1_000_000  # numbers that a life may use
+LONGEST_S = 0.4
+SETTINGS = RecorderSettings(batch_s=0.02)
+
+
+def live(spool: Path, url: str, first: int, told: int) -> None:
+    """Record one number after another, and tell each that is acknowledged, until we are killed."""
+    with (
+        Spool(spool, reserve_bytes=0) as opened,
+        Uploader(opened, lambda: Store(url)) as uploader,
+        Recorder(opened, settings=SETTINGS) as recorder,
+    ):
+        for number in range(first, first + PER_LIFE):
+            recorder.record(ROBOT, 1, batch(number, channels=("counter.number",)))
+            if number % 5 == 4 and recorder.flush(10):
+                os.write(told, f"{number}\n".encode())  # this and every one before it in this life
+                uploader.now()
+
+
+def main() -> int:
+    """Run the lives one after another."""
+    spool, url, lives, seed = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
+    chance = random.Random(seed)
+    for number in range(lives):
+        child = os.fork()
+        if child == 0:
+            live(spool, url, number * PER_LIFE, sys.stdout.fileno())
+            os._exit(1)
+        time.sleep(chance.uniform(0, LONGEST_S))  # the moment of the kill, not a synchronisation
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
