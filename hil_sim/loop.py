@@ -12,6 +12,7 @@ from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock
 _QUANTUM_NS = 500_000
 # A machine that slept, or had no time for us, does not make the robot rush through what it missed.
 _CATCH_UP_NS = 200 * MILLISECOND_NS
+_LONGEST_WAIT_NS = _CATCH_UP_NS / 2  # where little happens, waiting for it is not missing it
 _FAST_SLICE_NS = 10 * MILLISECOND_NS
 
 
@@ -91,4 +92,4 @@ class Loop:
         wait_ns = max(due_ns - self.clock.now_ns, _QUANTUM_NS) / self._speed
         late_ns = time.monotonic_ns() - self._real_start_ns
         late_ns -= round((self.clock.now_ns - self._simulated_start_ns) / self._speed)
-        return max(wait_ns - late_ns, 0.0) / SECOND_NS
+        return min(max(wait_ns - late_ns, 0.0), _LONGEST_WAIT_NS) / SECOND_NS

@@ -8,6 +8,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -26,7 +27,7 @@ _DISORDER_NS = (
 _PAUSE_NS = 3600 * SECOND_NS  # nobody waits for that: it was another clock, or another recording
 _ERROR_FLAG = 0x2000_0000  # Linux can.h; python-can knows one class of error frames and takes others for data
 _CANDUMP_LINE = re.compile(
-    r"\(\d+\.\d+\) \S+ ([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(R\d?|(?:[0-9A-Fa-f]{2})*|#.*)( [RT])?\s*"
+    r"\(\d+\.\d+\) (\S+) ([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(R\d?|(?:[0-9A-Fa-f]{2})*|#.*)( [RT])?\s*"
 )
 _BROKEN = (ValueError, IndexError, TypeError, EOFError, struct.error, zlib.error, can.CanError, BLFParseError)
 
@@ -71,8 +72,6 @@ class _Lines:
 class _Source:
     """An open log: its messages, and the words for where it is."""
 
-    first_channel = 1  # as the file counts; python-can counts them from 0
-
     def __init__(self, path: Path) -> None:
         self.path = path
         self.reader: can.io.generic.MessageReader
@@ -82,9 +81,13 @@ class _Source:
     def where(self) -> str:
         return f"{self.path}, after {self.read} frames"
 
-    def check(self, message: can.Message) -> bool:
-        """Whether it is an error frame; raises `_Implausible` where it is not what the file says."""
-        return message.is_error_frame
+    def look(self, message: can.Message) -> tuple[str, bool]:
+        """The channel as the file calls it, and whether this is an error frame.
+
+        Raises `_Implausible` where the message is not what the file says.
+        """
+        channel = message.channel
+        return str(channel + 1 if isinstance(channel, int) else channel), message.is_error_frame
 
 
 class _Text(_Source):
@@ -101,36 +104,35 @@ class _Text(_Source):
 
 
 class _Candump(_Text):
-    first_channel = 0
-
     def __init__(self, path: Path) -> None:
         super().__init__(path, can.CanutilsLogReader)
 
-    def check(self, message: can.Message) -> bool:
+    def look(self, message: can.Message) -> tuple[str, bool]:
         line = _CANDUMP_LINE.fullmatch(self.lines.text.lstrip())
         if line is None:
             raise _Implausible("this is no line of candump -l")
-        flagged = len(line[1]) > 3 and bool(int(line[1], 16) & _ERROR_FLAG)
-        return flagged or super().check(message)
+        channel, identifier = line[1], line[2]
+        return channel, message.is_error_frame or bool(int(identifier, 16) & _ERROR_FLAG)
 
 
 class _Asc(_Text):
     def __init__(self, path: Path) -> None:
         super().__init__(path, can.ASCReader, relative_timestamp=False)
 
-    def check(self, message: can.Message) -> bool:
+    def look(self, message: can.Message) -> tuple[str, bool]:
         if getattr(self.reader, "timestamps_format", None) == "relative":
             raise _Implausible("its stamps count from line to line: save it with absolute ones")
-        return super().check(message)
+        return super().look(message)
 
 
 class _Blf(_Source):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self.reader = can.BLFReader(path)
-        if path.stat().st_size < self.reader.file_size:
-            self.reader.stop()
-            raise _Implausible(f"the file is cut off: it was {self.reader.file_size} bytes long")
+        with ExitStack() as closing:
+            self.reader = can.BLFReader(closing.enter_context(path.open("rb")))
+            if path.stat().st_size < self.reader.file_size:
+                raise _Implausible(f"the file is cut off: it was {self.reader.file_size} bytes long")
+            closing.pop_all()  # closed with the reader
 
 
 _FORMATS: dict[str, Callable[[Path], _Source]] = {".log": _Candump, ".asc": _Asc, ".blf": _Blf}
@@ -167,8 +169,7 @@ class CanLog:
             for message in source.reader:
                 where = source.where
                 source.read += 1
-                is_error = source.check(message)
-                name = _channel(message, source.first_channel)
+                name, is_error = source.look(message)
                 channel = name if channel is None else channel
                 if name == channel:
                     yield (
@@ -202,10 +203,6 @@ def _words(error: BaseException) -> str:
     if isinstance(error, _Implausible):
         return str(error)
     return f"this cannot be read as a log ({type(error).__name__}: {error!s})"
-
-
-def _channel(message: can.Message, first: int) -> str:
-    return str(message.channel + first if isinstance(message.channel, int) else message.channel)
 
 
 def _frame(message: can.Message) -> Frame:
