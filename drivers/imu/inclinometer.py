@@ -15,6 +15,7 @@ from drivers.errors import SettingsError
 from drivers.imu import cia410
 from drivers.imu.cia410 import MappedSlope, SlopePlan
 from drivers.imu.formats import Conventions
+from drivers.imu.motion import TILT
 from drivers.imu.settings import InclinometerSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality, State
@@ -23,6 +24,8 @@ from eds import Description
 
 class Inclinometer(TrunkImu):
     """A two-axis inclinometer by its name in the robot's file (a `Component`)."""
+
+    channel_count = len(TILT)  # it feels nothing else
 
     def __init__(
         self,

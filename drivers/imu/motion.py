@@ -41,9 +41,10 @@ RAW_AFTER_NS = 500_000_000
 ZERO_FRAMES = 200  # about a second of the fastest device
 
 
-def channels(name: str) -> tuple[Channel, ...]:
-    """The channels of the IMU `name`."""
-    return tuple(Channel(f"{name}.{quantity}", name, quantity, unit) for quantity, unit in UNITS.items())
+def channels(name: str, count: int = len(UNITS)) -> tuple[Channel, ...]:
+    """The channels of the IMU `name`: all, or the first `count`, tilt before all else."""
+    quantities = list(UNITS.items())[:count]
+    return tuple(Channel(f"{name}.{quantity}", name, quantity, unit) for quantity, unit in quantities)
 
 
 def tilt(up: Vector) -> tuple[float, float]:

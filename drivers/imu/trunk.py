@@ -8,7 +8,7 @@ from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
 from drivers.imu.formats import Conventions
 from drivers.imu.frame import ImuFrame
-from drivers.imu.motion import TrunkMotion, channels
+from drivers.imu.motion import UNITS, TrunkMotion, channels
 from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion
 from drivers.imu.settings import Attitude, MountedSettings
@@ -32,6 +32,7 @@ class TrunkImu:
     """
 
     kind = Kind.IMU
+    channel_count = len(UNITS)
 
     def __init__(
         self,
@@ -42,7 +43,7 @@ class TrunkImu:
         beside: Path | None,
     ) -> None:
         self.name = name
-        self.channels = channels(name)
+        self.channels = channels(name, self.channel_count)
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         self.check = ImuCheck(name)
         stored = IDENTITY if settings.zero is None else zero.load((beside or Path()) / settings.zero)

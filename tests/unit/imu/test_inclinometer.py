@@ -75,6 +75,7 @@ def test_it_is_a_component_whose_slopes_are_tilt(channel: str) -> None:
         trunk = inclinometer(channel)
         component: Component = trunk
         assert component.kind is Kind.IMU
+        assert [one.name for one in component.channels] == ["trunk.tilt_forward", "trunk.tilt_side"]
         trunk.start()
         trunk.start()
         until(lambda: trunk.node.ready)
