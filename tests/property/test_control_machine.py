@@ -1,7 +1,7 @@
-"""Sessions, leases, writes, trials, stops and foreign masters in any order, against what must hold.
+"""Sessions, leases, writes, trials, stops, resets and foreign masters in any order, against what must hold.
 
 One writer; all or nothing; a trial always ends, confirmed or taken back; a stop always answers; nothing that
-reads, writes, reverts or stops ever enables a drive; the journal tells exactly what happened.
+reads, writes, reverts, stops or resets ever enables a drive; the journal tells exactly what happened.
 """
 
 import tempfile
@@ -129,6 +129,23 @@ class ControlMachine(RuleBasedStateMachine):
         self.stopped = True
         self.happened += ["stop", "stop answered"]
 
+    @rule(who=people)
+    def reset(self, who: str) -> None:
+        who = self.person(who)
+        expected = None if self.lease == who else "no_lease"
+        assert self.refused(who, "robot.reset") == expected
+        if expected is None:
+            down = dict.fromkeys(("left_knee", "right_knee"), "switch on disabled")
+            assert (self.answer["drives"], self.answer["held"]) == (down, False)
+            self.stopped = False
+            self.happened.append("reset")
+
+    @rule(who=people)
+    def enable(self, who: str) -> None:
+        """The robot's file says that another controller leads the bus."""
+        who = self.person(who)
+        assert self.refused(who, "robot.enable") == ("not_allowed" if self.lease == who else "no_lease")
+
     @rule(name=st.sampled_from([STEP, CYCLE]), data=st.data())
     def somebody_else_writes(self, name: str, data: st.DataObject) -> None:
         self.values[name] = data.draw(counts[name])
@@ -227,6 +244,7 @@ class ControlMachine(RuleBasedStateMachine):
         for drive in (self.bench.left, self.bench.right):
             written = [data for what, index, data in drive.node.log if what == "download"]
             assert not [data for data in written if data and data[0] & ENABLE_OPERATION == ENABLE_OPERATION]
+            assert drive.steps == []
 
     @invariant()
     def the_journal_tells_exactly_what_happened(self) -> None:
