@@ -78,6 +78,7 @@ class Hold:
         for controller in self._controllers.values():
             controller.stop()
         self._watch_over(left)
+        self._look_at_all()
 
     def begin(self, who: str, reason: str) -> "Future[str | None]":
         """Hold; the result is why it will not outlive this gateway, `None` when it will."""
@@ -124,10 +125,13 @@ class Hold:
                 name: Held(stopper, self._loop, self._on_again) for name, stopper in self._stoppers.items()
             }
             self._changed()
-            self._look()
+            self._timer = self._loop.call_later(WATCH_S, self._look)
 
     def _look(self) -> None:
         self._timer = self._loop.call_later(WATCH_S, self._look)
+        self._look_at_all()
+
+    def _look_at_all(self) -> None:
         for held in self._watched.values():
             held.look(ask_unseen=self.asks_unseen)
 
@@ -136,7 +140,7 @@ class Hold:
             controller.stop()
         if time.monotonic() >= self._silent_until.get(name, 0.0):
             self._silent_until[name] = time.monotonic() + SAY_AGAIN_S
-            log.warning("%s was enabled while the robot is stopped; it is stopped again", name)
+            log.warning("%s is enabled while the robot is stopped; it is stopped again", name)
             self._journal.append(GATEWAY, "stopped again", drive=name, times=self._watched[name].again)
 
     def _end_watch(self) -> None:

@@ -161,6 +161,19 @@ class FakeNode:
     ) -> "Future[None]":
         return self._do(lambda: self._download(index, subindex, data))
 
+    def run(
+        self,
+        job: Callable[[Any], Any],
+        *,
+        urgent: bool = False,
+        ahead: bytes | None = None,
+        wake: bool = True,
+    ) -> "Future[Any]":
+        return self._do(lambda: job(FakeSdo(self)))
+
+    def wake(self) -> None:
+        """It has answered already."""
+
     def written(self) -> list[tuple[int, bytes | None]]:
         return [(index, data) for what, index, data in self.log if what == "download"]
 
@@ -184,6 +197,21 @@ class FakeNode:
         except Exception as error:  # noqa: BLE001 - a device's error is the future's
             future.set_exception(error)
         return future
+
+
+class FakeSdo:
+    """A fake node's objects, as a job is given them."""
+
+    timeout_s = 0.1
+
+    def __init__(self, node: FakeNode) -> None:
+        self._node = node
+
+    def upload(self, index: int, subindex: int, attempts: int = 1, timeout_s: float | None = None) -> bytes:
+        return self._node._upload(index, subindex)
+
+    def download(self, index: int, subindex: int, data: bytes, timeout_s: float | None = None) -> None:
+        self._node._download(index, subindex, data)
 
 
 class FakeComponent:

@@ -1,6 +1,7 @@
 """The stop: every drive at once, without a lease, answered per drive, and held."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -8,8 +9,20 @@ import pytest
 
 from drivers.component import Kind
 from drivers.joint.quick_stop import StopOutcome
+from drivers.joint.reading import DriveReading
+from gateway.config import ConfigError
 from gateway.modules.stop.drive import is_enabled
-from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, config, serving, until
+from tests.unit.gateway.harness import (
+    DISABLED,
+    ENABLED,
+    ROBOT,
+    Bench,
+    Client,
+    FakeDrive,
+    config,
+    serving,
+    until,
+)
 
 
 def test_a_stop_needs_no_lease_and_answers_per_drive(connect: Callable[[], Client], bench: Bench) -> None:
@@ -135,3 +148,160 @@ def test_a_stop_is_done_although_its_client_vanishes(connect: Callable[[], Clien
 )
 def test_operation_enabled_is_read_from_the_statusword(statusword: int, enabled: bool) -> None:
     assert is_enabled(statusword) is enabled
+
+
+CONTROLLER = """
+[[stop.controller]]
+component = "gait"
+object = "0x2000:0"
+value = 0
+"""
+GAIT_COMMAND = (0x2000, 0)
+
+
+@contextlib.contextmanager
+def stopping(tmp_path: Path, stop: str) -> Iterator[Client]:
+    with serving(config(tmp_path, f"{ROBOT}[stop]\n{stop}")) as address, Client(address) as client:
+        yield client
+
+
+class TestFallback:
+    """What follows where a quick stop is not confirmed: only where the robot's file says so, and told."""
+
+    BOTH = 'fallback = ["disable_voltage", "nmt_stop"]\n'
+
+    def reads(self, drive: FakeDrive, abort_connection: int | None) -> None:
+        drive.reading = DriveReading((), {}, {"quick_stop": 2, "abort_connection": abort_connection})
+
+    def test_without_a_word_in_the_robots_file_nothing_follows(self, client: Client, bench: Bench) -> None:
+        bench.left.stopping = StopOutcome.UNCONFIRMED
+        answer = client.call("robot.stop")
+        assert (answer["drives"]["left_knee"], answer["fallbacks"]) == ("unconfirmed", {})
+        assert (bench.left.limp, bench.left.nmt_stops) == (0, 0)
+
+    def test_a_confirmed_drive_is_never_let_go_limp(self, bench: Bench, tmp_path: Path) -> None:
+        bench.left.stopping = StopOutcome.UNCONFIRMED
+        self.reads(bench.left, 3)
+        with stopping(tmp_path, self.BOTH) as client:
+            answer = client.call("robot.stop")
+            assert answer["drives"] == {"left_knee": "confirmed", "right_knee": "confirmed"}
+            assert list(answer["fallbacks"]) == ["left_knee"]
+            assert "the joint is limp" in answer["fallbacks"]["left_knee"]
+            told = [one for one in client.call("journal.tail")["entries"] if one["what"] == "stop fallback"]
+            assert [(one["drive"], one["result"]) for one in told] == list(answer["fallbacks"].items())
+        assert (bench.left.limp, bench.right.limp, bench.left.nmt_stops) == (1, 0, 0)
+
+    def test_nmt_stop_comes_last_and_is_never_confirmed(self, bench: Bench, tmp_path: Path) -> None:
+        bench.left.stopping = bench.left.limping = StopOutcome.UNCONFIRMED
+        self.reads(bench.left, 3)
+        with stopping(tmp_path, self.BOTH) as client:
+            answer = client.call("robot.stop")
+        assert answer["drives"]["left_knee"] == "unconfirmed"
+        first, second = answer["fallbacks"]["left_knee"].split("; ", 1)[0], answer["fallbacks"]["left_knee"]
+        assert "voltage was disabled" in first
+        assert "NMT stop was sent, which nothing confirms" in second
+        assert (bench.left.limp, bench.left.nmt_stops, bench.right.nmt_stops) == (1, 1, 0)
+
+    @pytest.mark.parametrize("option", [0, None, -1, 7])
+    def test_no_nmt_stop_where_6007h_is_not_known_to_act(
+        self, bench: Bench, tmp_path: Path, option: int | None
+    ) -> None:
+        bench.left.stopping = StopOutcome.UNREACHABLE
+        self.reads(bench.left, option)
+        with stopping(tmp_path, 'fallback = ["nmt_stop"]\n') as client:
+            answer = client.call("robot.stop")
+        assert answer["drives"]["left_knee"] == "unreachable"
+        assert "was not sent" in answer["fallbacks"]["left_knee"]
+        assert bench.left.nmt_stops == 0
+
+    def test_a_drive_out_of_reach_is_not_asked_to_go_limp(self, bench: Bench, tmp_path: Path) -> None:
+        bench.left.stopping = StopOutcome.UNREACHABLE
+        with stopping(tmp_path, 'fallback = ["disable_voltage"]\n') as client:
+            assert client.call("robot.stop")["drives"]["left_knee"] == "unreachable"
+        assert bench.left.limp == 0
+
+    def test_two_axes_of_one_drive_are_silenced_only_if_none_has_confirmed(
+        self, bench: Bench, tmp_path: Path
+    ) -> None:
+        bench.right.node = bench.left.node
+        bench.left.stopping = StopOutcome.UNCONFIRMED
+        for drive in (bench.left, bench.right):
+            self.reads(drive, 3)
+        with stopping(tmp_path, 'fallback = ["nmt_stop"]\n') as client:
+            assert client.call("robot.stop")["fallbacks"] == {}
+            bench.right.stopping = StopOutcome.UNCONFIRMED
+            assert list(client.call("robot.stop")["fallbacks"]) == ["left_knee", "right_knee"]
+        assert bench.left.nmt_stops + bench.right.nmt_stops == 1
+
+    def test_what_would_follow_is_described_with_what_it_means(self, bench: Bench, tmp_path: Path) -> None:
+        with stopping(tmp_path, self.BOTH) as client:
+            words = client.call("robot.describe")["stop"]["fallbacks"]
+        assert "limp" in words[0]
+        assert "nothing confirms" in words[1]
+
+
+class TestController:
+    """Where another controller commands the drives it is stopped too, by its own object."""
+
+    def test_it_is_written_and_read_back(self, bench: Bench, tmp_path: Path) -> None:
+        bench.gait.node.objects[GAIT_COMMAND] = b"\x01"
+        with stopping(tmp_path, CONTROLLER) as client:
+            answer = client.call("robot.stop")
+            assert client.call("robot.describe")["stop"]["controllers"] == {"gait": None}
+        assert answer["controllers"] == {"gait": "confirmed"}
+        assert bench.gait.node.written() == [(0x2000, b"\x00")]
+
+    def test_what_it_does_not_hold_is_not_confirmed(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("gateway.modules.stop.controllers.INSIST_S", 0.1)
+        bench.gait.node.store = lambda _index, _data: b"\x01"
+        with stopping(tmp_path, CONTROLLER) as client:
+            answer = client.call("robot.stop")
+        assert answer["controllers"] == {"gait": "unconfirmed"}
+        assert answer["drives"] == {"left_knee": "confirmed", "right_knee": "confirmed"}
+        assert len(bench.gait.node.written()) > 1
+
+    def test_one_that_is_not_there_is_unreachable(self, bench: Bench, tmp_path: Path) -> None:
+        bench.absent["gait"] = (Kind.DEVICE, "its EDS is broken")
+        with stopping(tmp_path, CONTROLLER) as client:
+            assert client.call("robot.stop")["controllers"] == {"gait": "unreachable"}
+            assert "not there" in client.call("robot.describe")["stop"]["controllers"]["gait"]
+
+    @pytest.mark.parametrize(("object_", "value"), [("0x2FFF:0", 0), ("0x2000:0", 300)])
+    def test_one_whose_object_cannot_be_written_is_told(
+        self, bench: Bench, tmp_path: Path, object_: str, value: int
+    ) -> None:
+        table = CONTROLLER.replace("0x2000:0", object_).replace("value = 0", f"value = {value}")
+        with stopping(tmp_path, table) as client:
+            assert client.call("robot.stop")["controllers"] == {"gait": "unreachable"}
+            assert object_ in client.call("robot.describe")["stop"]["controllers"]["gait"]
+
+    def test_it_is_stopped_again_with_its_drives(self, bench: Bench, tmp_path: Path) -> None:
+        with stopping(tmp_path, CONTROLLER) as client:
+            client.call("robot.stop")
+            bench.gait.node.objects[GAIT_COMMAND] = b"\x01"
+            bench.left.set_state(ENABLED)
+            until(lambda: bench.gait.node.objects[GAIT_COMMAND] == b"\x00", "stopped again")
+
+
+@pytest.mark.parametrize(
+    ("stop", "complaint"),
+    [
+        ('fallback = ["nmt_stop", "disable_voltage"]', "NMT stop last"),
+        ('fallback = ["disable_voltage", "disable_voltage"]', "each once"),
+        ('fallback = ["emergency_stop"]', "fallback"),
+        ("timeout_s = 0", "timeout_s"),
+        ("timeout_s = 60", "timeout_s"),
+        ("time_out_s = 1", "did you mean 'timeout_s'"),
+        (CONTROLLER.replace("gait", "left_knee"), "there is no [device.left_knee]; here are gait"),
+        (CONTROLLER.replace("0x2000:0", "2000"), "object"),
+        (CONTROLLER.replace("0x2000:0", "0x2000:999"), "subindex"),
+        (CONTROLLER.replace("value = 0", ""), "value"),
+    ],
+)
+def test_a_stop_table_that_cannot_work_is_refused(tmp_path: Path, stop: str, complaint: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        config(tmp_path, f"{ROBOT}[stop]\n{stop}")
+    assert complaint in str(refused.value)
+    assert "[stop" in str(refused.value)
