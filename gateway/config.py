@@ -46,6 +46,7 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client.
 
     `records` is the folder of journal, held stop and pending reverts, relative to the robot's file.
+    `classic_port` serves the process list as the paper's daemon does, for comparison.
     """
 
     host: str = "127.0.0.1"
@@ -53,6 +54,7 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     role: Role = Role.OBSERVER
     linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
     records: str | None = None
+    classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None
 
 
 class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):

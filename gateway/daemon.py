@@ -1,15 +1,16 @@
 """The on-demand TCP server: accepts clients and serves them in one loop until it is told to end."""
 
 import contextlib
-import errno
 import logging
-import selectors
 import signal
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
+from typing import Any
 
 from gateway import wire
+from gateway.acceptor import Acceptor
+from gateway.classic import ClassicPort
 from gateway.config import RobotConfig
 from gateway.loop import Loop
 from gateway.registry import MODULES, Spec
@@ -20,7 +21,6 @@ log = logging.getLogger(__name__)
 
 MAX_SESSIONS = 64
 BACKLOG = 32
-REST_S = 1.0  # how long nobody new is accepted when the process has no descriptors left
 
 
 class Daemon:
@@ -29,12 +29,22 @@ class Daemon:
     def __init__(
         self, config: RobotConfig, listener: socket.socket, specs: Mapping[str, Spec] = MODULES
     ) -> None:
+        classic_port = config.gateway.classic_port
+        classic = None if classic_port is None else listen(config.gateway.host, classic_port, "classic_port")
         self._listener = listener
         self._loop = Loop()
         self._service = Service(config, self._loop, specs)
         self._sessions: set[Session] = set()
         self._ending = False
-        listener.setblocking(False)
+        self._acceptor = Acceptor(self._loop, listener, self._open)
+        self._classic: ClassicPort | None = None
+        if classic is not None:
+            self._classic = ClassicPort(self._loop, classic, self._service.registry)
+
+    @property
+    def classic_port(self) -> int | None:
+        """Where the paper's own exchange is served, if at all."""
+        return None if self._classic is None else self._classic.port
 
     @property
     def address(self) -> tuple[str, int]:
@@ -44,13 +54,15 @@ class Daemon:
 
     def run(self, ready: Callable[[], object] = lambda: None) -> None:
         """Serve until `end`; `ready` is called once when clients can connect."""
-        self._listen()
+        self._acceptor.start()
         self._loop.post(self._service.resume)
         self._loop.post(ready)
         try:
             self._loop.run()
         finally:
             self._listener.close()
+            if self._classic is not None:
+                self._classic.close()
             self._loop.close()
 
     def end(self) -> None:
@@ -64,29 +76,8 @@ class Daemon:
         """While inside, SIGINT and SIGTERM end the daemon. For the main thread only."""
         return _signals(self._loop.wake_writer, self.end)
 
-    def _listen(self) -> None:
-        if not self._ending:
-            self._loop.watch(self._listener, selectors.EVENT_READ, lambda _events: self._accept())
-
-    def _accept(self) -> None:
-        try:
-            connection, address = self._listener.accept()
-        except BlockingIOError:
-            return
-        except OSError as error:
-            log.warning("a client could not be accepted: %s", error)
-            if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
-                self._loop.watch(self._listener, 0, lambda _events: None)
-                self._loop.call_later(REST_S, self._listen)
-            return
-        try:
-            self._open(connection, f"{address[0]}:{address[1]}")
-        except OSError as error:  # it has gone already
-            log.info("%s: %s", address, error)
-            connection.close()
-
-    def _open(self, connection: socket.socket, peer: str) -> None:
-        session = Session(self._loop, connection, peer, self._service.handle)
+    def _open(self, connection: socket.socket, address: Any) -> None:
+        session = Session(self._loop, connection, f"{address[0]}:{address[1]}", self._service.handle)
         if len(self._sessions) >= MAX_SESSIONS:
             message = f"{MAX_SESSIONS} clients are connected, which is the most; end one of them"
             session.send(wire.encode_error(None, wire.refuse(wire.Kind.UNAVAILABLE, message)))
@@ -104,14 +95,14 @@ class Daemon:
             log.error("%s", objection)
             return
         self._ending = True
-        self._loop.watch(self._listener, 0, lambda _events: None)
+        self._acceptor.end()
         for session in tuple(self._sessions):
             session.close()
         self._service.registry.close(self._loop.stop)
 
 
-def listen(host: str, port: int) -> socket.socket:
-    """A listening TCP socket; port 0 picks one.
+def listen(host: str, port: int, setting: str = "--host or --port") -> socket.socket:
+    """A listening TCP socket; port 0 picks one. `setting` is what an error tells to change.
 
     Raises:
         OSError: the address is not ours, or the port is in use; the message names both.
@@ -125,7 +116,7 @@ def listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         reason = error.strerror or str(error)
         raise OSError(
-            error.errno, f"cannot listen on {host}:{port}: {reason}; choose another with --host or --port"
+            error.errno, f"cannot listen on {host}:{port}: {reason}; choose another with {setting}"
         ) from error
 
 
