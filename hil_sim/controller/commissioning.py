@@ -39,10 +39,22 @@ def needed(node_id: int, cycle_ms: int) -> Iterator[Write]:
     yield from _pdo(0x1400, 0x1600, 0x200 + node_id, (0x6040_0010, 0x6060_0008, 0x607A_0020))
     yield Write(0x60C2, 2, -3, 1)
     yield Write(0x60C2, 1, cycle_ms, 1)
-    yield Write(0x6065, 0, 22_755, 4)  # following error window, and its time
-    yield Write(0x6066, 0, 500, 2)
-    yield Write(0x6085, 0, 1_300_000, 4)  # quick stop deceleration
-    yield Write(0x605A, 0, 2, 2)
+    yield from _JOINT
+
+
+# The motor, encoder and gear behind the drive, and how it is to move and stop them.
+_JOINT = (
+    Write(0x608F, 1, 4096, 4),  # increments a motor revolution
+    Write(0x608F, 2, 1, 4),
+    Write(0x6091, 1, 100, 4),  # gear
+    Write(0x6091, 2, 1, 4),
+    Write(0x6075, 0, 5000, 4),  # rated current (mA) and torque (mN·m)
+    Write(0x6076, 0, 400, 4),
+    Write(0x6065, 0, 22_755, 4),  # following error window, and its time (ms)
+    Write(0x6066, 0, 500, 2),
+    Write(0x6085, 0, 1_300_000, 4),  # quick stop deceleration
+    Write(0x605A, 0, 2, 2),
+)
 
 
 def _pdo(communication: int, mapping: int, cob_id: int, mapped: tuple[int, ...]) -> Iterator[Write]:

@@ -165,7 +165,9 @@ def test_the_controller_sets_foreign_drives_up_and_the_robot_walks(file: Path) -
     robot.clock.run_until(5_000_000_000)
     robot.drives["left_knee"].power_on()
     robot.clock.run_until(6_000_000_000)
-    assert robot.drives["left_knee"].dictionary[0x1A00, 0].value == 2  # set up once more
+    objects = robot.drives["left_knee"].dictionary
+    assert objects.number((0x1A00, 0)) == 2  # set up once more
+    assert objects.number((0x608F, 1)) == 4096
 
 
 def test_a_drive_that_cannot_be_set_up_holds_the_robot(tmp_path: Path) -> None:
