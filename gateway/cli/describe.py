@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, exact, say, say_json, table
-from gateway.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo
+from gateway.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo, StopInfo
 
 PAGE = 100  # columns
 
@@ -83,10 +83,9 @@ def _read_only(parameters: list[ParameterInfo]) -> Iterator[str]:
 
 
 def _stop(robot: Description) -> str:
-    held = f"a stop is held: {robot.stop.reason}\n" if robot.stop.held else "no stop is held\n"
     if not robot.stop.drives:
-        return held
-    return held + table(
+        return _stop_beyond(robot.stop)
+    return _stop_beyond(robot.stop) + table(
         ("DRIVE", "ON QUICK STOP (605Ah)", "ON LOST COMMUNICATION (6007h)", "ARMED"),
         [
             (
@@ -98,6 +97,16 @@ def _stop(robot: Description) -> str:
             for name, drive in robot.stop.drives.items()
         ],
     )
+
+
+def _stop_beyond(stop: StopInfo) -> str:
+    """Whether one is held, and what it does beside the drives' quick stop."""
+    lines = [f"a stop is held: {stop.reason or 'no reason given'}" if stop.held else "no stop is held"]
+    lines += [] if stop.problem is None else [stop.problem]
+    for name, why_not in stop.controllers.items():
+        lines.append(f"it goes to {name} too" + ("" if why_not is None else f", but cannot: {why_not}"))
+    lines += [f"where a quick stop is not confirmed: {fallback}" for fallback in stop.fallbacks]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _guard(guard: GuardInfo) -> str:

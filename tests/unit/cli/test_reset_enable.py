@@ -1,0 +1,104 @@
+"""gwrms stop, reset and enable: what is not certain is said, and is no success."""
+
+import json
+
+import pytest
+
+from gateway.main import main
+from tests.fake_robot import FakeRobot, Refusal
+
+DOWN, UP = "switch on disabled", "operation enabled"
+
+
+def run(robot: FakeRobot, *arguments: str) -> int:
+    return main([*arguments, "--robot", robot.address])
+
+
+def test_a_reset_takes_the_lease_and_says_that_no_stop_is_held(capsys: pytest.CaptureFixture[str]) -> None:
+    with FakeRobot() as robot:
+        robot.overrides["robot.reset"] = lambda _params: {
+            "drives": {"left_knee": DOWN},
+            "problems": {},
+            "held": False,
+        }
+        assert run(robot, "reset") == 0
+        called = [method for method, _ in robot.calls]
+    assert [one for one in called if one.startswith(("control.", "robot."))] == [
+        "control.acquire",
+        "robot.reset",
+        "control.release",
+    ]
+    out = capsys.readouterr().out
+    assert f"left_knee  {DOWN}" in out
+    assert "No stop is held." in out
+
+
+@pytest.mark.parametrize(("problems", "held"), [({"left_knee": "it does not answer"}, True), ({}, True)])
+def test_a_stop_that_stays_held_is_no_success(
+    capsys: pytest.CaptureFixture[str], problems: dict[str, str], held: bool
+) -> None:
+    with FakeRobot() as robot:
+        robot.overrides["robot.reset"] = lambda _params: {
+            "drives": {"left_knee": "unknown"},
+            "problems": problems,
+            "held": held,
+        }
+        assert run(robot, "reset") == 1
+    assert "STILL HELD" in capsys.readouterr().out
+
+
+def test_a_drive_that_is_enabled_is_told_with_its_mode(capsys: pytest.CaptureFixture[str]) -> None:
+    with FakeRobot() as robot:
+        robot.overrides["robot.enable"] = lambda params: {
+            "drives": {"left_knee": UP},
+            "problems": {},
+            "modes": {"left_knee": "cyclic synchronous position"},
+        }
+        assert run(robot, "enable", "left_*") == 0
+        assert robot.called("robot.enable") == [{"joints": ["left_*"]}]
+    assert "cyclic synchronous position" in capsys.readouterr().out
+
+
+def test_a_drive_that_could_not_be_enabled_is_no_success(capsys: pytest.CaptureFixture[str]) -> None:
+    with FakeRobot() as robot:
+        robot.overrides["robot.enable"] = lambda params: {
+            "drives": {"left_knee": "fault"},
+            "problems": {"left_knee": "it is in fault; its quick stop: confirmed"},
+        }
+        assert run(robot, "enable", "--json") == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out)["drives"] == {"left_knee": "fault"}
+    assert "NOT ENABLED" in said.err
+
+
+def test_what_is_refused_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse(_params: object) -> dict[str, object]:
+        raise Refusal(-32016, "the stop of desk is held; reset it first", kind="stopped")
+
+    with FakeRobot() as robot:
+        robot.overrides["robot.enable"] = refuse
+        assert run(robot, "enable") == 1
+    assert "reset it first" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("answer", "status", "words"),
+    [
+        ({"controllers": {"gait": "confirmed"}}, 0, "gait"),
+        ({"controllers": {"gait": "unreachable"}}, 1, "NOT CONFIRMED by gait"),
+        ({"fallbacks": {"left_knee": "its voltage was disabled"}}, 0, "its voltage was disabled"),
+        ({"problem": "this stop is held, but not beyond this gateway: full"}, 0, "not beyond this gateway"),
+    ],
+)
+def test_a_stop_tells_controllers_fallbacks_and_what_does_not_last(
+    capsys: pytest.CaptureFixture[str], answer: dict[str, object], status: int, words: str
+) -> None:
+    with FakeRobot() as robot:
+        robot.overrides["robot.stop"] = lambda _params: {
+            "drives": {"left_knee": "confirmed"},
+            "held": True,
+            **answer,
+        }
+        assert run(robot, "stop") == status
+    said = capsys.readouterr()
+    assert words in said.out + said.err
