@@ -11,6 +11,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 STAMP: Final = np.dtype("<i8")
 VALUE: Final = np.dtype("<f8")
+KEYS: Final = 4  # columns before the values
 
 
 class Layout(msgspec.Struct, frozen=True):
@@ -59,16 +60,14 @@ class JournalHead(msgspec.Struct, frozen=True):
 
 
 def pack(run: Run) -> bytes:
-    """Everything of a run that is not its name, as little-endian 8-byte numbers, column after column."""
+    """Row after row of little-endian 8-byte numbers, so that packed runs can simply be put together."""
     keys = np.stack((run.stamps_ns, run.seqs, run.rows, run.utc_offset_ns)).astype(STAMP, copy=False)
-    return keys.tobytes() + run.values.astype(VALUE, copy=False).tobytes()
+    return np.vstack((keys.view(VALUE), run.values.astype(VALUE, copy=False))).T.tobytes()
 
 
-def unpack(
-    robot: str, session: str, connection: str, stream: int, layout: Layout, count: int, data: bytes
-) -> Run:
-    """The run that was packed; its arrays are views of `data`."""
-    keys = np.frombuffer(data, STAMP, 4 * count).reshape(4, count)
-    values = np.frombuffer(data, VALUE, offset=4 * count * STAMP.itemsize)
-    shaped = values.reshape(len(layout.channels), count)
-    return Run(robot, session, connection, stream, layout, keys[0], keys[1], keys[2], keys[3], shaped)
+def unpack(robot: str, session: str, connection: str, stream: int, layout: Layout, data: bytes) -> Run:
+    """The run that was packed, or several with the same name."""
+    width = KEYS + len(layout.channels)
+    columns = np.ascontiguousarray(np.frombuffer(data, VALUE).reshape(-1, width).T)
+    keys = columns[:KEYS].view(STAMP)
+    return Run(robot, session, connection, stream, layout, keys[0], keys[1], keys[2], keys[3], columns[KEYS:])

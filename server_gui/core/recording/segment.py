@@ -1,10 +1,12 @@
 """One file of the spool: a SQLite database that is written, then frozen, then only read."""
 
 import contextlib
+import itertools
+import operator
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
@@ -22,6 +24,10 @@ CREATE TABLE IF NOT EXISTS run (
 CREATE TABLE IF NOT EXISTS record (number INTEGER PRIMARY KEY, content BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL);
 """
+ROWS_AT_ONCE: Final = 20_000  # that are in memory as columns
+PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hardly one
+MAPPED_BYTES: Final = 1 << 28
+_NAME: Final = operator.itemgetter(slice(5))
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
 _encoder = msgspec.msgpack.Encoder()
@@ -38,6 +44,8 @@ class Segment:
         self.rows = 0
         try:
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+            self._database.execute(f"PRAGMA page_size={PAGE_BYTES}")
+            self._database.execute(f"PRAGMA mmap_size={MAPPED_BYTES}")
             # WAL with FULL: a commit has returned only when the log is on the disk.
             self._database.execute("PRAGMA journal_mode=WAL")
             self._database.execute("PRAGMA synchronous=FULL")
@@ -112,14 +120,18 @@ class Segment:
         return [(robot, layouts[layout]) for robot, layout in found]
 
     def runs(self) -> Iterator[Run]:
-        """Every run: robot by robot, connection by connection, stream by stream, in the order of `seq`."""
+        """Every row: robot by robot, connection by connection, stream by stream, in the order of `seq`.
+
+        What follows each other with the same name and columns is one run, up to `ROWS_AT_ONCE`.
+        """
         layouts = {number: layout for layout, number in self._layouts.items()}
         found = self._database.execute(
             "SELECT robot, session, connection, stream, layout, rows, data FROM run "
             "ORDER BY robot, connection, stream, seq, row"
         )
-        for robot, session, connection, stream, layout, count, data in found:
-            yield unpack(robot, session, connection, stream, layouts[layout], count, data)
+        for (robot, session, connection, stream, layout), alike in itertools.groupby(found, _NAME):
+            for data in _portions(alike):
+                yield unpack(robot, session, connection, stream, layouts[layout], data)
 
     def records(self) -> Iterator[Record]:
         """Every record, in the order in which it was recorded."""
@@ -149,3 +161,17 @@ class Segment:
             with contextlib.suppress(FileNotFoundError):  # SQLite removes its log when it is closed
                 size += path.with_name(path.name + suffix).stat().st_size
         return size
+
+
+def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:
+    """The packed rows of these lines, put together."""
+    portion: list[bytes] = []
+    rows = 0
+    for *_, count, data in lines:
+        portion.append(data)
+        rows += count
+        if rows >= ROWS_AT_ONCE:
+            yield b"".join(portion)
+            portion, rows = [], 0
+    if portion:
+        yield b"".join(portion)

@@ -47,6 +47,6 @@ def _telemetry(segment: Segment, spool: str, store: Store, location: str, robots
     columns = Columns(layouts, store.units(location))
 
     def batches() -> Iterator[pa.RecordBatch]:
-        return columns.batches(run for run in segment.runs() if run.robot in robots)
+        return (columns.batch(run) for run in segment.runs() if run.robot in robots)
 
     store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)
