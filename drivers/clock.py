@@ -15,6 +15,9 @@ FEWEST = 3
 MOST_DRIFT = 0.05  # no counter is further off than this
 RESTARTED_NS = SECOND_NS  # a counter further than this from where it should be has begun anew
 STEPPED_NS = SECOND_NS // 4  # a counter that falls so far behind has stood still
+UNTRUSTED = (
+    2  # a counter that does so in as many seconds on end is no clock: samples are stamped on reception
+)
 
 
 class DeviceClock:
@@ -58,7 +61,7 @@ class DeviceClock:
             self._offset_ns -= predicted_ns - offset_ns
             predicted_ns = offset_ns
         self._note(offset_ns)
-        stamp_ns = device_ns + predicted_ns
+        stamp_ns = received_ns if self._steps_on_end >= UNTRUSTED else device_ns + predicted_ns
         self._stamp_ns = stamp_ns if stamp_ns > self._stamp_ns else self._stamp_ns + 1
         return self._stamp_ns
 
@@ -69,7 +72,8 @@ class DeviceClock:
         self._drift = 0.0
         self._uncertainty_ns: int | None = None
         self._minima: deque[tuple[int, int]] = deque(maxlen=WINDOW)
-        self._second = 0
+        self._second = 0  # of reception
+        self._steps_on_end = 0
         self._smallest: tuple[int, int] | None = None
 
     def _advance(self, ticks: int, received_ns: int) -> bool:
@@ -97,6 +101,7 @@ class DeviceClock:
     def _begin(self, ticks: int, received_ns: int) -> None:
         self._forget()
         self._offset_ns = received_ns
+        self._second = received_ns // SECOND_NS
         self._last_ticks, self._last_received_ns = ticks, received_ns
 
     def _predict(self, device_ns: int) -> int:
@@ -104,11 +109,14 @@ class DeviceClock:
 
     def _note(self, offset_ns: int) -> None:
         """Keep the smallest offset of each second; at the second's end, fit the line anew."""
-        second = self._device_ns // SECOND_NS
+        second = (self._device_ns + offset_ns) // SECOND_NS
         if second != self._second and self._smallest is not None:
             if self._has_stepped(*self._smallest):
                 self._minima.clear()
                 self.steps += 1
+                self._steps_on_end += 1
+            else:
+                self._steps_on_end = 0
             self._minima.append(self._smallest)
             self._second, self._smallest = second, None
             self._fit()

@@ -136,6 +136,20 @@ def test_a_counter_that_stands_still_again_and_again_does_not_make_its_samples_o
     assert clock.steps > 0 or pause_s < 0.1
 
 
+@pytest.mark.parametrize("speed", [0.001, 0.2, 0.5, 0.7])
+def test_a_counter_that_is_no_clock_makes_its_samples_old_for_no_more_than_its_first_seconds(
+    speed: float,
+) -> None:
+    """As of a logger whose time is in another unit than its description says."""
+    clock = DeviceClock(MICROSECONDS, 1 << 32)
+    for number in range(200 * 30):
+        received_ns = round((1000 + number / 200) * 1e9)
+        stamp = clock.stamp(round(number * 5000 * speed), received_ns)
+        assert stamp is not None
+        if number > 200 * 4:
+            assert received_ns - stamp < 0.01 * SECOND_NS
+
+
 def test_a_reader_that_was_slow_for_seconds_does_not_move_the_line() -> None:
     clock = DeviceClock(MICROSECONDS, 1 << 32)
     for number in range(200 * 40):
