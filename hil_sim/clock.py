@@ -6,7 +6,6 @@ real time, and the same events in the same order give the same robot.
 
 import heapq
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 MILLISECOND_NS = 1_000_000
 SECOND_NS = 1_000_000_000
@@ -14,13 +13,14 @@ SECOND_NS = 1_000_000_000
 Action = Callable[[], None]
 
 
-@dataclass(slots=True, order=True)
 class Event:
     """Something that will happen at `due_ns`, unless it is cancelled."""
 
-    due_ns: int
-    order: int
-    action: Action | None = field(compare=False)
+    __slots__ = ("action", "due_ns")
+
+    def __init__(self, due_ns: int, action: Action) -> None:
+        self.due_ns = due_ns
+        self.action: Action | None = action
 
     def cancel(self) -> None:
         self.action = None
@@ -31,7 +31,7 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_ns = 0
-        self._events: list[Event] = []
+        self._events: list[tuple[int, int, Event]] = []  # when, in which order made, what
         self._made = 0
 
     @property
@@ -41,8 +41,8 @@ class Clock:
     def at(self, due_ns: int, action: Action) -> Event:
         """Call `action` at `due_ns`; a time that has passed means now."""
         self._made += 1
-        event = Event(max(due_ns, self.now_ns), self._made, action)
-        heapq.heappush(self._events, event)
+        event = Event(max(due_ns, self.now_ns), action)
+        heapq.heappush(self._events, (event.due_ns, self._made, event))
         return event
 
     def after(self, delay_ns: int, action: Action) -> Event:
@@ -54,17 +54,17 @@ class Clock:
 
     def next_due_ns(self) -> int | None:
         """When the next event is due, `None` if nothing is to happen."""
-        while self._events and self._events[0].action is None:
+        while self._events and self._events[0][2].action is None:
             heapq.heappop(self._events)
-        return self._events[0].due_ns if self._events else None
+        return self._events[0][0] if self._events else None
 
     def run_until(self, end_ns: int) -> None:
         """Let everything happen that is due up to `end_ns`, and arrive there."""
         events = self._events
-        while events and events[0].due_ns <= end_ns:
-            event = heapq.heappop(events)
+        while events and events[0][0] <= end_ns:
+            due_ns, _, event = heapq.heappop(events)
             if event.action is not None:
-                self.now_ns = event.due_ns
+                self.now_ns = due_ns
                 event.action()
         self.now_ns = max(self.now_ns, end_ns)
 

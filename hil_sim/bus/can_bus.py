@@ -1,8 +1,8 @@
 """The simulated CAN bus: frames wait, arbitrate by identifier, and take their time at the bit rate."""
 
 import heapq
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
+from typing import NamedTuple
 
 from hil_sim.clock import SECOND_NS, Clock
 
@@ -17,8 +17,15 @@ _STUFFING = 0.074
 _ERROR_FRAME_BITS = 12 + 8 + 3
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+def _bits(length: int, extended: bool) -> float:
+    content = 8 * length + (_EXTENDED_BITS if extended else 0)
+    return _FRAME_BITS + content + _STUFFING * (_STUFFABLE_BITS + content)
+
+
+_BITS = {extended: [_bits(length, extended) for length in range(9)] for extended in (False, True)}
+
+
+class Frame(NamedTuple):
     """One CAN frame; `cob_id` is the identifier, `data` 0 to 8 bytes (none in a remote frame)."""
 
     cob_id: int
@@ -28,14 +35,15 @@ class Frame:
 
     def bits(self) -> float:
         """Length on the wire, intermission and average stuffing included."""
-        content = 8 * len(self.data) + (_EXTENDED_BITS if self.extended else 0)
-        return _FRAME_BITS + content + _STUFFING * (_STUFFABLE_BITS + content)
+        return _BITS[self.extended][len(self.data)]
 
     def arbitration(self) -> int:
         """The lower number wins the bus: a standard frame beats an extended one with the same first bits."""
         base = self.cob_id if self.extended else self.cob_id << 18
         return base << 2 | self.extended << 1 | self.remote
 
+
+_EXTENDED_ROUTE = -1  # of every 29-bit identifier: who filters takes standard frames alone
 
 Receiver = Callable[[Frame, object], None]
 ErrorListener = Callable[[], None]
@@ -76,6 +84,8 @@ class CanBus:
         self.busy_ns = 0
         self.disturbances: list[Disturbance] = []
         self._receivers: dict[object, Receiver] = {}
+        self._filters: dict[object, Collection[int]] = {}
+        self._routes: dict[int, tuple[tuple[object, Receiver], ...]] = {}
         self._error_listeners: dict[object, ErrorListener] = {}
         self._pending: list[_Waiting] = []
         self._queued = 0
@@ -85,12 +95,20 @@ class CanBus:
     def attach(self, participant: object, receive: Receiver, on_error: ErrorListener | None = None) -> None:
         """Take part; `on_error` is told of each error frame."""
         self._receivers[participant] = receive
+        self._routes.clear()
         if on_error is not None:
             self._error_listeners[participant] = on_error
 
     def detach(self, participant: object) -> None:
         self._receivers.pop(participant, None)
+        self._filters.pop(participant, None)
+        self._routes.clear()
         self._error_listeners.pop(participant, None)
+
+    def accept(self, participant: object, cob_ids: Collection[int]) -> None:
+        """Set its acceptance filter: from now on it receives standard frames with these identifiers alone."""
+        self._filters[participant] = cob_ids
+        self._routes.clear()
 
     @property
     def pending(self) -> int:
@@ -103,7 +121,7 @@ class CanBus:
 
     def send(self, frame: Frame, sender: object) -> None:
         """Queue a frame; it goes out when it wins the bus."""
-        if all(disturbance.leaves(frame, sender) for disturbance in self.disturbances):
+        if not self.disturbances or all(one.leaves(frame, sender) for one in self.disturbances):
             self.queue(frame, sender)
 
     def queue(self, frame: Frame, sender: object) -> None:
@@ -123,7 +141,9 @@ class CanBus:
     def _start_next(self) -> None:
         self._on_wire = waiting = heapq.heappop(self._pending)
         _, _, frame, sender = waiting
-        destroyed = not all(one.survives(frame, sender) for one in self.disturbances)
+        destroyed = bool(self.disturbances) and not all(
+            one.survives(frame, sender) for one in self.disturbances
+        )
         bits = frame.bits() / 2 + _ERROR_FRAME_BITS if destroyed else frame.bits()
         duration_ns = round(bits * SECOND_NS / self.bitrate)
         self.busy_ns += duration_ns
@@ -141,9 +161,24 @@ class CanBus:
     def deliver(self, frame: Frame, sender: object) -> None:
         """A frame has come over the wire: every receiver but its sender gets it."""
         self.frames_carried += 1
-        for participant, receive in tuple(self._receivers.items()):
-            if participant is not sender and self._reaches(frame, sender, participant):
+        for participant, receive in self._route(frame):
+            if participant is not sender and (
+                not self.disturbances or self._reaches(frame, sender, participant)
+            ):
                 receive(frame, sender)
+
+    def _route(self, frame: Frame) -> tuple[tuple[object, Receiver], ...]:
+        """Who takes frames like this one; found once, until somebody comes, goes or filters otherwise."""
+        key = _EXTENDED_ROUTE if frame.extended else frame.cob_id
+        route = self._routes.get(key)
+        if route is None:
+            filters = self._filters
+            route = self._routes[key] = tuple(
+                (participant, receive)
+                for participant, receive in self._receivers.items()
+                if participant not in filters or key in filters[participant]
+            )
+        return route
 
     def _reaches(self, frame: Frame, sender: object, receiver: object) -> bool:
         return all(disturbance.arrives(frame, sender, receiver) for disturbance in self.disturbances)

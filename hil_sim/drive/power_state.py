@@ -73,8 +73,8 @@ TRANSITIONS: dict[tuple[PowerState, Command], PowerState] = {
 }
 
 # States in which the power stage has its voltage, and those in which the motor has current.
-LIVE = frozenset({S.SWITCHED_ON, S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE})
-ENERGISED = frozenset({S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.FAULT_REACTION_ACTIVE})
+LIVE = (S.SWITCHED_ON, S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE)
+ENERGISED = (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.FAULT_REACTION_ACTIVE)
 
 
 def command_of(controlword: int, previous: int) -> Command | None:

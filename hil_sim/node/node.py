@@ -40,7 +40,7 @@ class Node:
         self.powered = False
         self._bus = bus
         self._boots = 0
-        self._handlers: dict[int, list[Handler]] = {}
+        self._handlers: dict[int, tuple[Handler, ...]] = {}
         self._emergencies = Emergencies(clock, dictionary, self.send, self._communicates)
         self._heartbeat = HeartbeatProducer(clock, dictionary, self._send_heartbeat)
         self._consumer = HeartbeatConsumer(clock, dictionary, self._heartbeat_lost, self._heartbeat_back)
@@ -95,7 +95,7 @@ class Node:
         self._guarding.reset()
         self._stop_communicating()
         self._pdos.stop()
-        self._handlers = {}
+        self._take({})
 
     # -- what a profile adds ---------------------------------------------------------------------------
 
@@ -163,7 +163,12 @@ class Node:
         handlers = defaultdict(list)
         for identifier, handler in self._all_handlers():
             handlers[identifier].append(handler)
+        self._take({identifier: tuple(several) for identifier, several in handlers.items()})
+
+    def _take(self, handlers: dict[int, tuple[Handler, ...]]) -> None:
         self._handlers = handlers
+        if self.powered:
+            self._bus.accept(self, handlers)
 
     def _all_handlers(self) -> Iterator[tuple[int, Handler]]:
         yield nmt.NMT_COB_ID, self._nmt_received
