@@ -14,7 +14,7 @@ from ml.store.errors import translated
 CONNECT_TIMEOUT: Final = "5s"
 TIMEOUT: Final = "60s"
 _CLIENT: Final = ("connect_timeout", "timeout", "allow_http")
-_RETRY: Final = {"max_retries": 3}
+RETRIES: Final = 3  # within one request; who calls us tries again later, with patience
 _PROFILE: Final = {  # what a profile's lines are called in the libraries
     "aws_access_key_id": "aws_access_key_id",
     "aws_secret_access_key": "aws_secret_access_key",
@@ -75,7 +75,11 @@ def _open(url: str) -> ObjectStore:
         return from_url(url, mkdir=True)
     options = s3_options()
     client = {name: options.pop(name) for name in _CLIENT if name in options}
-    settings: dict[str, Any] = {"config": options, "client_options": client, "retry_config": _RETRY}
+    settings: dict[str, Any] = {
+        "config": options,
+        "client_options": client,
+        "retry_config": {"max_retries": RETRIES},
+    }
     opened: ObjectStore = from_url(url, **settings)
     return opened
 

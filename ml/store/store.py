@@ -22,7 +22,7 @@ from deltalake.exceptions import CommitFailedError
 
 from ml.store import durable
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
-from ml.store.objects import Objects, s3_options
+from ml.store.objects import RETRIES, Objects, s3_options
 from ml.store.probe import probe
 from ml.store.tables import Table
 
@@ -32,7 +32,7 @@ ROW_GROUP: Final = 100_000  # rows that are read or left out together
 _ABOUT: Final = "store.json"
 FORMAT: Final = 1  # of the store as a whole
 # We make checkpoints ourselves, so that those in a folder are synchronised like everything else.
-_NO_HOOKS: Final = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
+NO_HOOKS: Final = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
 
 Batches = Callable[[], Iterator[pa.RecordBatch]]
 
@@ -151,7 +151,7 @@ class Store:
         return f"{self.url}/{location}"
 
     def _options(self) -> dict[str, str]:
-        return {} if self.folder is not None else s3_options()
+        return {} if self.folder is not None else s3_options() | {"max_retries": str(RETRIES)}
 
     def _writable(self, table: Table, location: str) -> DeltaTable:
         delta = self._open.get(location)
@@ -190,7 +190,7 @@ class Store:
             schema_mode="merge",
             writer_properties=writer_properties(schema),
             commit_properties=CommitProperties(app_transactions=[transaction]),
-            post_commithook_properties=_NO_HOOKS,
+            post_commithook_properties=NO_HOOKS,
         )
 
     def _settle(self, location: str, delta: DeltaTable, writer: str, sequence: int) -> None:

@@ -1,0 +1,145 @@
+"""Keeping a store in order: small files become few, old rows go, what a model names stays."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Final
+from urllib.parse import unquote
+
+import msgspec
+import pyarrow as pa
+from deltalake import DeltaTable
+from deltalake.exceptions import CommitFailedError
+
+from ml.store import durable
+from ml.store.errors import NoSuchTable, StoreError, translated
+from ml.store.store import NO_HOOKS, Store, writer_properties
+from ml.store.tables import TABLES, Table
+
+TARGET_BYTES: Final = 256 << 20  # of a file that compaction makes
+GRACE: Final = timedelta(
+    days=7
+)  # a file that nobody needs any more stays so long, for whoever still reads it
+_PINS: Final = "pins"
+
+
+class Pin(msgspec.Struct, frozen=True):
+    """A version of a table that `by`, a model for example, was made from."""
+
+    location: str
+    version: int
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
+class Compacted:
+    """What a compaction did to one table."""
+
+    location: str
+    files_before: int
+    files_after: int
+
+
+def pin(store: Store, location: str, version: int, by: str) -> None:
+    """Keep this version of the table readable until `unpin`; raises `NoSuchTable` where it is not there."""
+    store.table(location, version)
+    named = Pin(location, version, by)
+    store.objects.create(_path(named), msgspec.json.encode(named))
+
+
+def unpin(store: Store, location: str, version: int, by: str) -> None:
+    """Let the version go, as far as `by` is concerned."""
+    store.objects.remove(_path(Pin(location, version, by)))
+
+
+def pins(store: Store) -> list[Pin]:
+    """Every version that somebody names."""
+    found = (store.objects.read(name) for name in store.objects.names(_PINS))
+    return [msgspec.json.decode(data, type=Pin) for data in found if data is not None]
+
+
+def compact(store: Store, tables: Sequence[Table] = tuple(TABLES.values())) -> list[Compacted]:
+    """Put small files together; nothing that is written meanwhile is disturbed, and old versions stay."""
+    return [_compact(store, location) for location in _locations(store, tables)]
+
+
+def retain(store: Store, tables: Sequence[Table], before: datetime) -> dict[str, int]:
+    """Remove rows older than `before` (with a time zone); how many went, by location.
+
+    They stay readable in old versions until `vacuum`.
+    """
+    if before.tzinfo is None:
+        raise ValueError("`before` needs a time zone: the store's times are UTC")
+    went: dict[str, int] = {}
+    for location in _locations(store, tables):
+        with translated(f"{store.url}/{location} cannot be changed"):
+            delta = store.table(location)
+            found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
+            _make_last(store, location, delta)
+        went[location] = int(found["num_deleted_rows"] or 0)
+    return went
+
+
+def vacuum(
+    store: Store, tables: Sequence[Table] = tuple(TABLES.values()), grace: timedelta = GRACE
+) -> list[str]:
+    """Delete files that no version newer than `grace` needs, nor one that is pinned; their names."""
+    kept: dict[str, list[int]] = {}
+    for named in pins(store):
+        kept.setdefault(named.location, []).append(named.version)
+    gone: list[str] = []
+    for location in _locations(store, tables):
+        with translated(f"{store.url}/{location} cannot be cleaned"):
+            gone += store.table(location).vacuum(
+                retention_hours=int(grace / timedelta(hours=1)),
+                enforce_retention_duration=False,
+                dry_run=False,
+                keep_versions=sorted(kept.get(location, [])) or None,
+                post_commithook_properties=NO_HOOKS,
+            )
+    return gone
+
+
+def _compact(store: Store, location: str) -> Compacted:
+    with translated(f"{store.url}/{location} cannot be compacted"):
+        delta = store.table(location)
+        before = len(delta.file_uris())
+        try:
+            delta.optimize.compact(
+                target_size=TARGET_BYTES,
+                writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
+                post_commithook_properties=NO_HOOKS,
+            )
+        except CommitFailedError as error:  # rows were removed meanwhile
+            raise StoreError(f"{store.url}/{location} was changed meanwhile; compact it again") from error
+        _make_last(store, location, delta)
+        return Compacted(location, before, len(delta.file_uris()))
+
+
+def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
+    """Synchronise a folder's files, and begin the log anew with a checkpoint."""
+    delta.create_checkpoint()
+    if store.folder is not None:
+        table = store.folder / location
+        files = [
+            table / unquote(path) for path in delta.get_add_actions(flatten=True).column("path").to_pylist()
+        ]
+        durable.synchronise([*files, *(table / durable.LOG).iterdir()])
+
+
+def _locations(store: Store, tables: Sequence[Table]) -> list[str]:
+    """Where these tables lie, as far as something has been written to them."""
+    found: list[str] = []
+    for location in (location for table in tables for location in table.locations(store.about.shards)):
+        try:
+            store.table(location)
+        except NoSuchTable:
+            continue
+        found.append(location)
+    return found
+
+
+def _path(named: Pin) -> str:
+    digest = hashlib.sha256(msgspec.json.encode(named)).hexdigest()[:32]
+    return f"{_PINS}/{digest}.json"
