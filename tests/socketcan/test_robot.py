@@ -81,6 +81,18 @@ def test_a_robot_on_a_real_bus_is_seen_tuned_and_stopped_and_comes_back_with_its
         until(lambda: set(robot.stop("the test is over").drives.values()) == {"confirmed"})
 
 
+@pytest.mark.parametrize(
+    ("interface", "words"),
+    [(NAME, DOWN), ("lo", "lo is no CAN interface"), ("vcan9", "ip link add vcan9 type vcan")],
+)
+def test_an_interface_that_cannot_be_used_is_refused_in_words(
+    interface: str, words: str, tmp_path: Path
+) -> None:
+    set_up(False)
+    with pytest.raises(SimulatorError, match=words):
+        SimulatedRobot(tmp_path, interface=interface).open()
+
+
 def test_simulators_beside_each_other_share_the_bus_and_its_node_ids(
     tmp_path: Path, peer: can.BusABC
 ) -> None:

@@ -18,9 +18,9 @@ missing = [command for command in ("linux.uml", "ip", "busybox") if shutil.which
 @pytest.mark.skipif(
     bool(missing), reason=f"no {', '.join(missing)}: apt-get install user-mode-linux iproute2 busybox"
 )
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 def test_the_vcan_tests_pass_in_user_mode_linux() -> None:
-    run = subprocess.run([SCRIPT], capture_output=True, text=True, timeout=280, check=False)
+    run = subprocess.run([SCRIPT], capture_output=True, text=True, timeout=580, check=False)
     if BOOTED not in run.stdout:
         pytest.skip(f"User Mode Linux does not boot here: {(run.stdout + run.stderr)[-300:]}")
     assert run.returncode == 0, run.stdout
