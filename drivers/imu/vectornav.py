@@ -22,6 +22,7 @@ BINARY, ASCII = 0xFA, ord("$")
 LONGEST_ASCII = 256
 TESLA_PER_GAUSS = 1e-4
 CLOCK = ClockSpec(1_000_000_000, 1 << 64)  # time since start-up
+IN_A_MESSAGE = bytes(byte for byte in range(0x20, 0x7F) if byte != ASCII)  # between `$` and `*`
 HEX_DIGITS = frozenset(b"0123456789ABCDEFabcdef")
 
 # What the values of an ASCII message are, in order.
@@ -131,7 +132,7 @@ def _ascii_length(buffer: bytearray, start: int) -> int:
     """Up to the checksum's last digit; the byte behind it tells whether it has two or four."""
     star = buffer.find(b"*", start, start + LONGEST_ASCII)
     body = buffer[start + 1 : star if star >= 0 else start + LONGEST_ASCII]
-    if not all(0x20 <= byte < 0x7F for byte in body) or b"$" in body:
+    if body.translate(None, IN_A_MESSAGE):
         return IMPOSSIBLE
     if star < 0:
         return UNKNOWN if len(buffer) < start + LONGEST_ASCII else IMPOSSIBLE

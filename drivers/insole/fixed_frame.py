@@ -13,6 +13,7 @@ from drivers.insole.layout import Foot
 from drivers.insole.order import Order
 from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
 
+REALS = ("f32", "f64")
 LONGEST = 4096
 LETTERS = {
     "u8": "B",
@@ -65,6 +66,13 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         self._counting = {field.count for field in description.fields if isinstance(field.count, str)}
         self._tail = self._checksum_size + len(self._terminator)
         self._order = Order(self.counters, _sequence_modulus(description), each_foot=True)
+        self._feet: dict[float, Foot] = {description.foot_left: "left", description.foot_right: "right"}
+        self._scale = description.pascal_per_count or _scale_of(description, "cells")
+        self._reals = [field.name for field in description.fields if field.type in REALS]
+        known = {"cells", "foot", "sequence", *description.time}
+        self._others = [field for field in description.fields if field.name not in known]
+        if not self._counting:
+            self.constant_length = self._length(self._buffer, 0)
 
     def _restart(self) -> None:
         self._order.restart()
@@ -116,11 +124,10 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         description = self._description
         foot: Foot | None = None
         if "foot" in values:
-            feet: dict[float, Foot] = {description.foot_left: "left", description.foot_right: "right"}
-            foot = feet.get(values["foot"][0])
+            foot = self._feet.get(values["foot"][0])
             if foot is None:
                 return None
-        if not all(math.isfinite(number) for numbers in values.values() for number in numbers):
+        if not all(math.isfinite(number) for name in self._reals for number in values[name]):
             return None
         seconds = sum(values[name][0] * scale for name, scale in description.time.items())
         ticks = round(seconds * 1e6) if description.time else None
@@ -129,9 +136,9 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         missing = "missing" in means or f"{foot}_missing" in means
         saturated = "saturated" in means
         self.counters.saturated += saturated
-        scale = description.pascal_per_count or _scale_of(description, "cells")
+        scale, counts = self._scale, values["cells"]
         return InsoleFrame(
-            cells=tuple(None if missing else number * scale for number in values["cells"]),
+            cells=(None,) * len(counts) if missing else tuple([number * scale for number in counts]),
             foot=foot,
             calibrated=description.pascal_per_count is not None,
             saturated=saturated,
@@ -144,12 +151,10 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
 
     def _more(self, values: dict[str, Numbers]) -> dict[str, float | list[float]]:
         """The fields without a meaning of their own, scaled."""
-        known = {"cells", "foot", "sequence", *self._description.time}
         more: dict[str, float | list[float]] = {}
-        for field in self._description.fields:
-            if field.name not in known:
-                scaled = [number * field.scale for number in values[field.name]]
-                more[field.name] = scaled[0] if field.count == 1 else scaled
+        for field in self._others:
+            scaled = [number * field.scale for number in values[field.name]]
+            more[field.name] = scaled[0] if field.count == 1 else scaled
         return more
 
 
