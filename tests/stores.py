@@ -74,10 +74,18 @@ class SeaweedFS:
             "-s3", f"-s3.port={s3}", "-s3.port.iceberg=0", "-s3.port.lance=0",
             f"-s3.config={self.folder / 's3.json'}",
             "-master.volumeSizeLimitMB=64", "-volume.max=50", "-master.telemetry=false",
+            "-master.resumeState=false", "-master.electionTimeout=1s",
         ]  # fmt: skip
+        # It would let in whoever the environment names.
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("AWS_")}
         with (self.folder / "log").open("ab") as log:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=self.folder
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                cwd=self.folder,
+                env=environment,
             )
         deadline_s = time.monotonic() + START_S
         while not self._answers():
