@@ -5,17 +5,18 @@ ESRCH, whoever has the pid by then.
 """
 
 import errno
+import fcntl
 import os
 import resource
 from collections.abc import Collection
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from gateway.messages import MemoryUse
 from gateway.modules.counters import CoreTimes, ProcessTimes
 
-KEPT_MOST = 512  # descriptors; select(2), which serial drivers wait in, takes none above 1023
-KEPT_SHARE = 4  # and no more than this part of what the process may open
+KEPT_MOST = 4096  # descriptors, and no more than half of those that the process may have
+SELECTABLE = 1024  # select(2), which serial drivers wait in, takes lower numbers only: ours leave them free
 
 _STAT_BYTES = 1024  # all that we take from a process's line stands within
 _FILE_BYTES = 64 * 1024
@@ -52,8 +53,10 @@ class Procfs:
     def __init__(self, root: str = "/proc") -> None:
         self._root = root
         self._known: dict[str, _Process] = {}
-        limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-        self._keep_most = KEPT_MOST if limit < 0 else min(KEPT_MOST, limit // KEPT_SHARE)
+        soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        limit = soft if soft != resource.RLIM_INFINITY else SELECTABLE + KEPT_MOST
+        self._lowest = min(SELECTABLE, limit // 2)
+        self._keep_most = min(KEPT_MOST, limit - self._lowest)
         self._kept: set[_Process] = set()
         with ExitStack() as opened:
             self._stat = _open(f"{root}/stat", opened)
@@ -134,15 +137,18 @@ class Procfs:
             if process is not None and process.started_ticks == met.started_ticks:
                 process.update(stat)
                 met = process
-            if len(self._kept) < self._keep_most:
-                self._kept.add(met)
-                met.descriptor, descriptor = descriptor, -1
+            self._keep(met, descriptor)
             return met
         except ProcessLookupError:
             return None
         finally:
-            if descriptor >= 0:
-                os.close(descriptor)
+            os.close(descriptor)
+
+    def _keep(self, process: _Process, descriptor: int) -> None:
+        if len(self._kept) < self._keep_most:
+            with suppress(OSError):  # others have the high numbers: it is opened anew each time
+                process.descriptor = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, self._lowest)
+                self._kept.add(process)
 
     def _descriptor(self, path: str) -> int:
         try:

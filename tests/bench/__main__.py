@@ -1,4 +1,4 @@
-"""`python -m tests.bench [NAME …]`: run the named measurements, or all of them."""
+"""`python -m tests.bench [NAME …] [--quick]`: run the named measurements, or all; some have a shorter run."""
 
 import importlib
 import pkgutil
@@ -11,7 +11,7 @@ def main() -> int:
     known = sorted(
         module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)]) if module.name[0] != "_"
     )
-    wanted = sys.argv[1:] or known
+    wanted = [word for word in sys.argv[1:] if word != "--quick"] or known
     unknown = [name for name in wanted if name not in known]
     if unknown:
         sys.stderr.write(f"there is no measurement {', '.join(unknown)}; there are: {', '.join(known)}\n")

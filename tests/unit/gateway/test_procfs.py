@@ -1,6 +1,8 @@
 """Linux's counters: the same answer as psutil's, and processes that end, hide or are too many."""
 
 import errno
+import fcntl
+import functools
 import os
 import resource
 import subprocess
@@ -16,12 +18,13 @@ from gateway.messages import ResourceSnapshotParams
 from gateway.modules.counters import Counters, ProcessTimes
 from gateway.modules.host import Meter
 from gateway.modules.portable import Portable
-from gateway.modules.procfs import KEPT_SHARE, Procfs
+from gateway.modules.procfs import SELECTABLE, Procfs
 from tests.unit.gateway.harness import Client, until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="procfs is Linux's")
 
 MB = 1 << 20
+limits = functools.partial(resource.getrlimit, resource.RLIMIT_NOFILE)
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 PAGE = os.sysconf("SC_PAGE_SIZE")
 SLEEP = [sys.executable, "-S", "-c", "held = bytearray(b'x' * (32 << 20)); print(flush=True); input()"]
@@ -29,15 +32,15 @@ SLEEP = [sys.executable, "-S", "-c", "held = bytearray(b'x' * (32 << 20)); print
 
 def kept_lines() -> list[str]:
     """The processes' lines that this process holds open."""
-    found = []
-    for entry in Path("/proc/self/fd").iterdir():
-        try:
-            target = str(entry.readlink())
-        except OSError:
-            continue
-        if target.endswith("/stat") and target != "/proc/stat":
-            found.append(target)
-    return found
+    targets = map(target, Path("/proc/self/fd").iterdir())
+    return [one for one in targets if one.endswith("/stat") and one != "/proc/stat"]
+
+
+def target(entry: Path) -> str:
+    try:
+        return str(entry.readlink())
+    except OSError:  # what listed them
+        return ""
 
 
 @pytest.fixture
@@ -274,7 +277,7 @@ class TestEnding:
 class TestTooMany:
     @pytest.fixture(autouse=True)
     def few_descriptors(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(resource, "getrlimit", lambda _what: (3 * KEPT_SHARE, 4096))
+        monkeypatch.setattr(resource, "getrlimit", lambda _what: (6, 4096))
 
     def test_no_more_are_kept_than_there_is_room_for(
         self, procfs: Procfs, child: "subprocess.Popen[str]"
@@ -282,6 +285,30 @@ class TestTooMany:
         for _ in range(3):
             assert {1, os.getpid(), child.pid} <= by_pid(procfs).keys()
             assert len(kept_lines()) == 3
+
+    def test_low_numbers_are_left_to_those_who_wait_in_select(
+        self, child: "subprocess.Popen[str]", monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        soft, hard = limits()
+        if soft <= SELECTABLE:
+            pytest.skip(f"a process may have {soft} descriptors here")
+        monkeypatch.setattr(resource, "getrlimit", lambda _what: (soft, hard))
+        procfs = Procfs()
+        assert child.pid in by_pid(procfs)
+        mine = [one for one in Path("/proc/self/fd").iterdir() if target(one) == f"/proc/{child.pid}/stat"]
+        procfs.close()
+        assert [int(one.name) >= SELECTABLE for one in mine] == [True]
+
+    def test_without_high_numbers_each_is_opened_anew(
+        self, procfs: Procfs, child: "subprocess.Popen[str]", monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def none_left(*_arguments: object) -> int:
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+        monkeypatch.setattr(fcntl, "fcntl", none_left)
+        for _ in range(2):
+            assert {1, os.getpid(), child.pid} <= by_pid(procfs).keys()
+            assert kept_lines() == []
 
     def test_one_that_is_not_kept_is_known_again_by_its_start(
         self, fake: Fake, open_fake: Callable[[], Procfs]
