@@ -101,6 +101,29 @@ def test_a_client_reaches_the_bus_and_the_other_clients_but_not_itself(running: 
     assert Frame(0x60A, b"\x40\x00\x10\xff") in running.heard
 
 
+class Loaded(Running):
+    """More numbered frames than the bus has time for, for a second, once it may begin."""
+
+    FRAMES = 8457  # of 8 bytes in a second at 1 Mbit/s
+    begins = False
+
+    def _talk(self) -> None:
+        for _ in range(9):
+            if self.begins and self._counter < self.FRAMES:
+                self.bus.send(Frame(0x181, struct.pack("<Q", self._counter)), self)
+                self._counter += 1
+
+
+def test_a_fully_loaded_bus_reaches_three_clients_whole_and_in_order() -> None:
+    with closing(Loaded()) as running, ExitStack() as stack:
+        clients = [stack.enter_context(running.client()) for _ in range(3)]
+        running.begins = True
+        for client in clients:
+            got = [receive(client, lambda _: True).data for _ in range(Loaded.FRAMES)]
+            assert got == [struct.pack("<Q", counter) for counter in range(Loaded.FRAMES)]
+        assert running.hub.clients_cut == 0
+
+
 def test_error_frames_reach_the_clients_and_cost_no_frame(running: Running) -> None:
     class EverySecondAttempt(Disturbance):
         attempts = 0
