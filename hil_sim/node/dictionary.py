@@ -81,7 +81,10 @@ class Entry:
 
     def write(self, data: bytes) -> None:
         """Take a value from the wire after every check that a device makes; raises `SdoAbort`."""
-        value = coding.decode(self.data_type, data)
+        self.take(coding.decode(self.data_type, data))
+
+    def take(self, value: Value) -> None:
+        """Take a value of the object's type, likewise."""
         if not isinstance(value, str | bytes):
             if self.high is not None and value > self.high:
                 raise SdoAbort(AbortCode.TOO_HIGH)

@@ -158,6 +158,7 @@ class Rpdo:
         self._deadline_ns = dictionary.number((index, EVENT_TIMER)) * MILLISECOND_NS
         self._deadline: Event | None = None
         self._waiting: bytes | None = None
+        self.wrong: set[int] = set()  # the errors that were reported and are not over
 
     def stop(self) -> None:
         self._waiting = None
@@ -167,10 +168,12 @@ class Rpdo:
 
     def receive(self, data: bytes) -> None:
         length = self._mapping.length
-        self._report(TOO_SHORT, len(data) < length)
-        self._report(TOO_LONG, len(data) > length)
-        self._report(TIMED_OUT, False)
-        self._watch()
+        if self.wrong or len(data) != length:
+            self._tell(TOO_SHORT, len(data) < length)
+            self._tell(TOO_LONG, len(data) > length)
+            self._tell(TIMED_OUT, False)
+        if self._deadline_ns:
+            self._watch()
         if len(data) < length:
             return
         if self._type in SYNCHRONOUS:
@@ -186,5 +189,10 @@ class Rpdo:
     def _watch(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
-        if self._deadline_ns:
-            self._deadline = self._clock.after(self._deadline_ns, lambda: self._report(TIMED_OUT, True))
+        self._deadline = self._clock.after(self._deadline_ns, lambda: self._tell(TIMED_OUT, True))
+
+    def _tell(self, code: int, present: bool) -> None:
+        """Report an error that is there, or one that was."""
+        if present or code in self.wrong:
+            self._report(code, present)
+        (self.wrong.add if present else self.wrong.discard)(code)

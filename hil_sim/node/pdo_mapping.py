@@ -1,5 +1,6 @@
 """What a PDO carries: its mapping, and which objects may be mapped (CiA 301 §7.5.2.36, §7.5.2.38)."""
 
+import struct
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Self
@@ -10,6 +11,11 @@ from hil_sim.node.dictionary import Dictionary, Entry, Key
 
 MAX_BITS = 64
 
+_CODES = {
+    (kind, bits): code
+    for kind, codes in (("signed", "bhiq"), ("unsigned", "BHIQ"))
+    for bits, code in zip((8, 16, 32, 64), codes, strict=True)
+}
 _FIRST_OBJECT = 0x20  # below are dummy entries: data types that only take room
 _NOT_SENT = ("wo", "rww")  # access types of objects that only RPDOs may carry
 _NOT_RECEIVED = ("ro", "const", "rwr")
@@ -55,6 +61,8 @@ class Mapping:
         self.fields = fields
         self.keys = frozenset(field.key for field in fields)
         self.length = (bits + 7) // 8
+        self._layout = _layout(fields)
+        self._entries = tuple(field.entry for field in fields if field.entry is not None)
 
     @classmethod
     def read(cls, dictionary: Dictionary, index: int, count: int) -> Self:
@@ -73,6 +81,11 @@ class Mapping:
         return cls()
 
     def pack(self) -> bytes:
+        if self._layout is not None:
+            try:
+                return self._layout.pack(*[entry.get() for entry in self._entries])
+            except struct.error:  # a value beyond its type, which is saturated
+                pass
         packed, shift = 0, 0
         for field in self.fields:
             if field.entry is not None:
@@ -82,6 +95,13 @@ class Mapping:
 
     def unpack(self, data: bytes) -> None:
         """Write the values into the dictionary; one that is refused leaves its object as it was."""
+        if self._layout is not None:
+            for entry, value in zip(self._entries, self._layout.unpack_from(data), strict=True):
+                try:
+                    entry.take(value)
+                except SdoAbort:
+                    continue
+            return
         packed = int.from_bytes(data, "little")
         for field in self.fields:
             raw = (packed & (1 << field.bits) - 1).to_bytes((field.bits + 7) // 8, "little")
@@ -89,3 +109,17 @@ class Mapping:
             if field.entry is not None:
                 with suppress(SdoAbort):
                     field.entry.write(raw)
+
+
+def _layout(fields: tuple[Field, ...]) -> struct.Struct | None:
+    """The fields as one struct, `None` where they are not all integers of 1, 2, 4 or 8 bytes."""
+    codes = ""
+    for field in fields:
+        data_type = None if field.entry is None else field.entry.data_type
+        if data_type is None or data_type.bits != field.bits:
+            return None
+        code = _CODES.get((data_type.kind, field.bits))
+        if code is None:
+            return None
+        codes += code
+    return struct.Struct(f"<{codes}")

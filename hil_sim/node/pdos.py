@@ -38,18 +38,12 @@ class Pdos:
         self._checking: Repeating | None = None
         self._tpdos: dict[int, Tpdo] = {}
         self._rpdos: dict[int, Rpdo] = {}
+        self.sent: list[Tpdo] = []  # those that are active
+        self.received: list[Rpdo] = []
         for number in self._numbers(pdo.TPDO_COMMUNICATION):
             self._guard(pdo.TPDO_COMMUNICATION, pdo.TPDO_MAPPING, number, self._load_tpdo)
         for number in self._numbers(pdo.RPDO_COMMUNICATION):
             self._guard(pdo.RPDO_COMMUNICATION, pdo.RPDO_MAPPING, number, self._load_rpdo)
-
-    @property
-    def sent(self) -> list[Tpdo]:
-        return [tpdo for tpdo in self._tpdos.values() if tpdo.active]
-
-    @property
-    def received(self) -> list[Rpdo]:
-        return [rpdo for rpdo in self._rpdos.values() if rpdo.active]
 
     def load(self) -> None:
         """Make all PDOs as the dictionary says."""
@@ -76,18 +70,18 @@ class Pdos:
 
     def take(self) -> None:
         """A SYNC came: what has been received takes effect."""
-        for rpdo in self._rpdos.values():
+        for rpdo in self.received:
             rpdo.synchronise()
 
     def synchronise(self, counter: int | None) -> None:
         """A SYNC came: what is to be sent is sampled."""
-        for tpdo in self._tpdos.values():
+        for tpdo in self.sent:
             tpdo.synchronise(counter)
 
     def changed(self, key: Key) -> None:
         """An object has changed of which the application says so."""
         if self._running:
-            for tpdo in self._tpdos.values():
+            for tpdo in self.sent:
                 tpdo.changed(key)
 
     # -- made from the dictionary ------------------------------------------------------------------------
@@ -106,6 +100,7 @@ class Pdos:
     def _load_tpdo(self, number: int) -> None:
         before = self._tpdos.get(number)
         tpdo = self._tpdos[number] = Tpdo(self._clock, self._dictionary, number, self._send)
+        self.sent = [one for one in self._tpdos.values() if one.active]
         if before is not None:
             before.stop()
         if self._running and before is not None and before.active:
@@ -116,17 +111,19 @@ class Pdos:
 
     def _load_rpdo(self, number: int) -> None:
         before = self._rpdos.get(number)
-        if before is not None:
-            before.stop()
-        self._rpdos[number] = Rpdo(
+        rpdo = self._rpdos[number] = Rpdo(
             self._clock,
             self._dictionary,
             number,
             lambda code, present: self._report(number, code, present),
         )
+        if before is not None:
+            before.stop()
+            rpdo.wrong = before.wrong
+        self.received = [one for one in self._rpdos.values() if one.active]
 
     def _check_changes(self) -> None:
-        wanted = self._running and any(tpdo.on_change for tpdo in self._tpdos.values())
+        wanted = self._running and any(tpdo.on_change for tpdo in self.sent)
         if wanted and self._checking is None:
             self._checking = self._clock.every(_CHECK_NS, self._check)
         elif not wanted and self._checking is not None:
@@ -134,5 +131,5 @@ class Pdos:
             self._checking = None
 
     def _check(self) -> None:
-        for tpdo in self._tpdos.values():
+        for tpdo in self.sent:
             tpdo.check()
