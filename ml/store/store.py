@@ -206,7 +206,7 @@ class Store:
 
 
 def writer_properties(schema: pa.Schema) -> WriterProperties:
-    """How Parquet is written: measured in docs/adr/0008."""
+    """How Parquet is written: measured in docs/adr/0009."""
     plain = ColumnProperties(dictionary_enabled=False, statistics_enabled="CHUNK")
     split = ColumnProperties(
         dictionary_enabled=False, statistics_enabled="CHUNK", encoding="BYTE_STREAM_SPLIT"
