@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from hil_sim import robot_file
+from hil_sim.bus.load import LoadWatch
 from hil_sim.bus.socketcan import SocketCanBridge
 from hil_sim.control_socket import ControlSocket
 from hil_sim.exoskeleton import Exoskeleton, Scenario
@@ -25,9 +26,10 @@ class SimulatedRobot(Housing):
             bus = can.Bus(interface="virtual", channel="bench")
 
     The wearer is subject `person`; the ground truth is written to `truth`; `drives` names the files of joints
-    with other drives than ours. With `interface` the bus is that CAN interface of Linux, and `say` is told
-    when it goes and comes back; the nodes in `without` are not simulated. `faults` and `operator` belong to
-    the thread that runs it; others use the control socket in the folder. For the rest see `Housing`.
+    with other drives than ours. With `interface` the bus is that CAN interface of Linux; the nodes named in
+    `without` are not simulated. `say` is told when the interface goes and comes back, and when the bus is
+    overloaded. `faults` and `operator` belong to the thread that runs it; others use the control socket in
+    the folder. For the rest see `Housing`.
     """
 
     def __init__(
@@ -78,4 +80,5 @@ class SimulatedRobot(Housing):
             closing.callback(TruthFile(self._truth, self.exoskeleton).close)
         closing.callback(ControlSocket(loop, self.folder.path, self.operator.obey).close)
         closing.callback(self.faults.clear)
+        LoadWatch(self.exoskeleton.bus, self._say)
         self.exoskeleton.power_on()

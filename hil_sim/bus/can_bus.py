@@ -43,6 +43,7 @@ class Frame(NamedTuple):
         return base << 2 | self.extended << 1 | self.remote
 
 
+_MOST_WAITING = 16_384  # frames, about two seconds at 1 Mbit/s: controllers have no room for more
 _EXTENDED_ROUTE = -1  # of every 29-bit identifier: who filters takes standard frames alone
 
 Receiver = Callable[[Frame, object], None]
@@ -81,6 +82,7 @@ class CanBus:
         self.bitrate = bitrate
         self.carries_at_once = False
         self.frames_carried = 0
+        self.frames_lost = 0
         self.busy_ns = 0
         self.disturbances: list[Disturbance] = []
         self._receivers: dict[object, Receiver] = {}
@@ -130,6 +132,14 @@ class CanBus:
         heapq.heappush(self._pending, (frame.arbitration(), self._queued, frame, sender))
         if not self._transmitting:
             self._start_next()
+        elif len(self._pending) > _MOST_WAITING:
+            self._shed()
+
+    def _shed(self) -> None:
+        """Lose the half that would win last."""
+        self._pending.sort()  # a sorted list is a heap
+        self.frames_lost += len(self._pending) - _MOST_WAITING // 2
+        del self._pending[_MOST_WAITING // 2 :]
 
     def withdraw(self, sender: object) -> None:
         """The sender's controller is off: what waits of it never goes out, what is on the wire breaks off."""
