@@ -31,6 +31,6 @@ class LoadWatch:
     def _overload(self, lost: int) -> str:
         bus = self._bus
         return (
-            f"the bus is overloaded at {bus.bitrate / 1e6:g} Mbit/s: {bus.pending} frames wait, {lost} were lost "
-            "in the last second; send fewer PDOs, or SYNC less often"
+            f"the bus is overloaded at {bus.bitrate / 1e6:g} Mbit/s: {bus.pending} frames wait and {lost} "
+            "were lost in the last second; send fewer PDOs, or SYNC less often"
         )
