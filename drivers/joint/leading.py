@@ -17,10 +17,7 @@ from drivers.joint.setpoint import hold_still
 
 LOOK_S = 0.01  # between two looks at the statusword
 FAULT_RESET_S = 0.5  # between two attempts to reset a fault that stays
-STANDS_S, STANDS_COUNTS_SHARE = (
-    0.05,
-    1e-4,
-)  # an axis that moves less than this share of a turn meanwhile stands
+STANDS_S, STANDS_SHARE = 0.05, 1e-4  # an axis that moves less than this share of a turn in this time stands
 OVERTAKEN = "a stop came in between"
 _WAY_UP_STATES = (*WAY_UP, DriveState.OPERATION_ENABLED)
 
@@ -107,7 +104,7 @@ class _Descent:
     def _stands(self) -> bool:
         before = self._axis.position()
         time.sleep(STANDS_S)
-        return abs(self._axis.position() - before) <= STANDS_COUNTS_SHARE * self._errand.counts_per_turn
+        return abs(self._axis.position() - before) <= STANDS_SHARE * self._errand.counts_per_turn
 
 
 def _step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:

@@ -15,9 +15,8 @@ from drivers.joint.commands import Controlword
 
 CONFIRMING_READS = 2  # another master may enable the drive again between two of its cycles
 READ_PERIOD_S = 0.01
-FIRST_PATIENCE_S = (
-    0.05  # for an answer before it is asked again; twice as long each time, up to the channel's
-)
+# How long an answer is waited for before it is asked again: twice as long each time, up to the channel's.
+FIRST_PATIENCE_S = 0.05
 
 
 class StopOutcome(StrEnum):

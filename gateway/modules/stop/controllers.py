@@ -30,14 +30,20 @@ class Write:
 
 
 class Controller:
-    """One controller with all its objects."""
+    """One controller with all its objects, which is stopped once at a time."""
 
     def __init__(self, node: Any, writes: tuple[Write, ...]) -> None:
         self._node = node
         self._writes = writes
+        self._running: Future[Report] | None = None
 
     def stop(self, *, wake: bool = True) -> "Future[Report]":
         """Write ahead of everything else that is asked of its node; see `Node.run`. Never raises."""
+        if self._running is None or self._running.done():
+            self._running = self._begin(wake=wake)
+        return self._running
+
+    def _begin(self, *, wake: bool) -> "Future[Report]":
         first = self._writes[0]
         ahead = expedited(first.index, first.subindex, first.data) if len(first.data) <= EXPEDITED else None
         deadline = time.monotonic() + INSIST_S

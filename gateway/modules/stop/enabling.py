@@ -4,7 +4,6 @@ All chosen drives make one transition together; whatever comes in between, a sto
 was begun is stopped.
 """
 
-import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 
@@ -17,8 +16,6 @@ from gateway.messages import Enabled
 from gateway.modules.stop.drive import Drive, quick_stop_all
 from gateway.modules.stop.reset import as_led, state_words
 from gateway.records.journal import Journal
-
-log = logging.getLogger(__name__)
 
 Objection = Callable[[], str | None]  # why it must not go on, `None` where it may
 

@@ -84,17 +84,15 @@ class Stop:
         def tell() -> None:
             if not answer.done():
                 timer.cancel()
-                reports = {name: _now(stop) for name, stop in stops.items()}
-                reports |= last.result() if last.done() else {}
-                answer.set_result(self._answer({**reports, **self._unreachable}, kept))
+                answer.set_result(self._answer(_so_far(stops, last), kept))
 
         timer = self._loop.call_later(self._settings.timeout_s, tell)
         everything: dict[str, Future[Any]] = {**stops, "last resort": last, "hold kept": kept}
         gather(everything).add_done_callback(lambda _all: self._loop.call(tell))
         return answer
 
-    def _answer(self, reports: Mapping[str, Report], kept: "Future[str | None]") -> Stopped:
-        controllers = self._controllers.names
+    def _answer(self, found: Mapping[str, Report], kept: "Future[str | None]") -> Stopped:
+        controllers, reports = self._controllers.names, {**found, **self._unreachable}
         said: dict[str, Said] = {name: report.outcome.value for name, report in reports.items()}
         return Stopped(
             drives={name: one for name, one in said.items() if name not in controllers},
@@ -110,12 +108,20 @@ def _is_confirmed(stop: "Future[Report]") -> bool:
     return isinstance(report, Report) and report.outcome is StopOutcome.CONFIRMED
 
 
-def _now(stop: "Future[Report]") -> Report:
+def _so_far(stops: "Mapping[str, Future[Report]]", last: "Future[dict[str, Report]]") -> dict[str, Report]:
     """What is known by now; a target that has not answered yet is not confirmed."""
-    if not stop.done():
-        return Report(StopOutcome.UNCONFIRMED)
-    found: Report | Exception = outcome(stop)
-    return _report(found)
+    reports = dict.fromkeys(stops, Report(StopOutcome.UNCONFIRMED))
+    for name, stop in stops.items():
+        if stop.done():
+            found: Report | Exception = outcome(stop)
+            reports[name] = _report(found)
+    if not last.done():
+        return reports
+    after: dict[str, Report] | Exception = outcome(last)
+    if isinstance(after, Exception):
+        log.error("the last resort of a stop failed", exc_info=after)
+        return reports
+    return reports | after
 
 
 def _report(found: Report | Exception) -> Report:

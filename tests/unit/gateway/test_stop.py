@@ -12,6 +12,7 @@ from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
 from gateway.config import ConfigError
 from gateway.modules.stop.drive import is_enabled
+from gateway.modules.stop.target import Report
 from tests.unit.gateway.harness import (
     DISABLED,
     ENABLED,
@@ -276,6 +277,28 @@ class TestController:
         with stopping(tmp_path, table) as client:
             assert client.call("robot.stop")["controllers"] == {"gait": "unreachable"}
             assert object_ in client.call("robot.describe")["stop"]["controllers"]["gait"]
+
+    def test_it_is_asked_once_at_a_time(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """One that hangs must not gather what a drive, enabled again and again, would have it do."""
+        asked: list[Future[Report]] = []
+
+        def run(_job: object, **_how: object) -> Future[Report]:
+            asked.append(Future())
+            return asked[-1]
+
+        monkeypatch.setattr(bench.gait.node, "run", run)
+        with stopping(tmp_path, "timeout_s = 0.1\n" + CONTROLLER) as client:
+            assert client.call("robot.stop")["controllers"] == {"gait": "unconfirmed"}
+            for times in range(1, 4):
+                bench.left.set_state(ENABLED)
+                until(lambda times=times: bench.left.stops > times, "stopped again")  # type: ignore[misc]
+            assert len(asked) == 1
+            asked[0].set_result(Report(StopOutcome.CONFIRMED))
+            assert client.request("robot.stop")
+            until(lambda: len(asked) == 2, "and anew once it has answered")
+            asked[1].set_result(Report(StopOutcome.CONFIRMED))
 
     def test_it_is_stopped_again_with_its_drives(self, bench: Bench, tmp_path: Path) -> None:
         with stopping(tmp_path, CONTROLLER) as client:
