@@ -62,7 +62,10 @@ class SocketCanBridge:
         self._socket: socket.socket | None = open_interface(interface)
         try:
             self._refuse_doubles(self._socket)
-        except (OSError, SimulatorError):
+        except OSError as error:
+            self._socket.close()
+            raise InterfaceUnusable(f"{interface} went as it was opened: {error.strerror}") from error
+        except SimulatorError:
             self._socket.close()
             raise
         bus.carries_at_once = True
