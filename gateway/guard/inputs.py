@@ -54,10 +54,12 @@ class LevelWatcher(Watcher):
         self._seen_ns = stamp_ns
         number = self._measure(stamp_ns, value)
         over = self._band.left(number, tripped=self.state is State.TRIPPED)
-        late = time.monotonic_ns() - stamp_ns > self._stale_ns
-        if late and not over and self.state in (State.BLIND, State.TRIPPED):
-            return  # it is not live, and ends nothing
+        if not over and (self.is_settled or self._is_late(stamp_ns)):
+            return  # nothing changes; what is not live ends nothing
         self.judge(stamp_ns, over, lambda: f"{number:.4g}{self._unit}, {self.rule.words}", self._for_ns)
+
+    def _is_late(self, stamp_ns: int) -> bool:
+        return time.monotonic_ns() - stamp_ns > self._stale_ns
 
     def look(self, now_ns: int) -> int:
         seen_ns = self._seen_ns

@@ -66,6 +66,11 @@ class Watcher:
     def state(self) -> State:
         return self.last.state
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether another value that is well changes nothing, as it mostly is."""
+        return self._over_since_ns is None and self.last.state in (State.WATCHING, State.CLEARED)
+
     def look(self, now_ns: int) -> int:
         """See what has not come; returns when to look again at the latest (ns)."""
         raise NotImplementedError

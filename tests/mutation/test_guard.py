@@ -14,6 +14,7 @@ UNIT = "tests/unit/guard"
         ("gateway.guard.conditions", "test_conditions.py"),
         ("gateway.guard.watcher", "test_watchers.py"),
         ("gateway.guard.inputs", "test_watchers.py"),
+        ("gateway.guard.wiring", "test_wiring.py"),
     ],
 )
 def test_whatever_is_changed_in_it_is_noticed(module: str, test: str) -> None:

@@ -68,11 +68,12 @@ class TestLevel:
     def test_a_value_that_is_well_in_between_begins_anew(
         self, changed: Callable[[Watcher, Change], None]
     ) -> None:
-        watcher = level(changed, for_s=0.1)
+        now_ns = time.monotonic_ns()
+        watcher = level(changed, now_ns, for_s=0.1)
         for at_ms, value in ((0, 11.0), (60, 9.0), (70, 11.0), (160, 11.0)):
-            watcher.see(at_ms * MS, value)
+            watcher.see(now_ns + at_ms * MS, value)
         assert watcher.state is WATCHING
-        watcher.see(170 * MS, 11.0)
+        watcher.see(now_ns + 170 * MS, 11.0)
         assert watcher.state is TRIPPED
 
     @pytest.mark.parametrize(("value", "last_ms", "state"), [
