@@ -13,7 +13,6 @@ from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings, Role
 from drivers.component import Component, Kind
 from drivers.errors import SettingsError
-from drivers.imu import cia410
 from drivers.imu.inclinometer import Inclinometer
 from drivers.imu.settings import InclinometerSettings
 from drivers.samples import State
@@ -87,10 +86,14 @@ def test_it_is_a_component_whose_slopes_are_tilt(channel: str) -> None:
         assert tilt(trunk) == (None, None)
 
 
-@pytest.mark.parametrize(("resolution", "degrees"), [(1, 1.0), (10, 10.0), (100, 100.0), (1000, 1000.0)])
-def test_the_resolution_is_the_devices_own(resolution: int, degrees: float) -> None:
-    plan_scale = resolution * cia410.MILLIDEGREE
-    assert math.degrees(1000 * plan_scale) == pytest.approx(degrees)
+@pytest.mark.parametrize(("resolution", "counts"), [(1, 20_000), (10, 2000), (100, 200), (1000, 20)])
+def test_the_resolution_is_read_from_the_device(channel: str, resolution: int, counts: int) -> None:
+    with FakeNode(channel, NODE, device(resolution, counts, -counts)):
+        trunk = inclinometer(channel, poll_hz=50)
+        trunk.start()
+        until(lambda: tilt(trunk)[0] is not None)
+        assert tilt(trunk) == pytest.approx((math.radians(20.0), math.radians(-20.0)))
+        trunk.stop()
 
 
 def test_slopes_of_32_bits_are_preferred_where_both_are_mapped(channel: str) -> None:
