@@ -95,10 +95,12 @@ def stored(folder: Path) -> Iterator[Row]:
         opened.freeze()
         segment = opened.read(1)
         rows = ROBOTS * RATE_HZ * SECONDS
-        uploads_s, plains_s = [], []
+        uploads_s, plains_s, cpus_s = [], [], []
         for number in range(ROUNDS):
             store = Store((folder / f"store-{number}").as_uri())
+            cpu_s = time.process_time()
             uploads_s.append(_took_s(functools.partial(upload, segment, opened.id, store)))
+            cpus_s.append(time.process_time() - cpu_s)
             plains_s.append(_took_s(functools.partial(_plain, segment, folder / f"plain-{number}")))
         segment.close()
     what = f"{SECONDS} s × {ROBOTS} robots × {CHANNELS} channels, spool → "
@@ -110,6 +112,7 @@ def stored(folder: Path) -> Iterator[Row]:
         True,
     )
     yield Row("  best", min(uploads_s), "s")
+    yield Row("  CPU of it: median", statistics.median(cpus_s), "s")
     yield Row(f"{what}plain Parquet (pyarrow's defaults): median", statistics.median(plains_s), "s")
     yield Row("  store's size", _size(folder / "store-0") / 1e6, "MB")
     yield Row("  plain Parquet's size", _size(folder / "plain-0") / 1e6, "MB")

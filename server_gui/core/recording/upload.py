@@ -3,6 +3,7 @@
 import functools
 from collections import defaultdict
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pyarrow as pa
 
@@ -47,6 +48,15 @@ def _telemetry(segment: Segment, spool: str, store: Store, location: str, robots
     columns = Columns(layouts, store.units(location))
 
     def batches() -> Iterator[pa.RecordBatch]:
-        return (columns.batch(run) for run in segment.runs() if run.robot in robots)
+        return _ahead(columns.batch(run) for run in segment.runs() if run.robot in robots)
 
     store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)
+
+
+def _ahead(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+    """The same, the next one being made while the last one is written."""
+    with ThreadPoolExecutor(1, "upload") as maker:
+        coming = maker.submit(next, batches, None)
+        while (batch := coming.result()) is not None:
+            coming = maker.submit(next, batches, None)
+            yield batch
