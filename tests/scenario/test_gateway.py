@@ -48,22 +48,34 @@ def all_ok(client: Client) -> bool:
     return set(states(client).values()) == {"ok"}
 
 
+def whole(client: Client, *channels: str) -> dict[str, float]:
+    """Values of these channels, none of them stale, as some are for a while where the computer is busy."""
+    found: list[dict[str, float]] = []
+
+    def look() -> bool:
+        values = client.call("component.snapshot", channels=list(channels))["values"]
+        found.append(values)
+        return None not in values.values()
+
+    until(look, "nothing is stale")
+    return found[-1]
+
+
 def test_a_walking_robot_is_seen_live(client: Client) -> None:
     until(lambda: all_ok(client), "every component is there")
-    first = client.call("component.snapshot")["values"]
-    assert all(first[f"{joint}.position"] is not None for joint in JOINTS)
+    positions = [f"{joint}.position" for joint in JOINTS]
+    first = whole(client, *positions)
 
     def walks() -> bool:
-        now = client.call("component.snapshot")["values"]
-        moved = [abs(now[f"{joint}.position"] - first[f"{joint}.position"]) > 0.02 for joint in JOINTS]
-        return all(moved) and now["trunk.tilt_forward"] is not None
+        now = whole(client, *positions, "trunk.tilt_forward")
+        return all(abs(now[name] - first[name]) > 0.02 for name in positions)
 
     until(walks, "all joints move")
     forces: set[tuple[bool, bool]] = set()
 
     def both_feet() -> bool:
-        values = client.call("component.snapshot", channels=["*.force"])["values"]
-        forces.add(tuple(values[f"{side}_insole.force"] > 200.0 for side in ("left", "right")))
+        values = whole(client, "*.force")
+        forces.add((values["left_insole.force"] > 200.0, values["right_insole.force"] > 200.0))
         return {(True, False), (False, True)} <= forces
 
     until(both_feet, "the feet alternate")
@@ -198,17 +210,13 @@ class TestMissing:
                 lambda: list(states(client).values()).count("ok") == len(JOINTS) + 3 - 3, "the rest is served"
             )
             described = {one["name"]: one for one in client.call("robot.describe")["components"]}
-            assert {name for name, one in described.items() if one["state"] != "ok"} == {
-                "left_hip",
-                "left_knee",
-                "trunk",
-            }
+            lost = {name for name, one in described.items() if one["state"] == "lost"}
+            assert lost == {"left_hip", "left_knee", "trunk"}
             assert "broken.eds" in described["left_hip"]["problem"]
             assert "nocan7" in described["left_knee"]["problem"]
             assert "trunk-unplugged" in described["trunk"]["problem"]
-            values = client.call("component.snapshot")["values"]
-            assert values["left_knee.position"] is None
-            assert values["right_knee.position"] is not None
+            assert client.call("component.snapshot")["values"]["left_knee.position"] is None
+            whole(client, "right_knee.position")
             (tmp_path / "trunk-unplugged").symlink_to((tmp_path / "trunk").resolve())
             until(lambda: states(client)["trunk"] == "ok", "the IMU is plugged in")
             assert client.call("robot.stop", reason="x")["drives"]["left_hip"] == "unreachable"
