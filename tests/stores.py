@@ -144,6 +144,7 @@ def store_libraries(tmp_path_factory: pytest.TempPathFactory) -> None:
     store = Store(tmp_path_factory.mktemp("first").as_uri())
     data = EVENTS.rows([{"robot": "nobody"}])
     store.append(EVENTS, "events", data.schema, data.to_reader, "tests", 1)
+    store.dataset("events").to_table()
 
 
 @pytest.fixture

@@ -19,7 +19,9 @@ from tests.unit.recording.robots import batch
 
 ROBOT = "exo-01"
 PER_LIFE = 1_000_000  # numbers that a life may use
-LONGEST_S = 0.4
+LONGEST_S = 0.3
+UPLOADED = b"uploaded\n"
+AWAITED = (b"", b"\n", UPLOADED)  # what a life must have told: nothing, that it records, that it uploads
 SETTINGS = RecorderSettings(batch_s=0.02)
 
 
@@ -35,20 +37,36 @@ def live(spool: Path, url: str, first: int, told: int) -> None:
             if number % 5 == 4 and recorder.flush(10):
                 os.write(told, f"{number}\n".encode())  # this and every one before it in this life
                 uploader.now()
+            if uploader.state.uploaded:
+                os.write(told, UPLOADED)
+
+
+def end(spool: Path, url: str, life: int, chance: random.Random) -> bytes:
+    """One life, ended at a random moment after it has come as far as its turn says; all that it told."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        live(spool, url, life * PER_LIFE, writer)
+        os._exit(1)
+    os.close(writer)
+    told, awaited = b"", AWAITED[life % len(AWAITED)]
+    while awaited not in told:
+        told += os.read(reader, 65_536)
+    time.sleep(chance.uniform(0, LONGEST_S))  # the moment of the kill, not a synchronisation
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    while more := os.read(reader, 65_536):
+        told += more
+    os.close(reader)
+    return told.replace(UPLOADED, b"")
 
 
 def main() -> int:
     """Run the lives one after another."""
     spool, url, lives, seed = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
     chance = random.Random(seed)
-    for number in range(lives):
-        child = os.fork()
-        if child == 0:
-            live(spool, url, number * PER_LIFE, sys.stdout.fileno())
-            os._exit(1)
-        time.sleep(chance.uniform(0, LONGEST_S))  # the moment of the kill, not a synchronisation
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+    for life in range(lives):
+        os.write(sys.stdout.fileno(), end(spool, url, life, chance))
     return 0
 
 

@@ -3,7 +3,7 @@
 import functools
 from collections import defaultdict
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import pyarrow as pa
 
@@ -47,16 +47,19 @@ def _telemetry(segment: Segment, spool: str, store: Store, location: str, robots
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
     columns = Columns(layouts, store.units(location))
 
-    def batches() -> Iterator[pa.RecordBatch]:
-        return _ahead(columns.batch(run) for run in segment.runs() if run.robot in robots)
-
-    store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)
-
-
-def _ahead(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
-    """The same, the next one being made while the last one is written."""
     with ThreadPoolExecutor(1, "upload") as maker:
+
+        def batches() -> Iterator[pa.RecordBatch]:
+            made = (columns.batch(run) for run in segment.runs() if run.robot in robots)
+            return _ahead(maker, made, maker.submit(next, made, None))
+
+        store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)
+
+
+def _ahead(
+    maker: ThreadPoolExecutor, batches: Iterator[pa.RecordBatch], coming: "Future[pa.RecordBatch | None]"
+) -> Iterator[pa.RecordBatch]:
+    """The same batches: the next one is made while the store writes the last one."""
+    while (batch := coming.result()) is not None:
         coming = maker.submit(next, batches, None)
-        while (batch := coming.result()) is not None:
-            coming = maker.submit(next, batches, None)
-            yield batch
+        yield batch
