@@ -14,6 +14,7 @@ from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
 from tests.scenario.processes import until
+from tests.slow_network import SlowNetwork
 from tests.stores import BUCKET, SeaweedFS
 from tests.unit.recording.robots import batch
 
@@ -70,3 +71,30 @@ def test_a_store_that_dies_in_the_middle_of_an_upload_gets_everything_once_it_is
         table = Store(url, several_writers=False).dataset(HERE).to_table(columns=["seq", "row"])
         found = list(zip(table["seq"].to_pylist(), table["row"].to_pylist(), strict=True))
         assert sorted(found) == [(seq, row) for seq in range(40) for row in range(50)]
+
+
+@pytest.mark.parametrize("backend", ["s3"], indirect=True)
+@pytest.mark.timeout(180)
+def test_a_slow_network_that_is_cut_again_and_again_delays_an_upload_and_nothing_else(
+    backend: SeaweedFS, store_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (
+        SlowNetwork(backend.port, delay_s=0.02) as network,
+        Spool(tmp_path / "spool", reserve_bytes=0) as spool,
+    ):
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{network.port}")
+        with Recorder(spool) as recorder:
+            for seq in range(20):
+                recorder.record("exo-01", 1, batch(seq, rows=50))
+        with Uploader(spool, lambda: Store(store_url)) as uploader:
+            until(lambda: network.carried > 1_000)
+            network.cut()
+            uploader.now()
+            until(lambda: network.carried > 5_000)
+            network.cut()
+            uploader.now()
+            until(lambda: uploader.state.uploaded == 1, lambda: uploader.state)
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{backend.port}")
+        table = Store(store_url).dataset(HERE).to_table(columns=["seq", "row"])
+    found = list(zip(table["seq"].to_pylist(), table["row"].to_pylist(), strict=True))
+    assert sorted(found) == [(seq, row) for seq in range(20) for row in range(50)]
