@@ -58,7 +58,7 @@ class Bench:
     def start_gateway(self) -> None:
         arguments = ["gateway", str(self.config), "--port", str(self.port)]
         self.gateway = self._processes.enter_context(Child("gateway", arguments))
-        host, port = self.gateway.wait_ready(_listening, DEADLINE_S, nothing)
+        host, port = self.gateway.wait_ready(listening, DEADLINE_S, nothing)
         assert host == "127.0.0.1"
         self.port = port
 
@@ -69,7 +69,7 @@ class Bench:
     def kill(self, child: Child) -> None:
         """kill -9, and wait until it is dead."""
         os.kill(child.pid, signal.SIGKILL)
-        until(lambda: _is_dead(child))
+        until(lambda: is_dead(child))
 
     def ask(self, method: str, **params: Any) -> dict[str, Any]:
         """One request as `nc` sends it: a line, then the sending half is closed; the answer until the end."""
@@ -99,12 +99,12 @@ def _json(line: str) -> dict[str, Any] | None:
     return found
 
 
-def _listening(line: str) -> tuple[str, int] | None:
+def listening(line: str) -> tuple[str, int] | None:
     said = re.fullmatch(r"listening on (\S+):(\d+)", line)
     return (said[1], int(said[2])) if said else None
 
 
-def _is_dead(child: Child) -> bool:
+def is_dead(child: Child) -> bool:
     try:
         child.check()
     except ChildFailed:

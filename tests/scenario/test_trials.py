@@ -18,7 +18,8 @@ from hil_sim.control_socket import ask
 from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.node.dictionary import Value
 from hil_sim.robot import SimulatedRobot
-from tests.scenario.processes import Bench
+from server_gui.terminal.children import Child
+from tests.scenario.processes import DEADLINE_S, Bench, is_dead, listening, nothing
 from tests.scenario.processes import until as until_processes
 from tests.unit.gateway.harness import Answered, Client, serving, until
 
@@ -256,3 +257,38 @@ def test_a_gateway_killed_during_a_trial_takes_it_back_when_it_starts_again(benc
     until_processes(lambda: not folder.undo.exists())
     assert value(bench, "gait.cycle_time") == before
     assert [one["what"] for one in read_verified(folder.journal)][-1] == "taken back"
+
+
+def test_a_gateway_killed_during_a_store_leaves_a_record_of_it_and_a_robot_that_answers(
+    tmp_path: Path,
+) -> None:
+    with SimulatedRobot(tmp_path) as robot, ExitStack() as processes:
+        config, folder = str(robot.config), RecordsFolder(load(robot.config).records)
+        gateway = processes.enter_context(Child("gateway", ["gateway", config, "--port", "0"]))
+        port = gateway.wait_ready(listening, DEADLINE_S, nothing)[1]
+        client = processes.enter_context(Client(("127.0.0.1", port)))
+        until(lambda: None not in read(client).values(), "every parameter can be read")
+        client.call("robot.stop", reason="to store")
+        client.call("control.acquire", ttl_s=300)
+        until(lambda: not client.call("robot.reset")["held"], "every drive is at rest")
+        command = robot.exoskeleton.drives["left_knee"].dictionary[0x1010, 1]
+        check = command.on_write
+
+        def kill(value: Value) -> None:
+            os.kill(gateway.pid, signal.SIGKILL)
+            if check is not None:
+                check(value)
+
+        command.on_write = kill
+        client.request("parameter.store", component="left_knee")
+        until_processes(lambda: is_dead(gateway))
+        last = read_verified(folder.journal)[-1]
+        assert (last["what"], last["component"]) == ("store", "left_knee")  # begun, and no end of it
+        command.on_write = check
+        again = processes.enter_context(Child("gateway again", ["gateway", config, "--port", "0"]))
+        port = again.wait_ready(listening, DEADLINE_S, nothing)[1]
+        second = processes.enter_context(Client(("127.0.0.1", port)))
+        second.call("control.acquire", ttl_s=300)
+        until(lambda: None not in read(second).values(), "every parameter can be read")
+        assert second.call("parameter.store", component="left_knee")["component"] == "left_knee"
+        assert len(read_verified(folder.journal)) > last["n"]
