@@ -100,6 +100,10 @@ class SeaweedFS:
             self._process.kill()
             self._process.wait()
             self._process = None
+        for port in self._ports:  # it makes sockets of its own there, and leaves them
+            for name in (port, port + 10_000):
+                for left in Path("/tmp").glob(f"seaweedfs-*-{name}.sock"):
+                    left.unlink(missing_ok=True)
 
     def _answers(self) -> bool:
         """Whether an object can be written: its parts come up one after another."""
