@@ -66,6 +66,7 @@ def namespace() -> Iterator[str | None]:
 def _make(made: ExitStack) -> None:
     if shutil.which("ip") is None or os.geteuid() != 0:
         raise PermissionError("network namespaces are root's")
+    subprocess.run(["ip", "netns", "delete", NAMESPACE], check=False, capture_output=True)  # of a killed run
     _ip("netns", "add", NAMESPACE)
     made.callback(_ip, "netns", "delete", NAMESPACE)
     _ip("link", "add", OUTSIDE, "type", "veth", "peer", "name", INSIDE, "netns", NAMESPACE)
