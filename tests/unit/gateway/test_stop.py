@@ -1,6 +1,7 @@
 """The stop: every drive at once, without a lease, answered per drive, and held."""
 
 import contextlib
+import gc
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -328,3 +329,15 @@ def test_a_stop_table_that_cannot_work_is_refused(tmp_path: Path, stop: str, com
         config(tmp_path, f"{ROBOT}[stop]\n{stop}")
     assert complaint in str(refused.value)
     assert "[stop" in str(refused.value)
+
+
+def test_what_was_read_and_built_is_not_collected_again_and_again_while_the_robot_runs(
+    bench: Bench, tmp_path: Path
+) -> None:
+    """A full collection of a robot's descriptions holds up every thread for 20 ms."""
+    gc.unfreeze()
+    with serving(config(tmp_path)) as address, Client(address) as client:
+        client.call("robot.stop")
+        until(lambda: client.call("robot.describe")["modules"]["control"] == "running", "it runs")
+        assert gc.get_freeze_count() > 10_000
+    assert gc.get_freeze_count() == 0
