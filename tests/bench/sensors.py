@@ -31,6 +31,7 @@ from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
 from drivers.parsing import Counters
 from drivers.samples import Sample
+from tests.bench._serial_sender import RATE_HZ, frames
 from tests.unit.imu import encode as imu
 from tests.unit.insole.encode import cobs_frame, eighteen_cell_frame
 
@@ -39,6 +40,7 @@ CHUNK = 64  # bytes a read, as USB adapters give them
 ROUNDS = 5
 SECONDS = 10
 PASCAL_PER_COUNT = 100.0
+SECOND_NS = 1_000_000_000
 MOST_CPU, MOST_LATENCY_MS = 0.03, 2.0
 
 Read = Callable[[bytes], int]
@@ -65,6 +67,7 @@ def main() -> int:
         f"  … and parsing                              {parsing:.2%}  (limit {MOST_CPU:.0%})\n"
         f"  … and clock, calibration, force, centre of\n"
         f"    pressure, tilt, checks, latest values    {whole:.2%}\n"
+        f"  the same bytes in a row, without waking up {_in_a_row():.2%}\n"
         f"bytes → latest value: p50 {p50:.2f} ms, p99 {p99:.2f} ms of {len(latencies)} "
         f"(limit {MOST_LATENCY_MS} ms)\n"
     )
@@ -350,6 +353,22 @@ def _live(make: Make, listener: Callable[[Sample], None] | None = None) -> float
         finally:
             for user in users:
                 user.stop()
+
+
+def _in_a_row() -> float:
+    """Share of one core that the code alone takes, best of a few rounds: no thread, no port, warm caches."""
+    cycles, best = [frames(number) for number in range(FRAMES // 4)], float("inf")
+    with tempfile.TemporaryDirectory() as name:
+        for _ in range(ROUNDS):
+            components = _components(Path(name), ["left", "right", "trunk"])
+            for component in components:
+                component.line._users = (component,)
+            began = time.process_time()
+            for number, cycle in enumerate(cycles):
+                for component, data in zip(components, cycle, strict=True):
+                    component.line._received(data, SECOND_NS + number * SECOND_NS // RATE_HZ)
+            best = min(best, time.process_time() - began)
+    return best / len(cycles) * RATE_HZ
 
 
 def _spent(users: Live, masters: list[int]) -> float:
