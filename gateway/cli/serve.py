@@ -18,7 +18,7 @@ the computer's own CPU, memory and processes.
 
 Nothing runs until a client asks: no bus, no port, no timer is open. What a client asked
 for stops linger_s after the last client has left. What is not there is named in
-`gwrms describe` and tried again; the rest is served.
+`gwrms describe` and tried again; the rest is served. A [guard] in CONFIG runs from the start.
 
 CONFIG is the robot's file (TOML). `gwrms sim --dir DIR` writes a commented example,
 DIR/robot.toml, together with a simulated robot to try it on.
@@ -28,6 +28,8 @@ When ready it prints `listening on HOST:PORT` on standard output. Ask it by hand
   printf '{"jsonrpc":"2.0","id":1,"method":"component.snapshot"}\\n' | nc 127.0.0.1 7420
 
 SIGINT and SIGTERM end it cleanly. A stop stays held, also over its end and restart: gwrms reset.
+Where [guard] heartbeat_ms has armed the drives, they are freed first, and the end is refused
+while one is enabled: gwrms stop, then end it.
 
 Anybody who can connect can stop the robot and change its parameters: listen on
 127.0.0.1, or on a network of which you know every computer.
