@@ -36,7 +36,6 @@ class GuardModule:
     """`[guard]` of the robot's file, running."""
 
     def __init__(self, context: "Context") -> None:
-        self._context = context
         self._loop = context.loop
         self._component = cast("ComponentModule", context.needs["component"])
         self._control = cast("ControlModule", context.needs["control"])

@@ -1,5 +1,6 @@
 """The guard as it runs: without clients, stopping in the thread that sees, never flooding, open to all."""
 
+import re
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ import pytest
 
 from drivers.bus.life import NodeLife
 from drivers.component import Kind
+from gateway.cli.describe import main as describe
 from gateway.guard import alarms
 from gateway.guard.armings import Armings
 from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving, until
@@ -335,6 +337,22 @@ class TestOpen:
         assert hot_knee["state"] == any_knee["state"] == "blind"
         assert hot_knee["problems"] == ["left_knee: has no temperature"]
         assert any_knee["problems"] == ["the robot: has no temperature"]
+
+    def test_gwrms_describe_shows_it_to_people(
+        self, serve: Serve, bench: Bench, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        client = serve(LIMIT + FOOT)
+        bend(bench, 2.5)
+        until(lambda: state(client, "foot") == "tripped" and state(client, "knees") == "tripped")
+        host, port = client.socket.getpeername()
+        assert describe(["--robot", f"{host}:{port}"]) == 0
+        shown = capsys.readouterr().out
+        lines = shown[shown.index("GUARD RULE") :].splitlines()
+        words = [re.split(r"  +", line) for line in lines[1:]]
+        reason = "left_knee.position: 2.5 rad, below -0.1 rad or above 2 rad"
+        assert words[0][:3] == ["knees", "joint_limit", "below -0.1 rad or above 2 rad"]
+        assert words[0][3:] == ["quick stop, revert trials, alarm", "tripped", reason]
+        assert words[1][:5] == ["foot", "insole_stale", "silent for 0.2 s", "alarm", "tripped"]
 
     def test_a_component_that_could_not_be_built_cannot_be_seen(self, serve: Serve, bench: Bench) -> None:
         bench.absent["left_knee"] = (Kind.JOINT, "its EDS is broken")
