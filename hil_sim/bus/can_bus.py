@@ -129,10 +129,12 @@ class CanBus:
     def queue(self, frame: Frame, sender: object) -> None:
         """Queue a frame whatever disturbs the sending."""
         self._queued += 1
-        heapq.heappush(self._pending, (frame.arbitration(), self._queued, frame, sender))
+        waiting = (frame.arbitration(), self._queued, frame, sender)
         if not self._transmitting:
-            self._start_next()
-        elif len(self._pending) > _MOST_WAITING:
+            self._transmit(waiting)
+            return
+        heapq.heappush(self._pending, waiting)
+        if len(self._pending) > _MOST_WAITING:
             self._shed()
 
     def _shed(self) -> None:
@@ -148,19 +150,16 @@ class CanBus:
         if self._on_wire is not None and self._on_wire[3] is sender:
             self._on_wire = None
 
-    def _start_next(self) -> None:
-        self._on_wire = waiting = heapq.heappop(self._pending)
+    def _transmit(self, waiting: _Waiting) -> None:
+        self._on_wire = waiting
+        self._transmitting = True
         _, _, frame, sender = waiting
-        destroyed = bool(self.disturbances) and not all(
-            one.survives(frame, sender) for one in self.disturbances
-        )
-        bits = frame.bits() / 2 + _ERROR_FRAME_BITS if destroyed else frame.bits()
+        bits, end = _BITS[frame.extended][len(frame.data)], self._finish
+        if self.disturbances and not all(one.survives(frame, sender) for one in self.disturbances):
+            bits, end = bits / 2 + _ERROR_FRAME_BITS, self._destroy
         duration_ns = round(bits * SECOND_NS / self.bitrate)
         self.busy_ns += duration_ns
-        self._transmitting = True
-        self.clock.after(
-            0 if self.carries_at_once else duration_ns, self._destroy if destroyed else self._finish
-        )
+        self.clock.after(0 if self.carries_at_once else duration_ns, end)
 
     def _finish(self) -> None:
         if self._on_wire is not None:
@@ -171,23 +170,20 @@ class CanBus:
     def deliver(self, frame: Frame, sender: object) -> None:
         """A frame has come over the wire: every receiver but its sender gets it."""
         self.frames_carried += 1
-        for participant, receive in self._route(frame):
-            if participant is not sender and (
-                not self.disturbances or self._reaches(frame, sender, participant)
-            ):
+        key = _EXTENDED_ROUTE if frame.extended else frame.cob_id
+        disturbances = self.disturbances
+        for participant, receive in self._routes.get(key) or self._route(key):
+            if participant is not sender and (not disturbances or self._reaches(frame, sender, participant)):
                 receive(frame, sender)
 
-    def _route(self, frame: Frame) -> tuple[tuple[object, Receiver], ...]:
-        """Who takes frames like this one; found once, until somebody comes, goes or filters otherwise."""
-        key = _EXTENDED_ROUTE if frame.extended else frame.cob_id
-        route = self._routes.get(key)
-        if route is None:
-            filters = self._filters
-            route = self._routes[key] = tuple(
-                (participant, receive)
-                for participant, receive in self._receivers.items()
-                if participant not in filters or key in filters[participant]
-            )
+    def _route(self, key: int) -> tuple[tuple[object, Receiver], ...]:
+        """Who takes frames of an identifier; found once, until somebody comes, goes or filters otherwise."""
+        filters = self._filters
+        route = self._routes[key] = tuple(
+            (participant, receive)
+            for participant, receive in self._receivers.items()
+            if participant not in filters or key in filters[participant]
+        )
         return route
 
     def _reaches(self, frame: Frame, sender: object, receiver: object) -> bool:
@@ -205,6 +201,7 @@ class CanBus:
         self._release()
 
     def _release(self) -> None:
-        self._transmitting, self._on_wire = False, None
         if self._pending:
-            self._start_next()
+            self._transmit(heapq.heappop(self._pending))
+        else:
+            self._transmitting, self._on_wire = False, None

@@ -1,5 +1,6 @@
 """The socketcand protocol in raw mode: text messages in `< … >`, frames both ways."""
 
+import binascii
 import re
 
 from hil_sim.bus.can_bus import Frame
@@ -13,8 +14,8 @@ _EXTENDED_DIGITS = 8
 
 def frame_message(frame: Frame, stamp_s: float) -> bytes:
     """A received frame; without data the field is empty, and its two spaces stay."""
-    identifier = f"{frame.cob_id:08X}" if frame.extended else f"{frame.cob_id:03X}"
-    return f"< frame {identifier} {stamp_s:.6f} {frame.data.hex().upper()} >".encode("ascii")
+    message = b"< frame %08X %.6f %b >" if frame.extended else b"< frame %03X %.6f %b >"
+    return message % (frame.cob_id, stamp_s, binascii.hexlify(frame.data).upper())
 
 
 def error_message(stamp_s: float) -> bytes:

@@ -65,7 +65,7 @@ class JointDrive(Node):
         self._following = supervision.FollowingErrorWatch()
         self._advanced_ns = 0
         self._controlword = 0
-        self._shown = 0
+        self._shown: int | None = None  # the statusword, where somebody wants to know of its changes
         self._bind_values()
         clock.every(_TICK_NS, self.advance)
 
@@ -137,12 +137,11 @@ class JointDrive(Node):
         servo, state = self.servo, self.power.state
         word: int = state.value | _REMOTE
         word |= _VOLTAGE_ENABLED * (self.supply_v >= supervision.LOWEST_SUPPLY_V)
-        word |= _WARNING * supervision.warning(servo, self.supply_v)
-        word |= _LIMIT_ACTIVE * servo.limited
-        word |= _CURRENT_REDUCED * (servo.thermal.peak_share < 1.0) | _HOMED * servo.homed
+        word |= _WARNING * supervision.warning(servo, self.supply_v) | _LIMIT_ACTIVE * servo.limited
+        word |= _CURRENT_REDUCED * servo.thermal.reduced | _HOMED * servo.homed
         if state is PowerState.OPERATION_ENABLED:
-            late = self._following.late_s > 0.0
-            return word | self._mode.status() | BIT_13 * late | _LIMIT_ACTIVE * self._mode.clipped
+            mode, late = self._mode, self._following.late_s > 0.0
+            return word | mode.status() | BIT_13 * late | _LIMIT_ACTIVE * mode.clipped
         return word | TARGET_REACHED * (self.power.energised and servo.at_rest)
 
     # -- commands --------------------------------------------------------------------------------------
@@ -268,9 +267,11 @@ class JointDrive(Node):
             self.fault(error)
 
     def _show_changes(self) -> None:
-        word = self.statusword()
-        if word != self._shown:
-            self._shown = word
+        if not self.watched(od.STATUSWORD):
+            self._shown = None
+            return
+        before, self._shown = self._shown, self.statusword()
+        if before not in (None, self._shown):
             self.object_changed(od.STATUSWORD)
 
 

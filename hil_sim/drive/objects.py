@@ -186,13 +186,17 @@ class Objects:
         for key, value in _OTHERWISE.items():
             if self.has(key) and not dictionary[key].described:
                 dictionary[key].default = dictionary[key].value = value
+        self._counting = {entry.key: entry for entry in dictionary if self._counts(entry.key)}
 
     def has(self, key: Key) -> bool:
         return key in self.dictionary and (self._ours or key[0] not in _MANUFACTURER)
 
+    def _counts(self, key: Key) -> bool:
+        return self.has(key) and (self._ours or key not in _BUILT_IN)
+
     def number(self, key: Key) -> int:
-        counts = self.has(key) and (self._ours or key not in _BUILT_IN)
-        return self.dictionary[key].number() if counts else _OTHERWISE[key]
+        entry = self._counting.get(key)
+        return _OTHERWISE[key] if entry is None else entry.number()
 
     def positive(self, key: Key) -> int:
         """A number that cannot be 0."""

@@ -63,6 +63,8 @@ class Power:
 
     def do(self, command: Command) -> None:
         """Carry out what the table allows, now or once the motor stands."""
+        if command is Command.ENABLE_OPERATION and self.follows:
+            return  # as a master says again and again
         if command is Command.FAULT_RESET and not self._can_recover():
             return
         if self._stays_stopping(command) or self._goes_out_slowly(command):

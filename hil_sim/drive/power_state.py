@@ -15,6 +15,8 @@ class PowerState(Enum):
     FAULT_REACTION_ACTIVE = 0x0F
     FAULT = 0x08
 
+    __hash__ = object.__hash__  # each is one object, looked up in every cycle
+
 
 class Command(StrEnum):
     """What moves the machine: the commands of the controlword, then what the drive itself sees."""
@@ -41,6 +43,12 @@ _CONTROLWORDS: tuple[tuple[int, int, Command], ...] = (
     (0x8F, 0x07, Command.SWITCH_ON),
     (0x8F, 0x0F, Command.ENABLE_OPERATION),
 )
+
+# The same by the controlword's first byte.
+_COMMANDS = [
+    next((command for mask, value, command in _CONTROLWORDS if byte & mask == value), None)
+    for byte in range(256)
+]
 
 S, C = PowerState, Command
 
@@ -81,10 +89,7 @@ def command_of(controlword: int, previous: int) -> Command | None:
     """The command in a controlword; a fault reset is the rising edge of bit 7 against the `previous` one."""
     if controlword & ~previous & _FAULT_RESET_BIT:
         return Command.FAULT_RESET
-    for mask, value, command in _CONTROLWORDS:
-        if controlword & mask == value:
-            return command
-    return None
+    return _COMMANDS[controlword & 0xFF]
 
 
 def after(state: PowerState, command: Command) -> PowerState:

@@ -113,10 +113,11 @@ class Servo:
 
     def limits(self) -> tuple[float, float]:
         """The lowest and highest torque that objects and the winding's heat allow."""
-        settings, share = self.settings, self.thermal.peak_share
+        settings = self.settings
         rated = settings.rated_torque
         highest, lowest = settings.highest_torque, settings.lowest_torque
-        if share < 1.0:
+        if self.thermal.reduced:
+            share = self.thermal.peak_share
             highest = min(highest, rated + share * max(highest - rated, 0.0))
             lowest = max(lowest, -rated + share * min(lowest + rated, 0.0))
         return lowest, highest

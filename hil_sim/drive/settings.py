@@ -21,6 +21,8 @@ class Control(Enum):
     VELOCITY = "velocity"
     TORQUE = "torque"
 
+    __hash__ = object.__hash__  # each is one object, looked up in every cycle
+
 
 @dataclass(frozen=True, slots=True)
 class Gains:

@@ -23,6 +23,11 @@ class Thermal:
         """How much of the current above the rated one is allowed (0 … 1)."""
         return min(max((1.0 - self.load) / (1.0 - _FULL_PEAK_UNTIL), 0.0), 1.0)
 
+    @property
+    def reduced(self) -> bool:
+        """Whether it is less than all of it."""
+        return self.load > _FULL_PEAK_UNTIL
+
     def advance(self, current: float, elapsed_s: float, winding_time_s: float, housing_time_s: float) -> None:
         """Let `current` (share of the rated one) heat the motor for `elapsed_s`."""
         power = current * current

@@ -14,6 +14,7 @@ Key = tuple[int, int]
 
 IDENTITY = 0x1018
 
+_NUMBERS = (int, float)
 _FIRST_OBJECT = 0x20  # below are data types, which only take room in a PDO
 
 
@@ -70,7 +71,7 @@ class Entry:
 
     def number(self) -> int:
         """The value of an object that holds an integer."""
-        value = self.get()
+        value = self.value if self.source is None else self.source()
         if not isinstance(value, int):
             raise TypeError(f"object {self.key[0]:04X}h:{self.key[1]} holds no integer")
         return value
@@ -85,10 +86,11 @@ class Entry:
 
     def take(self, value: Value) -> None:
         """Take a value of the object's type, likewise."""
-        if not isinstance(value, str | bytes):
-            if self.high is not None and value > self.high:
+        low, high = self.low, self.high
+        if not (low is None and high is None) and isinstance(value, _NUMBERS):
+            if high is not None and value > high:
                 raise SdoAbort(AbortCode.TOO_HIGH)
-            if self.low is not None and value < self.low:
+            if low is not None and value < low:
                 raise SdoAbort(AbortCode.TOO_LOW)
         if self.on_write is not None:
             self.on_write(value)

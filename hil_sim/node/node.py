@@ -127,6 +127,10 @@ class Node:
         if self.powered:  # it may have been switched off by what it is just answering
             self._bus.send(Frame(identifier, data), self)
 
+    def watched(self, key: Key) -> bool:
+        """Whether somebody wants to be told by `object_changed`."""
+        return key in self._pdos.watched
+
     def object_changed(self, key: Key) -> None:
         """Tell event-driven PDOs that an object they carry has another value."""
         self._pdos.changed(key)

@@ -33,6 +33,7 @@ class Tpdo:
         index = TPDO_COMMUNICATION + number
         identifier = dictionary.number((index, COB_ID), cob_id.INVALID)
         self._mapping = Mapping.current(dictionary, TPDO_MAPPING + number)
+        self.keys = self._mapping.keys
         self.cob_id = identifier & cob_id.IDENTIFIER
         self.active = cob_id.is_valid(identifier) and bool(self._mapping.fields)
         self._remote = not identifier & cob_id.NO_REMOTE
@@ -102,7 +103,7 @@ class Tpdo:
 
     def changed(self, key: Key) -> None:
         """An object has changed of which the application says so."""
-        if self.on_change and key in self._mapping.keys:
+        if self.on_change and key in self.keys:
             self._event()
 
     def requested(self) -> None:
@@ -120,13 +121,14 @@ class Tpdo:
             self._transmit()
 
     def _transmit(self) -> None:
-        self.stop()
         self._changed = False
         self._sent = self._mapping.pack()
         self._send(self.cob_id, self._sent)
-        self._arm()
-        if self._inhibit_ns and self._type in EVENT_DRIVEN:
-            self._inhibited = self._clock.after(self._inhibit_ns, self._inhibit_over)
+        if self._type in EVENT_DRIVEN:
+            self.stop()
+            self._arm()
+            if self._inhibit_ns:
+                self._inhibited = self._clock.after(self._inhibit_ns, self._inhibit_over)
 
     def _arm(self) -> None:
         if self._event_ns and self._type in EVENT_DRIVEN:

@@ -83,7 +83,9 @@ class Mapping:
     def pack(self) -> bytes:
         if self._layout is not None:
             try:
-                return self._layout.pack(*[entry.get() for entry in self._entries])
+                return self._layout.pack(
+                    *[entry.value if entry.source is None else entry.source() for entry in self._entries]
+                )
             except struct.error:  # a value beyond its type, which is saturated
                 pass
         packed, shift = 0, 0

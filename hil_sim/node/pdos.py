@@ -38,6 +38,7 @@ class Pdos:
         self._checking: Repeating | None = None
         self._tpdos: dict[int, Tpdo] = {}
         self._rpdos: dict[int, Rpdo] = {}
+        self.watched: frozenset[Key] = frozenset()  # the objects of which a change is an event now
         self.sent: list[Tpdo] = []  # those that are active
         self.received: list[Rpdo] = []
         for number in self._numbers(pdo.TPDO_COMMUNICATION):
@@ -123,7 +124,9 @@ class Pdos:
         self.received = [one for one in self._rpdos.values() if one.active]
 
     def _check_changes(self) -> None:
-        wanted = self._running and any(tpdo.on_change for tpdo in self.sent)
+        on_change = [tpdo for tpdo in self.sent if tpdo.on_change and self._running]
+        self.watched = frozenset(key for tpdo in on_change for key in tpdo.keys)
+        wanted = bool(on_change)
         if wanted and self._checking is None:
             self._checking = self._clock.every(_CHECK_NS, self._check)
         elif not wanted and self._checking is not None:
