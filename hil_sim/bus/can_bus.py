@@ -159,7 +159,8 @@ class CanBus:
             bits, end = bits / 2 + _ERROR_FRAME_BITS, self._destroy
         duration_ns = round(bits * SECOND_NS / self.bitrate)
         self.busy_ns += duration_ns
-        self.clock.after(0 if self.carries_at_once else duration_ns, end)
+        clock = self.clock
+        clock.at(clock.now_ns if self.carries_at_once else clock.now_ns + duration_ns, end)
 
     def _finish(self) -> None:
         if self._on_wire is not None:

@@ -58,6 +58,13 @@ class GaitController(Node):
         self._commissionings = {
             node: Commissioning(clock, self.send, node, partial(self._start_node, node)) for node in foreign
         }
+        self._commands = [
+            [
+                self.dictionary[index, number]
+                for index in (objects.CONTROLWORDS, objects.MODES, objects.TARGETS)
+            ]
+            for number in range(1, len(joints) + 1)
+        ]
         self._holder = 0
         self._since_ns = 0
         self._offsets = [0.0] * len(joints)
@@ -227,6 +234,6 @@ class GaitController(Node):
             self._set(number, controlword, self.dictionary[objects.POSITIONS, number].number())
 
     def _set(self, number: int, controlword: int, target: int) -> None:
-        self.dictionary[objects.CONTROLWORDS, number].value = controlword
-        self.dictionary[objects.MODES, number].value = _CYCLIC_SYNCHRONOUS_POSITION
-        self.dictionary[objects.TARGETS, number].value = target
+        entries = self._commands[number - 1]
+        for entry, value in zip(entries, (controlword, _CYCLIC_SYNCHRONOUS_POSITION, target), strict=True):
+            entry.value = value

@@ -61,7 +61,7 @@ class JointDrive(Node):
         self.encoder = self.servo.encoder
         self.power = Power(self.servo, self.objects, self._power_changed, self._may_recover)
         self._modes = {number: mode(self.servo, self.objects) for number, mode in MODES.items()}
-        self._mode_number = _FIRST_MODE
+        self._choose_mode(_FIRST_MODE)
         self._following = supervision.FollowingErrorWatch()
         self._advanced_ns = 0
         self._controlword = 0
@@ -93,7 +93,7 @@ class JointDrive(Node):
             od.CONTROLWORD: self._write_controlword,
             od.MODE: self._write_mode,
             od.HOMING_METHOD: _check_homing_method,
-            **{key: self._target_taker(key) for key in _TARGETS},
+            **{key: self._target_taker(key) for key in _TARGETS if self.objects.has(key)},
             **{key: _option_check(allowed) for key, allowed in options.ALLOWED.items()},
         }
         for key, check in checks.items():
@@ -146,20 +146,20 @@ class JointDrive(Node):
 
     # -- commands --------------------------------------------------------------------------------------
 
-    @property
-    def _mode(self) -> Mode:
-        return self._modes[self._mode_number]
-
     def _write_mode(self, value: Value) -> None:
         if value in (_NO_MODE_CHANGE, self._mode_number):
             return
         if not self._offers(int(value)):
             raise SdoAbort(AbortCode.INVALID_VALUE)
-        self._mode_number = ModeNumber(int(value))
+        self._choose_mode(int(value))
         self._following.late_s = 0.0
         if self.power.follows:
             self.servo.stop(Ramp.SLOW_DOWN)
             self._mode.enter()
+
+    def _choose_mode(self, number: int) -> None:
+        self._mode_number = ModeNumber(number)
+        self._mode: Mode = self._modes[self._mode_number]
 
     def _offers(self, mode: int) -> bool:
         return mode in tuple(ModeNumber) and bool(self.objects.positive(od.SUPPORTED_MODES) >> mode - 1 & 1)
@@ -174,9 +174,11 @@ class JointDrive(Node):
             self._mode.command(controlword, controlword & ~previous)
 
     def _target_taker(self, key: Key) -> Callable[[Value], None]:
+        entry = self.dictionary[key]
+
         def written(value: Value) -> None:
             if self.power.follows:
-                self._mode.target_written(key, value != self.dictionary[key].value)
+                self._mode.target_written(key, value != entry.value)
 
         return written
 
@@ -209,7 +211,7 @@ class JointDrive(Node):
         self.servo.forget_home()
         self._controlword = 0
         mode = self.objects.number(od.MODE)
-        self._mode_number = ModeNumber(mode) if self._offers(mode) else _FIRST_MODE
+        self._choose_mode(mode if self._offers(mode) else _FIRST_MODE)
         for key in (od.CONTROLWORD, *_TARGETS):
             if self.objects.has(key):
                 self.dictionary[key].value = 0

@@ -43,7 +43,7 @@ class Power:
     @property
     def follows(self) -> bool:
         """The drive follows set-points: it is enabled, and not on its way out."""
-        return self.enabled and self._way_out is None
+        return self.state is PowerState.OPERATION_ENABLED and self._way_out is None
 
     @property
     def energised(self) -> bool:

@@ -172,32 +172,30 @@ def _gains(number: Callable[[Key], int], rated_torque: float) -> dict[Control, G
 
 
 class Parameters:
-    """Keeps the settings until a write changes one of the objects.
+    """Keeps the settings as they are `now`, until a write changes one of the objects.
 
     It watches every writable object of the profile and manufacturer ranges that nobody else does.
     """
 
     def __init__(self, objects: Objects) -> None:
         self._objects = objects
-        self._settings = read(objects)
         self._changed = False
+        self.now = read(objects)
         for entry in objects.dictionary:
             if entry.writable and entry.key[0] >= 0x2000 and entry.on_write is None:
                 entry.on_write = self._watcher(entry)
+                entry.on_written = self._refresh
 
     def _watcher(self, entry: Entry) -> Callable[[Value], None]:
-        def written(value: Value) -> None:
-            self._changed |= value != entry.value
+        def taken(value: Value) -> None:
+            self._changed = value != entry.value
 
-        return written
+        return taken
+
+    def _refresh(self) -> None:
+        if self._changed:
+            self.now = read(self._objects)
 
     def reset(self) -> None:
         """All objects may have changed."""
-        self._changed = True
-
-    @property
-    def now(self) -> Settings:
-        if self._changed:
-            self._changed = False
-            self._settings = read(self._objects)
-        return self._settings
+        self.now = read(self._objects)
