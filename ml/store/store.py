@@ -64,7 +64,7 @@ class Store:
     """
 
     def __init__(self, url: str | None = None, shards: int = 1, several_writers: bool = True) -> None:
-        self.url = _checked(url or default_url())
+        self.url = checked_url(url or default_url())
         self.folder = Path(urlsplit(self.url).path) if self.url.startswith("file://") else None
         self.objects = Objects(self.url)
         self.about = self._about(About(shards=shards, several_writers=several_writers))
@@ -221,7 +221,7 @@ def writer_properties(schema: pa.Schema) -> WriterProperties:
     )
 
 
-def _checked(url: str) -> str:
+def checked_url(url: str) -> str:
     """The URL without a slash at its end.
 
     Raises:

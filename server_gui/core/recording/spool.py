@@ -25,12 +25,6 @@ KEEP_BYTES: Final = 4 << 30  # uploaded segments that stay as a second copy, whi
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded)?\.db")
 
 
-def default_folder() -> Path:
-    """Under the user's own state (XDG base directories)."""
-    state = os.environ.get("XDG_STATE_HOME")
-    return (Path(state) if state else Path.home() / ".local" / "state") / "gwrms" / "spool"
-
-
 def _free_bytes(folder: Path) -> int:
     return shutil.disk_usage(folder).free
 
