@@ -2,8 +2,16 @@
 
 from dataclasses import dataclass
 
-from gateway.client import Batch, ConnectionState
-from gateway.messages import Description, ParameterValues, ResourceSnapshot, Snapshot, Stopped, Written
+from gateway.client import Batch, ClockOffset, ConnectionState
+from gateway.messages import (
+    Description,
+    JournalEntries,
+    ParameterValues,
+    ResourceSnapshot,
+    Snapshot,
+    Stopped,
+    Written,
+)
 
 STOP = "STOP"  # what a stop that failed is called
 
@@ -26,10 +34,18 @@ class Described:
 
 @dataclass(frozen=True, slots=True)
 class Telemetry:
-    """A batch of the stream; `age_ns` is how old its newest row was on arrival, None where nobody knows."""
+    """A batch of a stream, and what the robot's clock is to ours, None where nobody knows."""
 
+    stream: int
     batch: Batch
-    age_ns: int | None
+    clock: ClockOffset | None
+
+    @property
+    def age_ns(self) -> int | None:
+        """How old the newest row was on arrival, None where nobody knows."""
+        if self.clock is None or not self.batch.stamps_ns:
+            return None
+        return max(0, self.batch.received_ns + self.clock.offset_ns - self.batch.stamps_ns[-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +64,13 @@ class Resources:
     snapshot: ResourceSnapshot
     round_trip_ns: int | None
     at_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Journalled:
+    """The newest entries of the robot's journal, oldest first; most have come before."""
+
+    journal: JournalEntries
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,4 +95,6 @@ class Failed:
     reason: str
 
 
-Event = LinkChanged | Described | Telemetry | Looked | Resources | Changed | StopAnswered | Failed
+Event = (
+    LinkChanged | Described | Telemetry | Looked | Resources | Journalled | Changed | StopAnswered | Failed
+)

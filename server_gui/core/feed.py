@@ -2,12 +2,15 @@
 
 import asyncio
 import fnmatch
+import math
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from msgspec import Struct
 
 from gateway.client import (
     Address,
-    Batch,
     CallTimeout,
     Client,
     ClientError,
@@ -17,13 +20,15 @@ from gateway.client import (
     NotConnected,
     RemoteError,
 )
-from gateway.messages import ResourceSnapshotParams
+from gateway.client.backoff import Backoff
+from gateway.messages import Description, ResourceSnapshotParams
 from server_gui.core.events import (
     STOP,
     Changed,
     Described,
     Event,
     Failed,
+    Journalled,
     LinkChanged,
     Looked,
     Resources,
@@ -33,34 +38,43 @@ from server_gui.core.events import (
 
 Tell = Callable[[Event], None]
 
-LOOK_PERIOD_S = 0.5  # quality and parameters
-RESOURCE_PERIOD_S = 1.0
-AGAIN_S = 0.1  # before following anew: a robot that refuses is not asked without pause
-LEASE_S = 10.0
+ONCE: Final = math.inf  # a period: once on every link
+AGAIN_S: Final = 5.0  # before a look that failed is tried again
+LEASE_S: Final = 10.0
+DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
+WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
+COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
+
+
+class Following(Struct, frozen=True):
+    """What is asked of a robot, how often, and in whose name; `channels` and `parameters` are globs.
+
+    What of them this robot does not have is left out. `rate_hz` 0 gives every source's own samples.
+    """
+
+    client: str
+    channels: tuple[str, ...]
+    parameters: tuple[str, ...] = ("*",)
+    rate_hz: float = 50.0
+    look_s: float = 0.5  # quality and parameters
+    resources: ResourceSnapshotParams = ResourceSnapshotParams(limit=8)
+    resources_s: float = 1.0
+    journal_s: float | None = None  # None: it is not asked for
 
 
 class Feed:
     """One robot, followed from `run` until that is cancelled.
 
-    `tell` is called in the network's thread with every event, in order. `channels` are globs; those that this
-    robot does not have are left out. Writes take the lease for as long as they last.
+    `tell` is called in the network's thread with every event, in order. Writes take the lease for as long as
+    they last.
     """
 
-    def __init__(
-        self,
-        address: Address,
-        tell: Tell,
-        channels: Sequence[str],
-        parameters: Sequence[str] = ("*",),
-        rate_hz: float = 50.0,
-        processes: int = 8,
-    ) -> None:
+    def __init__(self, address: Address, tell: Tell, following: Following) -> None:
         self._tell = tell
-        self._channels = tuple(channels)
-        self._parameters = tuple(parameters)
-        self._rate_hz = rate_hz
-        self._processes = processes
-        self._client = Client(address, LinkSettings(client="gwrms view"), self._link_changed)
+        self._following = following
+        self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
+        self._backoff = Backoff()
+        self._newest_entry: dict[str, Any] = {"n": 0}
 
     async def run(self) -> None:
         """Follow the robot until cancelled, over every link that there is."""
@@ -75,7 +89,7 @@ class Feed:
                 except* ClientError as errors:
                     for error in errors.exceptions:
                         self._tell(Failed("following the robot", str(error)))
-                await asyncio.sleep(AGAIN_S)
+                await asyncio.sleep(self._backoff.next_s())
         finally:
             await self._client.close()
 
@@ -97,31 +111,38 @@ class Feed:
     # --- what goes on by itself
 
     def _link_changed(self, state: ConnectionState) -> None:
+        if state is ConnectionState.CONNECTED:
+            self._backoff.reset()
         problem = self._client.link.problem
         self._tell(LinkChanged(state, None if problem is None else str(problem), time.monotonic_ns()))
 
     async def _follow(self) -> None:
         """Everything that goes on while one link lasts; ends by raising why it cannot go on."""
+        following = self._following
         async with asyncio.TaskGroup() as group:
             description = await self._client.describe()
             self._tell(Described(description))
-            channels = _matching(self._channels, (channel.name for channel in description.channels))
+            group.create_task(self._stream(self._channels(description)))
             changeable = (known.name for known in description.parameters if known.read_only is None)
-            parameters = _matching(self._parameters, changeable)
-            group.create_task(self._stream(channels))
-            group.create_task(self._repeat(LOOK_PERIOD_S, lambda: self._look(parameters)))
-            group.create_task(self._repeat(RESOURCE_PERIOD_S, self._resources))
+            parameters = _matching(following.parameters, changeable)
+            group.create_task(self._repeat(following.look_s, lambda: self._look(parameters)))
+            group.create_task(self._repeat(following.resources_s, self._resources))
+            if following.journal_s is not None:
+                group.create_task(self._repeat(following.journal_s, self._journal))
+
+    def _channels(self, description: Description) -> list[str]:
+        known = (channel.name for channel in description.channels if channel.component != COMPUTER)
+        return _matching(self._following.channels, known)
 
     async def _stream(self, channels: Sequence[str]) -> None:
-        async with self._client.subscribe(*channels, rate_hz=self._rate_hz) as stream:
+        if not channels:
+            globs = ", ".join(self._following.channels)
+            self._tell(Failed("the stream", f"the robot has no channel {globs} (gwrms describe lists them)"))
+            return
+        rate_hz, clock = self._following.rate_hz, self._client.link.clock
+        async with self._client.subscribe(*channels, rate_hz=rate_hz, depth=DEPTH) as stream:
             async for batch in stream:
-                self._tell(Telemetry(batch, self._age_ns(batch)))
-
-    def _age_ns(self, batch: Batch) -> int | None:
-        offset = self._client.link.clock.offset
-        if offset is None or not batch.stamps_ns:
-            return None
-        return max(0, batch.received_ns + offset.offset_ns - batch.stamps_ns[-1])
+                self._tell(Telemetry(stream.stream or 0, batch, clock.offset))
 
     async def _look(self, parameters: Sequence[str]) -> None:
         quality = await self._client.components()
@@ -129,16 +150,27 @@ class Feed:
         self._tell(Looked(quality, values, time.monotonic_ns()))
 
     async def _resources(self) -> None:
-        snapshot = await self._client.resources(ResourceSnapshotParams(limit=self._processes))
+        snapshot = await self._client.resources(self._following.resources)
         self._tell(Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns()))
+
+    async def _journal(self) -> None:
+        """Tell the newest entries when there are new ones, without a hole as far as the robot has them."""
+        journal = await self._client.journal()
+        if journal.entries and journal.entries[0]["n"] > self._newest_entry["n"] + 1:
+            journal = await self._client.journal(WHOLE_JOURNAL)
+        if journal.entries and journal.entries[-1] != self._newest_entry:
+            self._newest_entry = journal.entries[-1]
+            self._tell(Journalled(journal))
 
     async def _repeat(self, period_s: float, look: Callable[[], Awaitable[None]]) -> None:
         while True:
+            wait_s = period_s
             try:
                 await look()
             except (RemoteError, CallTimeout) as error:
                 self._tell(Failed("a look at the robot", str(error)))
-            await asyncio.sleep(period_s)
+                wait_s = min(period_s, AGAIN_S)
+            await asyncio.sleep(wait_s)
 
 
 def _matching(globs: Sequence[str], names: Iterable[str]) -> list[str]:

@@ -6,14 +6,17 @@ from typing import Self
 
 from gateway.client import Address
 from server_gui.core.events import Looked, Telemetry
-from server_gui.core.feed import Feed
+from server_gui.core.feed import Feed, Following
 from server_gui.core.mailbox import Mailbox
 from server_gui.core.network import Network
 from server_gui.core.robot import Robot
 from server_gui.core.summary import Summary
 
-CHANNELS = ("*.position", "*.state", "*.force", "*.tilt_forward", "*.tilt_side")
-PARAMETERS = ("gait.*",)
+FOLLOWING = Following(
+    "gwrms view",
+    channels=("*.position", "*.state", "*.force", "*.tilt_forward", "*.tilt_side"),
+    parameters=("gait.*",),
+)
 
 
 class Session:
@@ -24,7 +27,7 @@ class Session:
         self.summary: Summary | None = None
         self._mailbox = Mailbox()
         self._network = Network()
-        self._feed = Feed(address, self._mailbox.put, CHANNELS, PARAMETERS)
+        self._feed = Feed(address, self._mailbox.put, FOLLOWING)
         self._following: concurrent.futures.Future[None] | None = None
 
     def __enter__(self) -> Self:

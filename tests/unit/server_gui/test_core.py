@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from gateway.client import Address, Batch, ConnectionState
+from gateway.client import Address, Batch, ClockOffset, ConnectionState
 from server_gui.core.events import STOP, Event, Failed, LinkChanged, Telemetry
-from server_gui.core.feed import Feed
+from server_gui.core.feed import Feed, Following
 from server_gui.core.mailbox import Mailbox
 from server_gui.core.network import Network
 from server_gui.core.robot import HISTORY_ROWS, Robot
@@ -27,7 +27,7 @@ def batch(columns: dict[str, list[float | None]], at_ns: int = 0, dropped: int =
 def telemetry(
     columns: dict[str, list[float | None]], at_ns: int = 0, dropped: int = 0, missed: int = 0
 ) -> Telemetry:
-    return Telemetry(batch(columns, at_ns, dropped, missed), age_ns=0)
+    return Telemetry(1, batch(columns, at_ns, dropped, missed), None)
 
 
 # --- state
@@ -52,7 +52,8 @@ def test_values_are_stale_half_a_second_after_they_were_taken() -> None:
     robot = Robot()
     assert robot.is_stale(0)
     assert robot.age_s(0) is None
-    robot.apply(Telemetry(batch({"a": [1.0]}, at_ns=10 * SECOND_NS), age_ns=SECOND_NS // 10))
+    clock = ClockOffset(-10 * SECOND_NS + SECOND_NS // 10, 0)  # the row was taken at 0 on the robot's clock
+    robot.apply(Telemetry(1, batch({"a": [1.0]}, at_ns=10 * SECOND_NS), clock))
     assert not robot.is_stale(10 * SECOND_NS)
     assert robot.age_s(10 * SECOND_NS) == pytest.approx(0.1)
     assert robot.is_stale(10 * SECOND_NS + SECOND_NS // 2)
@@ -160,9 +161,8 @@ class Watcher:
         self.robot = Robot()
         self.events: list[Event] = []
         self._mailbox = Mailbox()
-        self.feed = Feed(
-            Address.parse(fake.address), self._mailbox.put, ("*.position", "*.state"), ("gait.*",)
-        )
+        following = Following("test", ("*.position", "*.state"), ("gait.*",))
+        self.feed = Feed(Address.parse(fake.address), self._mailbox.put, following)
         self.following = network.run(self.feed.run())
 
     def until(self, condition: Callable[[], object]) -> None:

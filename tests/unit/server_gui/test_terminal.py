@@ -318,4 +318,4 @@ def test_headless_line_has_a_dash_for_what_is_missing() -> None:
 
 
 def _feed(robot: Robot, columns: dict[str, list[float | None]]) -> None:
-    robot.apply(Telemetry(Batch([0], columns, 0, 0, 0, 1, 0), age_ns=0))
+    robot.apply(Telemetry(1, Batch([0], columns, 0, 0, 0, 1, 0), None))
