@@ -5,7 +5,7 @@ import uuid
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 import numpy as np
@@ -20,12 +20,16 @@ class EventKind(Enum):
     GAP = "gap"  # something was not seen: the link dropped, or notifications never came
     DROPPED = "dropped"  # the robot threw rows away
     LOST = "lost"  # this server threw rows away: its queue or its disk was full
+    LINK = "link"  # the link to the robot dropped
     NAME = "name"  # a robot calls itself by another name than the server's file, or by another robot's
     JOURNAL_GAP = "journal_gap"  # entries of the robot's journal were never seen
+    REFUSED = "refused"  # a robot sent what cannot be kept
     MARKER = "marker"  # somebody marked this instant
 
 
 Name = tuple[str, str, int, Layout]  # session, connection, stream, columns
+
+NUMBERS: Final = range(-(2**62), 2**62)  # what is kept in 8 bytes, and may be added up in them
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,7 @@ class Gathering:
         self.units: dict[str, str] = {}
         self._link: int | None = None
         self._dropped: dict[int, int] = {}  # by stream, what the robot dropped until now
+        self._seqs: dict[int, int] = {}  # by stream, the newest notification
         self._gathered: dict[Name, list[Notification]] = {}
         self._layouts: dict[tuple[str, ...], Layout] = {}
 
@@ -61,7 +66,13 @@ class Gathering:
         self._layouts.clear()
 
     def take(self, new: Notification) -> list[Record]:
-        """Keep one notification; the events that it tells of: a new link, a gap, rows dropped."""
+        """Keep one notification; the events that it tells of: a new link, a gap, rows dropped.
+
+        Raises:
+            ValueError: it cannot be kept, and is as if it had never come.
+
+        """
+        _check(new)
         events = self._missing(new)
         if new.batch.stamps_ns:
             name = (self.session, self.connection, new.stream, self._layout(tuple(new.batch.columns)))
@@ -98,21 +109,28 @@ class Gathering:
             events.append(self.event(kind, text, utc_ns, first_ns, stream=new.stream, seq=batch.seq, **data))
 
         if batch.link != self._link:
-            self._new_link(batch.link, happened)
-        if batch.missed:
-            happened(EventKind.GAP, f"{batch.missed} notifications never came", missed=batch.missed)
+            self._new_connection(batch.link, "the link was made again", happened)
+        elif batch.seq <= self._seqs.get(new.stream, -1):
+            self._new_connection(batch.link, "the stream's numbers began anew", happened)
+        # Counted here: what waited too long for us behind the link is missing as well.
+        newest = self._seqs.get(new.stream, batch.seq - batch.missed - 1)
+        missed = batch.seq - newest - 1
+        if missed:
+            happened(EventKind.GAP, f"{missed} notifications never came", missed=missed)
+        self._seqs[new.stream] = batch.seq
         rows = batch.dropped - self._dropped.get(new.stream, 0)
         if rows > 0:
             happened(EventKind.DROPPED, f"the robot dropped {rows} rows: we read too slowly", rows=rows)
         self._dropped[new.stream] = batch.dropped
         return events
 
-    def _new_link(self, link: int, happened: Callable[[EventKind, str], None]) -> None:
+    def _new_connection(self, link: int, why: str, happened: Callable[[EventKind, str], None]) -> None:
         if self._link is not None:
             self.connection = uuid.uuid4().hex[:16]
-            happened(EventKind.GAP, "the link was made again; what was in between has not been seen")
+            happened(EventKind.GAP, f"{why}; what was in between has not been seen")
         self._link = link
         self._dropped.clear()
+        self._seqs.clear()
 
     def _layout(self, channels: tuple[str, ...]) -> Layout:
         layout = self._layouts.get(channels)
@@ -139,6 +157,17 @@ class Gathering:
             utc_offset_ns=np.repeat(np.array([new.utc_offset_ns for new in found], np.int64), counts),
             values=np.array(columns, np.float64).reshape(len(columns), sum(counts)),  # None becomes NaN
         )
+
+
+def _check(new: Notification) -> None:
+    """Refuse what would keep every robot's rows from being written."""
+    batch = new.batch
+    for name, column in batch.columns.items():
+        if len(column) != len(batch.stamps_ns):
+            raise ValueError(f"{len(batch.stamps_ns)} stamps, but {len(column)} values of {name}")
+    numbers = (new.stream, batch.seq, new.utc_offset_ns, *batch.stamps_ns)
+    if not all(number in NUMBERS for number in numbers):
+        raise ValueError("a stamp, or another number, is larger than 8 bytes hold")
 
 
 def _joined(parts: Iterable[list[Any]]) -> list[Any]:

@@ -1,28 +1,40 @@
 """The recorder: takes everything from the network's thread at once, and puts it into the spool in its own."""
 
 import functools
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 from gateway.client import Batch
 from gateway.messages import Description, ResourceSnapshot
 from ml.store.tables import TABLES
 from server_gui.core.recording import records
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.gathering import EventKind, Gathering, Notification
-from server_gui.core.recording.journals import Entry, news
-from server_gui.core.recording.records import Facts, Session
-from server_gui.core.recording.rows import JournalHead, Record
+from server_gui.core.recording.gathering import EventKind, Notification
+from server_gui.core.recording.journals import Entry
+from server_gui.core.recording.records import Facts
+from server_gui.core.recording.robots import Robots
+from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
+
+log = logging.getLogger(__name__)
 
 COMMIT_S: Final = 0.05  # rows of so long go to the disk together
 AGAIN_S: Final = 1.0  # between attempts on a disk that refuses, and looks at how full it is
 
 Work = Callable[[], Iterable[Record]]
+
+
+class Item(NamedTuple):
+    """Something handed in: how many rows of which robot, and what makes records of it."""
+
+    robot: str
+    rows: int
+    work: Work
 
 
 class AlarmKind(Enum):
@@ -81,17 +93,14 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name="recorder")
         # Shared between the threads, under the lock.
         self._changed = threading.Condition()
-        self._queue: list[Work] = []
+        self._queue: list[Item] = []
         self._queued_rows = 0
         self._handed = 0
         self._acknowledged = 0
         self._overflowed = 0
         self._ending = threading.Event()
         # The recorder's thread.
-        self._robots: dict[str, Gathering] = {}
-        self._sessions: dict[str, Session] = {}
-        self._names: dict[str, str] = {}  # what robots call themselves → robot
-        self._heads = dict(spool.heads)  # up to where journals are recorded, or about to be
+        self._robots = Robots(spool.heads)
         self._alarms: dict[AlarmKind, Alarm] = {}
         self._recorded = 0
         self._lost = 0
@@ -124,30 +133,37 @@ class Recorder:
             newest_ns = batch.stamps_ns[-1] if batch.stamps_ns else batch.received_ns
             clock_offset_ns = newest_ns - batch.received_ns
         new = Notification(stream, batch, to_utc_ns - clock_offset_ns, batch.received_ns + to_utc_ns)
-        return self._put(len(batch.stamps_ns), functools.partial(self._take, robot, new))
+        return self._put(robot, len(batch.stamps_ns), functools.partial(self._robots.take, robot, new))
 
     def describe(self, robot: str, description: Description) -> int:
         """Take the channels' units; a name that differs from `robot`, or is another's too, is an event."""
-        return self._put(1, functools.partial(self._describe, robot, description, time.time_ns()))
+        return self._put(
+            robot, 1, functools.partial(self._robots.describe, robot, description, time.time_ns())
+        )
 
     def begin(self, robot: str, facts: Facts) -> str:
         """Begin a session, end the one before, and give its name. The first row begins one where none is."""
         session = records.begin(robot, facts)
-        self._put(1, functools.partial(self._begin, session))
+        self._put(robot, 1, functools.partial(self._robots.begin, session))
         return session.name
+
+    def amend(self, robot: str, facts: Facts) -> int:
+        """Say more about the robot's session than was known when it began."""
+        return self._put(robot, 1, functools.partial(self._robots.amend, robot, facts))
 
     def end(self, robot: str) -> int:
         """End the robot's session."""
-        return self._put(1, functools.partial(self._end, robot))
+        return self._put(robot, 1, functools.partial(self._robots.end, robot))
 
     def resources(self, robot: str, snapshot: ResourceSnapshot) -> int:
         """Keep a look at the robot's computer."""
-        utc_ns = time.time_ns()
-        return self._put(1, lambda: [records.resources(robot, self._session(robot), utc_ns, snapshot)])
+        return self._put(robot, 1, functools.partial(self._robots.resources, robot, time.time_ns(), snapshot))
 
     def journal(self, robot: str, entries: Sequence[Entry]) -> int:
         """Keep what is new in a tail of the robot's journal."""
-        return self._put(len(entries), functools.partial(self._journal, robot, entries, time.time_ns()))
+        return self._put(
+            robot, len(entries), functools.partial(self._robots.journal, robot, entries, time.time_ns())
+        )
 
     def mark(self, robot: str, text: str, **data: Any) -> int:
         """Mark this instant."""
@@ -156,7 +172,7 @@ class Recorder:
     def event(self, robot: str, kind: EventKind, text: str, **data: Any) -> int:
         """Keep that something happened to the robot now."""
         utc_ns = time.time_ns()
-        return self._put(1, lambda: [self._known(robot).event(kind, text, utc_ns, **data)])
+        return self._put(robot, 1, lambda: [self._robots.known(robot).event(kind, text, utc_ns, **data)])
 
     def add(self, record: Record) -> int:
         """Keep a row of any table: a label, a prediction.
@@ -167,8 +183,8 @@ class Recorder:
         """
         if record.table not in TABLES:
             raise ValueError(f"there is no table {record.table}; there are {', '.join(TABLES)}")
-        TABLES[record.table].rows([record.fields])  # what the store would not take is refused here
-        return self._put(1, lambda: [record])
+        TABLES[record.table].rows([record.fields])
+        return self._put(record.fields.get("robot", ""), 1, lambda: [record])
 
     # --- how it goes
 
@@ -190,14 +206,14 @@ class Recorder:
             wanted = self._handed
             return self._changed.wait_for(lambda: self._acknowledged >= wanted, timeout_s)
 
-    def _put(self, rows: int, work: Work) -> int:
+    def _put(self, robot: str, rows: int, work: Work) -> int:
         with self._changed:
             self._handed += 1
             if self._queued_rows + rows > self._settings.capacity:
                 self._overflowed += rows
             else:
                 self._queued_rows += rows
-                self._queue.append(work)
+                self._queue.append(Item(robot, rows, work))
             self._changed.notify_all()
             return self._handed
 
@@ -207,16 +223,16 @@ class Recorder:
         ending = False
         while not ending:
             queue, handed, ending = self._next()
-            found = [record for work in queue for record in work()]
+            found = [record for item in queue for record in self._done(item)]
             if ending:
-                found += [record for robot in list(self._sessions) for record in self._end(robot)]
+                found += self._robots.end_all()
             self._keep(found)
             self._freeze(ending)
             with self._changed:
                 self._acknowledged = handed
                 self._changed.notify_all()
 
-    def _next(self) -> tuple[list[Work], int, bool]:
+    def _next(self) -> tuple[list[Item], int, bool]:
         """Wait until there is something to keep, let more come, and take it all."""
         with self._changed:
             self._changed.wait_for(
@@ -238,17 +254,30 @@ class Recorder:
         )
         return queue, handed, ending
 
+    def _done(self, item: Item) -> list[Record]:
+        """The records that an item makes; what a robot sends wrongly disturbs no other robot."""
+        try:
+            found = list(item.work())
+            for record in found:
+                TABLES[record.table].rows([record.fields])  # what the store would not take
+        except Exception as error:  # noqa: BLE001 - whatever it is, the others' recording goes on
+            self._lost += item.rows
+            return self._robots.refused(item.robot, f"{item.robot} sent what cannot be kept: {error}")
+        return found
+
     def _keep(self, found: list[Record]) -> None:
-        runs = [run for robot in self._robots.values() for run in robot.runs()]
+        runs = self._robots.runs()
         rows = sum(map(len, runs)) + len(found)
         if not self._has_room():
             self._lose(rows)
             return
-        found += self._losses()
+        if self._lost_untold:
+            found += self._robots.lost(self._lost_untold)
+            self._lost_untold = 0
         while runs or found:
             try:
                 began_s = time.monotonic()
-                self._spool.append(runs, found, self._heads)
+                self._spool.append(runs, found, self._robots.heads)
             except SpoolUnusable as error:
                 self._alarm(AlarmKind.SPOOL_FAILED, str(error))
                 if not self._ending.wait(AGAIN_S):
@@ -263,16 +292,7 @@ class Recorder:
     def _lose(self, rows: int) -> None:
         self._lost += rows
         self._lost_untold += rows
-        self._heads = dict(self._spool.heads)  # those entries are still to be seen
-
-    def _losses(self) -> list[Record]:
-        """That rows were lost here, told in the recording of every robot there is."""
-        lost, self._lost_untold = self._lost_untold, 0
-        if not lost:
-            return []
-        text = f"this server lost {lost} rows of all its robots"
-        now_ns = time.time_ns()
-        return [robot.event(EventKind.LOST, text, now_ns, rows=lost) for robot in self._robots.values()]
+        self._robots.heads = dict(self._spool.heads)  # those entries are still to be seen
 
     def _has_room(self) -> bool:
         now_s = time.monotonic()
@@ -293,55 +313,14 @@ class Recorder:
 
     def _alarm(self, kind: AlarmKind, text: str | None) -> None:
         """Begin an alarm, go on with it, or end it where there is nothing to say."""
+        known = self._alarms.get(kind)
         if text is None:
-            self._alarms.pop(kind, None)
+            if known is not None:
+                del self._alarms[kind]
+                log.warning("over: %s", known.text)
             return
-        new = kind not in self._alarms
         self._alarms[kind] = Alarm(kind, text)
-        if new and self._on_alarm is not None:
-            self._on_alarm(self._alarms[kind])
-
-    # --- what the queue holds
-
-    def _known(self, robot: str) -> Gathering:
-        return self._robots.setdefault(robot, Gathering(robot))
-
-    def _session(self, robot: str) -> str:
-        return self._known(robot).session
-
-    def _take(self, robot: str, new: Notification) -> Iterable[Record]:
-        known = self._known(robot)
-        begun = [] if known.session else self._begin(records.begin(robot, Facts(units=known.units)))
-        return [*begun, *known.take(new)]
-
-    def _begin(self, session: Session) -> list[Record]:
-        ended = self._end(session.robot)
-        self._known(session.robot).session = session.name
-        self._sessions[session.robot] = session
-        return [*ended, session.record()]
-
-    def _end(self, robot: str) -> list[Record]:
-        self._known(robot).session = ""
-        session = self._sessions.pop(robot, None)
-        return [] if session is None else [session.ended().record()]
-
-    def _describe(self, robot: str, description: Description, utc_ns: int) -> list[Record]:
-        known = self._known(robot)
-        known.describe({channel.name: channel.unit for channel in description.channels})
-        problems = []
-        if description.robot != robot:
-            problems.append(f"{robot} in the server's file calls itself {description.robot}")
-        other = self._names.setdefault(description.robot, robot)
-        if other != robot:
-            problems.append(f"{robot} and {other} both call themselves {description.robot}")
-        return [known.event(EventKind.NAME, problem, utc_ns) for problem in problems]
-
-    def _journal(self, robot: str, entries: Sequence[Entry], utc_ns: int) -> list[Record]:
-        new = news(entries, self._heads.get(robot))
-        if entries:
-            self._heads[robot] = JournalHead(entries[-1]["n"], entries[-1]["hash"])
-        found = [records.journal(robot, entry) for entry in new.entries]
-        if new.missing:
-            text = f"{new.missing} entries of the robot's journal were never seen"
-            found.append(self._known(robot).event(EventKind.JOURNAL_GAP, text, utc_ns, missing=new.missing))
-        return found
+        if known is None:
+            log.error("%s", text)
+            if self._on_alarm is not None:
+                self._on_alarm(self._alarms[kind])

@@ -4,12 +4,14 @@ import time
 import uuid
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
 from gateway.messages import ResourceSnapshot
 from server_gui.core.recording.rows import Record
+
+MORE: Final = ("disk", "network", "thermal", "throttling", "kernel")  # of a snapshot, in one column
 
 
 class Facts(msgspec.Struct, frozen=True):
@@ -52,6 +54,10 @@ class Session(msgspec.Struct, frozen=True):
             "notes": facts.notes,
         }
         return Record("sessions", fields)
+
+    def amended(self, facts: Facts) -> "Session":
+        """The same session, of which more is known now."""
+        return msgspec.structs.replace(self, facts=facts)
 
     def ended(self) -> "Session":
         """The same session, ended now."""
@@ -109,7 +115,7 @@ def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot)
     """A row of `resources`: the robot's computer, with its processes."""
     found = msgspec.to_builtins(snapshot)
     cpu, memory, gateway = found["cpu"], found["memory"], found["gateway"]
-    more = {key: found[key] for key in ("disk", "network", "thermal", "kernel") if key in found}
+    more = {key: found[key] for key in MORE if key in found}
     fields = {
         "robot": robot,
         "session": session,

@@ -256,3 +256,48 @@ def test_a_notification_without_rows_still_tells_what_was_lost(spool: Spool) -> 
     with Recorder(spool) as recorder:
         recorder.record("exo-01", 1, empty)
     assert len(events(spool, "dropped")) == 1
+
+
+def test_what_a_robot_sends_wrongly_is_refused_and_told_once_and_disturbs_no_other(spool: Spool) -> None:
+    ragged = Batch([1, 2], {"a.b": [0.5]}, 0, 0, 0, 1, 1)
+    huge = Batch([2**63], {"a.b": [0.5]}, 1, 0, 0, 1, 1)
+    with Recorder(spool) as recorder:
+        for wrong in (ragged, huge, ragged):
+            recorder.record("bad", 1, wrong)
+        recorder.journal("bad", [{"nonsense": True}])
+        recorder.record("good", 1, batch(0))
+        assert recorder.flush(WAIT_S)
+        assert recorder.state.lost == 2 + 1 + 2 + 1
+    assert [row[0] for row in rows(kept(spool)[0])] == ["good"]
+    (event,) = events(spool, "refused")
+    assert event["text"] == "bad sent what cannot be kept: 2 stamps, but 1 values of a.b"
+
+
+def test_numbers_that_begin_anew_without_a_new_link_keep_their_rows_apart(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for seq in (0, 1, 0, 0):
+            recorder.record("exo-01", 1, batch(seq))
+    found = rows(kept(spool)[0])
+    assert len(found) == len(set(found)) == 4
+    assert len(events(spool, "gap")) == 2
+
+
+def test_what_is_missing_between_the_link_and_the_recorder_is_a_gap_too(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for seq in (0, 1, 5, 6):
+            recorder.record("exo-01", 1, batch(seq))
+    (gap,) = events(spool, "gap")
+    assert json.loads(str(gap["data"])) == {"stream": 1, "seq": 5, "missed": 3}
+
+
+def test_a_session_of_which_more_becomes_known_is_told_again_under_its_name(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.amend("exo-01", Facts(operator="nobody"))  # there is none
+        name = recorder.begin("exo-01", Facts(operator="Ada"))
+        recorder.amend("exo-01", Facts(operator="Ada", parameters={"gait.step_length": 0.4}))
+    sessions = [record.fields for record in kept(spool)[1] if record.table == "sessions"]
+    assert {session["session"] for session in sessions} == {name}
+    assert [json.loads(str(session["parameters"])) for session in sessions] == [
+        {},
+        *2 * [{"gait.step_length": 0.4}],
+    ]
