@@ -11,8 +11,8 @@ from obstore.store import ObjectStore, from_url
 
 from ml.store.errors import translated
 
-CONNECT_TIMEOUT: Final = "5s"
-TIMEOUT: Final = "60s"
+CONNECT_TIMEOUT_S: Final = 5
+TIMEOUT_S: Final = 60
 _CLIENT: Final = ("connect_timeout", "timeout", "allow_http")
 RETRIES: Final = 3  # within one request; who calls us tries again later, with patience
 _PROFILE: Final = {  # what a profile's lines are called in the libraries
@@ -65,7 +65,7 @@ class Objects:
 
 def s3_options() -> dict[str, str]:
     """How S3 is reached: what the AWS environment says, and the profile where it has no keys."""
-    options = {"connect_timeout": CONNECT_TIMEOUT, "timeout": TIMEOUT} | _profile()
+    options = {"connect_timeout": f"{CONNECT_TIMEOUT_S}s", "timeout": f"{TIMEOUT_S}s"} | _profile()
     endpoint = os.environ.get("AWS_ENDPOINT_URL") or options.get("aws_endpoint", "")
     return options | ({"allow_http": "true"} if endpoint.startswith("http://") else {})
 

@@ -22,6 +22,7 @@ from deltalake.exceptions import CommitFailedError
 
 from ml.store import durable
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
+from ml.store.files import filesystem
 from ml.store.objects import RETRIES, Objects, s3_options
 from ml.store.probe import probe
 from ml.store.tables import Table
@@ -118,7 +119,7 @@ class Store:
         """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
         delta = self.table(location, version)
         with translated(f"{self.url}/{location}"):
-            return delta.to_pyarrow_dataset()
+            return delta.to_pyarrow_dataset(filesystem=filesystem(self._uri(location)))
 
     def units(self, location: str) -> dict[str, str | None]:
         """Each column's unit, None where none was given; nothing where there is no table yet."""
