@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock
 
-# Events closer together than this are handled in one go: frames that follow each other on the bus.
-_QUANTUM_NS = 500_000
+# Real time passes in steps of so long: what happens in one is handled in one go, at its end. SYNC's periods
+# are multiples of it, so that SYNC always comes at the same place of a step, and evenly.
+_STEP_NS = 500_000
 # A machine that slept, or had no time for us, does not make the robot rush through what it missed.
 _CATCH_UP_NS = 200 * MILLISECOND_NS
 _LONGEST_WAIT_NS = _CATCH_UP_NS / 2  # where little happens, waiting for it is not missing it
@@ -26,7 +27,10 @@ class Loop:
         self.clock = clock
         self.skipped_ns = 0
         self._speed = speed
-        self._selector = selectors.DefaultSelector()
+        self._step_ns = round(_STEP_NS * (speed or 1.0))
+        self._selector = (
+            selectors.SelectSelector()
+        )  # it waits to the microsecond; others in whole milliseconds
         self._each_turn: list[Callable[[], None]] = []
         self._stopped = False
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -68,7 +72,7 @@ class Loop:
 
     def _anchor(self, simulated_ns: int) -> None:
         self._real_start_ns = time.monotonic_ns()
-        self._simulated_start_ns = simulated_ns
+        self._simulated_start_ns = simulated_ns - simulated_ns % self._step_ns
 
     def _target_ns(self) -> int:
         """The simulated time that should be reached now."""
@@ -81,7 +85,7 @@ class Loop:
             self.skipped_ns += target - now_ns
             self._anchor(now_ns)
             return now_ns
-        return target
+        return target - (target - self._simulated_start_ns) % self._step_ns
 
     def _wait_s(self) -> float | None:
         if self._speed is None:
@@ -89,7 +93,6 @@ class Loop:
         due_ns = self.clock.next_due_ns()
         if due_ns is None:
             return None
-        wait_ns = max(due_ns - self.clock.now_ns, _QUANTUM_NS) / self._speed
-        late_ns = time.monotonic_ns() - self._real_start_ns
-        late_ns -= round((self.clock.now_ns - self._simulated_start_ns) / self._speed)
-        return min(max(wait_ns - late_ns, 0.0), _LONGEST_WAIT_NS) / SECOND_NS
+        steps = -((self._simulated_start_ns - due_ns) // self._step_ns)
+        wake_ns = self._real_start_ns + round(steps * self._step_ns / self._speed)
+        return min(max(wake_ns - time.monotonic_ns(), 0), _LONGEST_WAIT_NS) / SECOND_NS
