@@ -134,11 +134,11 @@ class Insole:
         contact = self._stance.contact(load.force)
         others = None if self.other is None else self.other.latest.read(0, stamp_ns)[0]
         share = self._stance.share(load.force, others)
+        self.latest.update(stamp_ns, self._indices, (*load, *pressures, contact, share))
         if self.check.is_due(stamp_ns):
             self.check.update(stamp_ns, pressures, load.force)
             if self.other is not None:
                 self._check_against(self.other, stamp_ns, load.force, others)
-        self.latest.update(stamp_ns, self._indices, (*load, *pressures, contact, share))
 
     def _check_against(
         self, other: "Insole", stamp_ns: int, force: float | None, others: float | None
