@@ -1,6 +1,8 @@
 """Runs as the columns of the store's telemetry table."""
 
+import itertools
 from collections.abc import Iterable, Mapping
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -9,26 +11,47 @@ import pyarrow as pa
 from ml.store.tables import TELEMETRY, UTC, field
 from server_gui.core.recording.rows import Layout, Run
 
+OWN: Final = frozenset(TELEMETRY.schema.names)
+
 
 class Columns:
     """Where each channel of these layouts goes, in a table whose columns have these units already.
 
-    A channel's column has its name. Where the column has another unit, because another robot means something
-    else by that name, it is `name@unit`: values in different units never stand in one column.
+    A channel's column has its name. Where that column has another unit, because another robot means something
+    else by the name, it is `name@unit`: values in different units never stand in one column. Where the name
+    is one of the table's own, or another one in other letters' case, which the table format takes for the
+    same, it is `name@2`.
     """
 
     def __init__(self, layouts: Iterable[Layout], units: Mapping[str, str | None]) -> None:
-        taken = dict(units)
+        self._columns = {name.lower(): (name, unit) for name, unit in units.items()}
         self._names: dict[tuple[str, str | None], str] = {}
         for layout in layouts:
-            for channel, unit in zip(layout.channels, layout.units, strict=True):
-                name = channel if unit is None or taken.get(channel) in {None, unit} else f"{channel}@{unit}"
-                taken[name] = unit if taken.get(name) is None else taken[name]
-                self._names[channel, unit] = name
+            for key in zip(layout.channels, layout.units, strict=True):
+                if key not in self._names:
+                    self._names[key] = self._place(*key)
         channels = dict.fromkeys(self._names.values())
         self.schema = pa.schema(
-            [*TELEMETRY.schema, *(field(name, pa.float64(), taken[name]) for name in channels)]
+            [
+                *TELEMETRY.schema,
+                *(field(name, pa.float64(), self._columns[name.lower()][1]) for name in channels),
+            ]
         )
+
+    def _place(self, channel: str, unit: str | None) -> str:
+        named = [channel] if unit is None else [channel, f"{channel}@{unit}"]
+        further = (f"{channel}@{number}" for number in itertools.count(2))
+        name = next(name for name in itertools.chain(named, further) if self._fits(name, unit))
+        known = self._columns.get(name.lower(), (name, None))[1]
+        self._columns[name.lower()] = (name, unit if known is None else known)
+        return name
+
+    def _fits(self, name: str, unit: str | None) -> bool:
+        """Whether values in this unit may stand in the column of this name."""
+        if name.lower() in OWN:
+            return False
+        taken, known = self._columns.get(name.lower(), (name, None))
+        return taken == name and (unit is None or known in {None, unit})
 
     def batch(self, run: Run) -> pa.RecordBatch:
         """A run's rows."""

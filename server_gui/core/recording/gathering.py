@@ -73,9 +73,10 @@ class Gathering:
 
         """
         _check(new)
+        layout = self._layout(tuple(new.batch.columns))
         events = self._missing(new)
         if new.batch.stamps_ns:
-            name = (self.session, self.connection, new.stream, self._layout(tuple(new.batch.columns)))
+            name = (self.session, self.connection, new.stream, layout)
             self._gathered.setdefault(name, []).append(new)
         return events
 
@@ -135,6 +136,9 @@ class Gathering:
     def _layout(self, channels: tuple[str, ...]) -> Layout:
         layout = self._layouts.get(channels)
         if layout is None:
+            for channel in channels:
+                if not (channel and channel.isprintable()):
+                    raise ValueError(f"{channel!r} is no name of a channel")
             layout = Layout(channels, tuple(self.units.get(channel) for channel in channels))
             self._layouts[channels] = layout
         return layout

@@ -17,6 +17,7 @@ from server_gui.core.recording.upload import upload
 
 log = logging.getLogger(__name__)
 
+KNOWN: Final = (StoreError, RecordingError, sqlite3.Error)
 LOOK_S: Final = 1.0  # between looks at the spool
 LONGEST_S: Final = 60.0  # between attempts on a store that cannot be reached
 
@@ -91,10 +92,11 @@ class Uploader:
                 return True
             try:
                 self._upload(number)
-            except (StoreError, RecordingError, sqlite3.Error) as error:
+            except Exception as error:  # noqa: BLE001 - uploading goes on, whatever a library raises
                 self._store = None
-                log.warning("upload of batch %d: %s", number, error)
-                self.state = replace(self.state, problem=str(error))
+                problem = str(error) if isinstance(error, KNOWN) else _unknown(error)
+                log.warning("batch %d is not in the store yet: %s", number, problem)
+                self.state = replace(self.state, problem=problem)
                 return False
             self._tell(waiting[done:])
         return True
@@ -114,3 +116,7 @@ class Uploader:
     def _tell(self, waiting: list[int]) -> None:
         backlog = self._spool.backlog_bytes()
         self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog)
+
+
+def _unknown(error: Exception) -> str:
+    return f"internal error, {type(error).__name__}"  # its text may quote keys

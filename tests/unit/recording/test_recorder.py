@@ -261,13 +261,14 @@ def test_a_notification_without_rows_still_tells_what_was_lost(spool: Spool) -> 
 def test_what_a_robot_sends_wrongly_is_refused_and_told_once_and_disturbs_no_other(spool: Spool) -> None:
     ragged = Batch([1, 2], {"a.b": [0.5]}, 0, 0, 0, 1, 1)
     huge = Batch([2**63], {"a.b": [0.5]}, 1, 0, 0, 1, 1)
+    unnamed = Batch([1], {"a\x00b": [0.5]}, 1, 0, 0, 1, 1)
     with Recorder(spool) as recorder:
-        for wrong in (ragged, huge, ragged):
+        for wrong in (ragged, huge, unnamed, ragged):
             recorder.record("bad", 1, wrong)
         recorder.journal("bad", [{"nonsense": True}])
         recorder.record("good", 1, batch(0))
         assert recorder.flush(WAIT_S)
-        assert recorder.state.lost == 2 + 1 + 2 + 1
+        assert recorder.state.lost == 2 + 1 + 1 + 2 + 1
     assert [row[0] for row in rows(kept(spool)[0])] == ["good"]
     (event,) = events(spool, "refused")
     assert event["text"] == "bad sent what cannot be kept: 2 stamps, but 1 values of a.b"

@@ -127,6 +127,22 @@ def test_values_in_different_units_never_share_a_column(spool: Spool, folder_url
     assert "left_knee.position" not in columns.schema.names
 
 
+@pytest.mark.parametrize(
+    "channels", [("seq", "robot"), ("Utc",), ("a.b", "A.b"), ("a b", "a,b;{}()=", "a/b", "é"), ("`x`", '"x"')]
+)
+def test_no_name_of_a_channel_keeps_a_batch_from_the_store(
+    spool: Spool, folder_url: str, channels: tuple[str, ...]
+) -> None:
+    store = Store(folder_url)
+    for seq in range(2):  # the second time the columns are there already
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(seq, channels=channels))
+        upload_all(spool, store)
+    table = store.dataset(HERE).to_table().sort_by("seq")
+    found = {tuple(table[name].to_pylist()) for name in table.column_names[len(TELEMETRY.schema) :]}
+    assert found == {tuple(value(seq, 0, c) for seq in range(2)) for c in range(len(channels))}
+
+
 def test_the_uploader_empties_the_spool(spool: Spool, store_url: str) -> None:
     with Uploader(spool, lambda: Store(store_url)) as uploader:
         with Recorder(spool) as recorder:
