@@ -15,9 +15,9 @@ FIRST_RAD_S, LEAST_RAD_S = 1.5, 1.0  # before any was seen; and always
 class FootImuEvents:
     """Heel strike and toe off of `leg` from its foot's pitch rate (rad/s, toes down positive: REP-103's y).
 
-    The foot turns toes down while it pushes off, toes up in swing, and down again from contact on (Sabatini et
-    al. 2005, IEEE Trans. Biomed. Eng. 52, 486; Jasiewicz et al. 2006, Gait & Posture 24, 502). Toe off is where
-    the push-off's last half peak is passed, known when the rate changes its sign; heel strike is stamped
+    The foot turns toes down while it pushes off, toes up in swing, and down again from contact on (Sabatini
+    et al. 2005, IEEE Trans. Biomed. Eng. 52, 486; Jasiewicz et al. 2006, Gait & Posture 24, 502). Toe off is
+    where the push-off's last half peak is passed, known when the rate changes its sign; heel strike is
     `STRIKE_AFTER_NS` after the rate's next change of sign, and known at the first sample from then on.
     """
 

@@ -15,10 +15,10 @@ APART = 0.12  # leg lengths between the feet: closer together, nobody steps
 class KinematicEvents:
     """Heel strike and toe off of both legs from their joints' angles (rad, flexion positive).
 
-    A foot strikes where it is farthest before the hip and leaves where it is farthest behind (Zeni, Richards &
-    Higginson 2008, Gait & Posture 27, 710), here in leg lengths with thigh and shank alike; the constant
-    difference between these extremes and contact is taken out. Both feet must be apart at that moment, so that
-    sitting down, where they move together, is no step. Known as soon as the foot has turned back by
+    A foot strikes where it is farthest before the hip and leaves where it is farthest behind (Zeni, Richards
+    & Higginson 2008, Gait & Posture 27, 710), here in leg lengths with thigh and shank alike; the constant
+    difference between these extremes and contact is taken out. Both feet must be apart at that moment, so
+    that sitting down, where they move together, is no step. Known as soon as the foot has turned back by
     `TURN_SHARE` of its usual way.
     """
 
@@ -52,7 +52,7 @@ class KinematicEvents:
 
 
 def foot_forward(hip: float, knee: float, trunk: float) -> float:
-    """How far the ankle is before the hip, in leg lengths; `hip` counts from a trunk that leans by `trunk`."""
+    """How far the ankle is before the hip, in leg lengths; `hip` counts from a trunk leaning by `trunk`."""
     thigh = hip - trunk
     return 0.5 * (math.sin(thigh) + math.sin(thigh - knee))
 

@@ -17,9 +17,9 @@ class PressureEvents:
     """Heel strike and toe off of `leg`, sample by sample; the same live and over a recording.
 
     A foot is down from where the force passes `LAND_SHARE` of a usual step's peak to where it falls below
-    `LIFT_SHARE`, counted from what the insole shows in the air (vertical force thresholds as in
-    Catalfamo et al. 2008, Gait & Posture 28, 420: relative to the wearer's own load, with a minimum duration).
-    An event is stamped where the line between two samples crosses the threshold, and known `CONFIRM_NS` later.
+    `LIFT_SHARE`, counted from what the insole shows in the air (thresholds relative to the wearer's own load,
+    with a minimum duration, as in Catalfamo et al. 2008, Gait & Posture 28, 420). An event is stamped where
+    the line between two samples crosses the threshold, and known `CONFIRM_NS` later.
     """
 
     def __init__(self, leg: Leg) -> None:
@@ -108,7 +108,7 @@ class PressureEvents:
         block[0], block[1] = min(block[0], force), max(block[1], force)
 
     def _find_again(self) -> None:
-        """Where drift has left the thresholds outside of what a stepping foot shows, begin with what it shows."""
+        """Where drift has left the thresholds outside of what a stepping foot shows, follow the foot."""
         if len(self._blocks) < BLOCKS:
             return
         low, high = min(block[0] for block in self._blocks), max(block[1] for block in self._blocks)

@@ -1,0 +1,134 @@
+"""Units for people: inside everything is SI, and no digit is lost on the way out and back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+from types import MappingProxyType
+
+# A float has 17 significant digits; with twice as many, going there and back ends at the very same float.
+_EXACT = Context(prec=40, rounding=ROUND_HALF_EVEN)
+_PI = Decimal("3.141592653589793238462643383279502884197")
+_GRAVITY = Decimal("9.80665")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit: one of `si` is `factor` of these."""
+
+    symbol: str
+    si: str
+    factor: Decimal = Decimal(1)
+    digits: int = 2  # decimal places that are worth showing
+
+    def shown(self, value: float) -> Decimal:
+        """An SI value in this unit, to more digits than a float has."""
+        return _EXACT.multiply(Decimal(value), self.factor)
+
+    def si_value(self, typed: Decimal | str) -> float:
+        """What was typed in this unit, as the nearest SI float.
+
+        Raises:
+            ValueError: it is not a finite number.
+
+        """
+        try:
+            number = Decimal(typed)
+        except ArithmeticError:
+            number = Decimal("NaN")
+        if not number.is_finite():
+            raise ValueError(f"{typed!r} is not a number in {self.symbol or 'units'}: write one such as 12.5")
+        return float(_EXACT.divide(number, self.factor))
+
+    def text(self, value: float | None) -> str:
+        """For reading: rounded, without the unit; a dash where there is none."""
+        return "–" if value is None else f"{float(self.shown(value)):.{self.digits}f}"
+
+    def editable(self, value: float) -> str:
+        """For editing: the fewest digits that lead back to exactly this value."""
+        exact = self.shown(value)
+        for precision in range(1, 22):
+            short = Context(prec=precision, rounding=ROUND_HALF_EVEN).plus(exact)
+            if self.si_value(short) == value:
+                return f"{short.normalize():f}"
+        return f"{exact:f}"
+
+
+_DEGREES = _EXACT.divide(Decimal(180), _PI)
+
+# Per SI unit what there is to choose from; the first is the usual one.
+UNITS: Mapping[str, tuple[Unit, ...]] = MappingProxyType(
+    {
+        "rad": (Unit("°", "rad", _DEGREES, 1), Unit("rad", "rad", digits=3)),
+        "rad/s": (
+            Unit("°/s", "rad/s", _DEGREES, 1),
+            Unit("rad/s", "rad/s", digits=3),
+            Unit("rpm", "rad/s", _EXACT.divide(Decimal(30), _PI), 1),
+        ),
+        "Pa": (Unit("kPa", "Pa", Decimal("0.001"), 1), Unit("Pa", "Pa", digits=0)),
+        "N": (Unit("N", "N", digits=0),),
+        "N·m": (Unit("N·m", "N·m"),),
+        "m": (
+            Unit("mm", "m", Decimal(1000), 0),
+            Unit("cm", "m", Decimal(100), 1),
+            Unit("m", "m", digits=3),
+        ),
+        "m/s²": (Unit("m/s²", "m/s²"), Unit("g", "m/s²", _EXACT.divide(Decimal(1), _GRAVITY), 3)),
+        "s": (Unit("s", "s"), Unit("ms", "s", Decimal(1000), 0)),
+        "A": (Unit("A", "A"), Unit("mA", "A", Decimal(1000), 0)),
+        "°C": (Unit("°C", "°C", digits=1),),
+        "B": (Unit("MiB", "B", _EXACT.divide(Decimal(1), Decimal(1 << 20)), 1), Unit("B", "B", digits=0)),
+        "": (Unit("", "", digits=3), Unit("%", "", Decimal(100), 1)),
+    }
+)
+
+
+def percent_body_weight(body_mass: float) -> Unit:
+    """Forces as a share of the wearer's weight; `body_mass` in kg, with the machine where it is worn.
+
+    Raises:
+        ValueError: no mass of a person.
+
+    """
+    if not 0.0 < body_mass < 1000.0:
+        raise ValueError(f"a body mass of {body_mass} kg cannot be: give one above 0 and below 1000")
+    weight = _EXACT.multiply(Decimal(body_mass), _GRAVITY)
+    return Unit("% BW", "N", _EXACT.divide(Decimal(100), weight), 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """Which unit each quantity is shown in.
+
+    `by_quantity` (such as `cop_x`) goes before `by_si` (such as `rad`); both name units by their symbols.
+    `body_mass` (kg) makes `% BW` a unit of forces.
+    """
+
+    by_si: Mapping[str, str] = field(default_factory=dict)
+    by_quantity: Mapping[str, str] = field(default_factory=dict)
+    body_mass: float | None = None
+
+    def choices(self, si: str) -> tuple[Unit, ...]:
+        """What values of this SI unit can be shown in, the usual first; an unknown unit stands for itself."""
+        known = UNITS.get(si, (Unit(si, si, digits=3),))
+        if si == "N" and self.body_mass is not None:
+            return (*known, percent_body_weight(self.body_mass))
+        return known
+
+    def unit(self, quantity: str, si: str) -> Unit:
+        """The unit that this quantity is shown in.
+
+        Raises:
+            ValueError: the one that was chosen cannot show it.
+
+        """
+        choices = self.choices(si)
+        wanted = self.by_quantity.get(quantity, self.by_si.get(si))
+        if wanted is None:
+            return choices[0]
+        for unit in choices:
+            if unit.symbol == wanted:
+                return unit
+        allowed = ", ".join(unit.symbol or "(none)" for unit in choices)
+        raise ValueError(
+            f"{quantity} in {si or 'no unit'} cannot be shown in {wanted}: choose from {allowed}"
+        )
