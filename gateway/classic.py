@@ -66,10 +66,14 @@ class _Exchange:
 class ClassicPort:
     """The second listening socket, its calls and exchanges."""
 
-    def __init__(self, loop: Loop, listener: socket.socket, registry: Registry) -> None:
+    def __init__(
+        self, loop: Loop, listener: socket.socket, registry: Registry, left: Callable[[], None]
+    ) -> None:
+        """`left` is called whenever a client has gone."""
         self._loop = loop
         self._listener = listener
         self._registry = registry
+        self._left = left
         self._calls: set[_Call] = set()
         self._exchanges: dict[str, _Exchange] = {}
         self._acceptor = Acceptor(loop, listener, self._opened)
@@ -79,10 +83,16 @@ class ClassicPort:
     def port(self) -> int:
         return int(self._listener.getsockname()[1])
 
-    def close(self) -> None:
-        """End every call and give the port back."""
+    @property
+    def busy(self) -> bool:
+        """Whether somebody is connected, or in the midst of an exchange."""
+        return bool(self._calls or self._exchanges)
+
+    def close(self, *, given_back: bool) -> None:
+        """End every call, and give the port back where it is nobody's any more."""
         self._acceptor.end()
-        self._listener.close()
+        if given_back:
+            self._listener.close()
         for call in tuple(self._calls):
             call.close()
 
@@ -92,8 +102,12 @@ class ClassicPort:
         if full or len(self._calls) >= MOST_CALLS:
             connection.close()
             return
-        call = _Call(self._loop, connection, lambda: self._answer(source), self._calls.discard)
+        call = _Call(self._loop, connection, lambda: self._answer(source), self._ended)
         self._calls.add(call)
+
+    def _ended(self, call: "_Call") -> None:
+        self._calls.discard(call)
+        self._left()
 
     def _answer(self, source: str) -> "Future[bytes]":
         exchange = self._exchanges.setdefault(source, _Exchange())
@@ -104,6 +118,7 @@ class ClassicPort:
 
     def _expire(self, source: str) -> None:
         self._registry.leave(self._exchanges.pop(source))
+        self._left()
 
 
 class _Call:

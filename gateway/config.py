@@ -1,6 +1,5 @@
 """The robot's file: TOML to frozen structs, validated once; every error names file, table, key and remedy."""
 
-import difflib
 import math
 import re
 import tomllib
@@ -227,6 +226,8 @@ def _struct(where: str, table: Any, kind: type[Struct]) -> Struct:
 def _check_keys(where: str, table: Table, allowed: list[str] | None, required: list[str]) -> None:
     for key in table:
         if allowed is not None and key not in allowed:
+            import difflib  # for who has mistyped only
+
             close = difflib.get_close_matches(key, allowed, n=1)
             hint = f"did you mean {close[0]!r}? " if close else ""
             raise ConfigError(f"{where} has an unknown key {key!r}: {hint}allowed are {', '.join(allowed)}")

@@ -1,4 +1,4 @@
-"""The on-demand TCP server: accepts clients and serves them in one loop until it is told to end."""
+"""The on-demand TCP server: accepts clients and serves them in one loop until it is told to end, or idle."""
 
 import contextlib
 import logging
@@ -12,34 +12,47 @@ from gateway import wire
 from gateway.acceptor import Acceptor
 from gateway.classic import ClassicPort
 from gateway.config import RobotConfig
-from gateway.loop import Loop
+from gateway.loop import Loop, Timer
 from gateway.registry import MODULES, Spec
+from gateway.resting import ENDING
 from gateway.service import Service
 from gateway.session import Session
 
 log = logging.getLogger(__name__)
 
 MAX_SESSIONS = 64
-BACKLOG = 32
 
 
 class Daemon:
     """One robot's gateway on one listening socket."""
 
     def __init__(
-        self, config: RobotConfig, listener: socket.socket, specs: Mapping[str, Spec] = MODULES
+        self,
+        config: RobotConfig,
+        listener: socket.socket,
+        specs: Mapping[str, Spec] = MODULES,
+        classic: socket.socket | None = None,
+        *,
+        ends_idle: bool = False,
     ) -> None:
-        classic_port = config.gateway.classic_port
-        classic = None if classic_port is None else listen(config.gateway.host, classic_port, "classic_port")
+        """`classic` is where the paper's own exchange is served.
+
+        With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`.
+        """
+        self._config = config
         self._listener = listener
         self._loop = Loop()
         self._service = Service(config, self._loop, specs)
+        self._service.registry.when_off = self._look_whether_idle
         self._sessions: set[Session] = set()
         self._ending = False
+        self._told = False
+        self._ends_idle = ends_idle
+        self._idle: Timer | None = None
         self._acceptor = Acceptor(self._loop, listener, self._open)
         self._classic: ClassicPort | None = None
         if classic is not None:
-            self._classic = ClassicPort(self._loop, classic, self._service.registry)
+            self._classic = ClassicPort(self._loop, classic, self._service.registry, self._left)
 
     @property
     def classic_port(self) -> int | None:
@@ -52,24 +65,44 @@ class Daemon:
         host, port = self._listener.getsockname()[:2]
         return host, port
 
+    @property
+    def told(self) -> bool:
+        """Whether it was told to end."""
+        return self._told
+
     def run(self, ready: Callable[[], object] = lambda: None) -> None:
-        """Serve until `end`; `ready` is called once when clients can connect."""
+        """Serve until `end`, then close the listening sockets; `ready` is called when clients can connect.
+
+        Where it has ended because it was idle, the sockets stay open: somebody may just be coming.
+        """
         self._acceptor.start()
         self._loop.post(self._service.resume)
         self._loop.post(ready)
+        self._loop.post(self._left)
         try:
             self._loop.run()
         finally:
-            self._listener.close()
+            if self._told:
+                self._listener.close()
             if self._classic is not None:
-                self._classic.close()
+                self._classic.close(given_back=self._told)
             self._loop.close()
+
+    def repeat(self, period_s: float, work: Callable[[], object]) -> None:
+        """Call `work` once a period, for as long as the loop turns."""
+
+        def again() -> None:
+            work()
+            self._loop.call_later(period_s, again)
+
+        self._loop.post(again)
 
     def end(self) -> None:
         """Close every client, stop every module, and let `run` return; from any thread or signal handler.
 
         Where a guard has armed the drives it is refused, in the log and the journal, while one is enabled.
         """
+        self._told = True
         self._loop.post(self._end)
 
     def end_on_signals(self) -> "contextlib.AbstractContextManager[None]":
@@ -84,8 +117,30 @@ class Daemon:
             session.close()
             return
         self._sessions.add(session)
-        session.on_close(lambda: self._sessions.discard(session))
+        session.on_close(lambda: self._gone(session))
         self._service.opened(session)
+
+    def _gone(self, session: Session) -> None:
+        self._sessions.discard(session)
+        self._left()
+
+    def _left(self) -> None:
+        """Somebody has gone, or nobody has come yet: `linger_s` from now it may be idle."""
+        if self._idle is not None:
+            self._idle.cancel()
+        if self._ends_idle:
+            self._idle = self._loop.call_later(self._config.gateway.linger_s, self._lingered)
+
+    def _lingered(self) -> None:
+        self._idle = None
+        self._look_whether_idle()
+
+    def _look_whether_idle(self) -> None:
+        """End where nobody is there, nothing runs, and nothing is left that must."""
+        if not self._ends_idle or self._ending or self._idle is not None or self._sessions:
+            return
+        if not self._service.needed and not (self._classic is not None and self._classic.busy):
+            self._loop.stop()
 
     def _end(self) -> None:
         if self._ending:
@@ -101,32 +156,14 @@ class Daemon:
         self._service.registry.close(self._loop.stop)
 
 
-def listen(host: str, port: int, setting: str = "--host or --port") -> socket.socket:
-    """A listening TCP socket; port 0 picks one. `setting` is what an error tells to change.
-
-    Raises:
-        OSError: the address is not ours, or the port is in use; the message names both.
-
-    """
-    try:
-        family, _, _, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        return socket.create_server(address[:2], family=family, backlog=BACKLOG)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OSError(
-            error.errno, f"cannot listen on {host}:{port}: {reason}; choose another with {setting}"
-        ) from error
-
-
 @contextlib.contextmanager
 def _signals(wake_writer: int, end: Callable[[], None]) -> Iterator[None]:
     def on_signal(_number: int, _frame: FrameType | None) -> None:
         end()
 
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, on_signal) for number in ENDING}
     woken = signal.set_wakeup_fd(wake_writer, warn_on_full_buffer=False)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # where it was woken, they have waited
     try:
         yield
     finally:

@@ -96,6 +96,12 @@ class Registry:
         self._slots = {name: _Slot(spec) for name, spec in specs.items()}
         self._linger: Timer | None = None
         self._closing: Callable[[], None] | None = None
+        self.when_off: Callable[[], None] = lambda: None  # called when the last module has stopped
+
+    @property
+    def off(self) -> bool:
+        """Whether no module runs, or is about to."""
+        return all(slot.phase is Phase.OFF and not slot.waiting for slot in self._slots.values())
 
     @property
     def phases(self) -> dict[str, str]:
@@ -239,6 +245,8 @@ class Registry:
         slot.phase = Phase.OFF
         gc.unfreeze()  # what the module leaves may be collected
         self._settle()
+        if self.off:
+            self.when_off()
 
     def _failed(self, name: str, slot: _Slot, reason: Exception) -> None:
         self._give_up(name, wire.refuse(wire.Kind.UNAVAILABLE, f"the module {name} cannot start: {reason}"))

@@ -90,6 +90,13 @@ class Service:
         guard: Any = self.registry.running("guard") if self._config.guard is not None else None
         return None if guard is None else guard.objection()
 
+    @property
+    def needed(self) -> bool:
+        """Whether something runs, or has to without any client."""
+        if self._config.guard is not None or not self.registry.off:
+            return True
+        return RecordsFolder(self._config.records).unfinished
+
     def opened(self, session: Session) -> None:
         """A client has come."""
         session.on_close(lambda: self.registry.leave(session))

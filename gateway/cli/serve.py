@@ -1,24 +1,33 @@
-"""`gwrms gateway`: serves one robot over TCP until SIGINT or SIGTERM."""
+"""`gwrms gateway`: serves one robot over TCP until it is told to end, and rests while nobody asks."""
 
 import argparse
+import contextlib
 import gc
 import logging
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from msgspec.structs import replace
 
-from gateway import config
-from gateway.daemon import Daemon, listen
+from gateway import config, notify, wire
+from gateway.daemon import Daemon
+from gateway.listeners import Listeners, inherited, listen, rest
+from gateway.resting import ENDING
+
+log = logging.getLogger(__name__)
 
 _DESCRIPTION = """\
 Serves one robot over TCP: joints over CANopen, insoles and IMU over serial ports, and
 the computer's own CPU, memory and processes.
 
 Nothing runs until a client asks: no bus, no port, no timer is open. What a client asked
-for stops linger_s after the last client has left. What is not there is named in
-`gwrms describe` and tried again; the rest is served. A [guard] in CONFIG runs from the start.
+for stops linger_s after the last client has left, and the gateway then becomes a small process
+that waits at its port; it reads CONFIG again when the next client comes. What is not there is
+named in `gwrms describe` and tried again; the rest is served. A [guard] in CONFIG runs from the
+start and for ever, and so does what a held stop or a trial needs.
 
 CONFIG is the robot's file (TOML). `gwrms sim --dir DIR` writes a commented example,
 DIR/robot.toml, together with a simulated robot to try it on.
@@ -64,18 +73,66 @@ def main(arguments: Sequence[str]) -> int:
     except SystemExit as ended:  # argparse has said why
         return ended.code if isinstance(ended.code, int) else 2
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    robot = config.load(options.config)
-    gateway = robot.gateway
-    host = gateway.host if options.host is None else options.host
-    port = gateway.port if options.port is None else options.port
-    daemon = Daemon(replace(robot, gateway=replace(gateway, host=host, port=port)), listen(host, port))
+    handed = inherited(os.environ)
+    try:
+        robot = _robot(options)
+    except config.ConfigError as error:
+        if handed is None:
+            raise
+        return _refuse(handed, error)
+    sockets = _listeners(robot.gateway, handed)
+    by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
+    daemon = Daemon(robot, sockets.port, classic=sockets.classic, ends_idle=watched is None)
+    if watched is not None:
+        daemon.repeat(watched / 2, lambda: notify.tell("WATCHDOG=1"))
     gc.freeze()  # what was loaded so far lives as long as the process
     with daemon.end_on_signals():
-        daemon.run(ready=lambda: _announce(daemon))
+        daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+        if by_hand and not daemon.told:
+            rest(sockets)
     return 0
 
 
-def _announce(daemon: Daemon) -> None:
-    host, port = daemon.address
-    sys.stdout.write(f"listening on {f'[{host}]' if ':' in host else host}:{port}\n")
-    sys.stdout.flush()
+def _robot(options: argparse.Namespace) -> config.RobotConfig:
+    robot = config.load(options.config)
+    given = {"host": options.host, "port": options.port}
+    changed = {key: value for key, value in given.items() if value is not None}
+    return replace(robot, gateway=replace(robot.gateway, **changed))
+
+
+def _listeners(gateway: config.GatewaySettings, handed: Listeners | None) -> Listeners:
+    """Those that were handed over; what is missing is opened."""
+    port = listen(gateway.host, gateway.port) if handed is None else handed.port
+    classic = None if handed is None else handed.classic
+    if classic is None and gateway.classic_port is not None:
+        try:
+            classic = listen(gateway.host, gateway.classic_port, "classic_port")
+        except OSError:
+            port.close()
+            raise
+    return Listeners(port, classic, handed is not None and handed.woken)
+
+
+def _refuse(handed: Listeners, error: config.ConfigError) -> int:
+    """Tell everybody who has come why they are not served; where it was woken, rest again."""
+    log.error("%s", error)
+    line = wire.encode_error(None, wire.refuse(wire.Kind.UNAVAILABLE, str(error)))
+    for listener in handed.all:
+        listener.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                connection, _ = listener.accept()
+                with connection, contextlib.suppress(OSError):
+                    connection.send(line)
+    if handed.woken:
+        rest(handed)
+    return 1
+
+
+def _announce(daemon: Daemon, *, anew: bool) -> None:
+    notify.tell("READY=1")
+    if anew:
+        host, port = daemon.address
+        sys.stdout.write(f"listening on {f'[{host}]' if ':' in host else host}:{port}\n")
+        sys.stdout.flush()

@@ -1,5 +1,7 @@
 """Builds a robot's buses and components from its file; what cannot be built is named and left out."""
 
+import gc
+import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +19,7 @@ from drivers.insole.device import Insole, line_for, pair
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.drive import JointDrive
 from gateway.config import RobotConfig
+from gateway.lean import without
 
 T = TypeVar("T")
 
@@ -34,6 +37,9 @@ class Robot:
 def assemble(config: RobotConfig) -> Robot:
     """Build everything that the file names; nothing is opened yet."""
     robot = Robot()
+    if config.can:
+        with without("ssl", "_hashlib"):  # OpenSSL: 5 MB
+            importlib.import_module("canopen")
     for name, settings in config.can.items():
         robot.buses[name] = CanBus(name, settings, config.gateway.role)
     for kind, devices in ((Kind.JOINT, config.joint), (Kind.DEVICE, config.device)):
@@ -65,6 +71,7 @@ def _can_component(robot: Robot, path: Path, kind: Kind, name: str, settings: An
     def build() -> Component:
         description = eds.load(eds.locate(settings.eds, path), settings.node_id)
         robot.descriptions[name] = description
+        gc.collect()  # what reading it leaves is larger than what it gives, and would lie there for long
         make = JointDrive if kind is Kind.JOINT else CanDevice
         return make(name, settings, robot.buses[settings.bus], description)
 

@@ -20,7 +20,6 @@ from gateway.messages import (
     ResourceSnapshotParams,
 )
 from gateway.modules.counters import CoreTimes, Counters, ProcessTimes
-from gateway.modules.redact import redact
 
 
 class Host:
@@ -116,6 +115,8 @@ class Meter:
         return [self._with_cmdline(row) for row in rows] if "cmdline" in params.include else rows
 
     def _with_cmdline(self, row: ProcessUse) -> ProcessUse:
+        from gateway.modules.redact import redact  # its patterns, for who asks for command lines only
+
         words = self._counters.command_line(row.pid)
         return ProcessUse(row.pid, row.name, row.cpu_percent, row.memory_bytes, redact(words))
 

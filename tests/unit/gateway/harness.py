@@ -26,8 +26,9 @@ from drivers.joint.reading import DriveReading
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from gateway.config import RobotConfig, load
-from gateway.daemon import Daemon, listen
+from gateway.daemon import Daemon
 from gateway.futures import done
+from gateway.listeners import listen
 from gateway.modules.assembly import Robot
 
 DEADLINE_S = 20.0

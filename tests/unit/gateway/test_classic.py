@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -10,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from msgspec.structs import replace
 
 from gateway import acceptor, classic
 from gateway.config import ConfigError
-from gateway.daemon import Daemon, listen
+from gateway.daemon import Daemon
+from gateway.listeners import listen
+from gateway.main import main
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, config, until
 
 Call = Callable[..., bytes]
@@ -23,7 +25,7 @@ Call = Callable[..., bytes]
 @contextlib.contextmanager
 def daemon(folder: Path) -> Iterator[Daemon]:
     robot = config(folder, HEAD.replace("port = 0", "port = 0\nclassic_port = 0"))
-    made = Daemon(robot, listen("127.0.0.1", 0))
+    made = Daemon(robot, listen("127.0.0.1", 0), classic=listen("127.0.0.1", 0))
     ready = threading.Event()
     thread = threading.Thread(target=made.run, args=(ready.set,), name="daemon")
     thread.start()
@@ -182,14 +184,15 @@ def test_without_descriptors_it_rests_and_goes_on(
     assert refusals == []
 
 
-def test_it_is_off_unless_configured_and_its_port_in_use_is_named(tmp_path: Path) -> None:
-    robot = config(tmp_path, HEAD)
-    with listen("127.0.0.1", 0) as listener, listen("127.0.0.1", 0) as taken:
+def test_it_is_off_unless_configured_and_its_port_in_use_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert config(tmp_path, HEAD).gateway.classic_port is None
+    with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
-        assert robot.gateway.classic_port is None
-        wrong = replace(robot, gateway=replace(robot.gateway, classic_port=port))
-        with pytest.raises(OSError, match=f"127.0.0.1:{port}: .*classic_port"):
-            Daemon(wrong, listener)
+        config(tmp_path, HEAD.replace("port = 0", f"port = 0\nclassic_port = {port}"))
+        assert main(["gateway", str(tmp_path / "robot.toml")]) == 1
+        assert re.search(f"127.0.0.1:{port}: .*classic_port", capsys.readouterr().err)
     with pytest.raises(ConfigError, match="classic_port"):
         config(tmp_path, HEAD.replace("port = 0", "port = 0\nclassic_port = 70000"))
 

@@ -1,7 +1,6 @@
 """The daemon as clients meet it: bad input, half-closed, silent and flooding clients; nobody else notices."""
 
 import json
-import re
 import signal
 import socket
 import subprocess
@@ -17,6 +16,8 @@ from hypothesis import strategies as st
 
 from drivers.joint.quick_stop import StopOutcome
 from gateway import daemon, wire
+from gateway.listeners import listen
+from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, Bench, Client, config, serving, until
 
 Connect = Callable[[], Client]
@@ -233,31 +234,14 @@ class TestProcess:
     @pytest.fixture
     def process(self, tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
         config(tmp_path)
-        command = [
-            sys.executable,
-            "-m",
-            "gateway.main",
-            "gateway",
-            str(tmp_path / "robot.toml"),
-            "--port",
-            "0",
-        ]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        with processes.process(*processes.GATEWAY, str(tmp_path / "robot.toml")) as process:
             yield process
-            process.kill()
-
-    @staticmethod
-    def address(process: "subprocess.Popen[str]") -> tuple[str, int]:
-        assert process.stdout is not None
-        match = re.fullmatch(r"listening on (127\.0\.0\.1):(\d+)\n", process.stdout.readline())
-        assert match is not None
-        return match[1], int(match[2])
 
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_signals_end_it_cleanly_with_clients_and_modules(
         self, process: "subprocess.Popen[str]", number: signal.Signals
     ) -> None:
-        with Client(self.address(process)) as client:
+        with Client(processes.address(process)) as client:
             client.call("resource.snapshot")
             process.send_signal(number)
             assert client.line() is None
@@ -266,26 +250,11 @@ class TestProcess:
         assert process.stderr.read() == ""
 
     def test_a_resource_only_client_starts_no_thread(self, process: "subprocess.Popen[str]") -> None:
-        with Client(self.address(process)) as client:
+        with Client(processes.address(process)) as client:
             client.call("hello", client="test")
             client.call("resource.snapshot")
             threads = list(Path(f"/proc/{process.pid}/task").iterdir())
         assert len(threads) == 1
-
-    def test_idle_it_does_not_run_at_all(self, process: "subprocess.Popen[str]") -> None:
-        with Client(self.address(process)) as client:
-            client.call("resource.snapshot")
-
-        def switches() -> tuple[str, ...]:
-            status = Path(f"/proc/{process.pid}/status").read_text(encoding="ascii")
-            return tuple(line for line in status.splitlines() if "ctxt_switches" in line)
-
-        def rests() -> bool:
-            before = switches()
-            time.sleep(0.4)
-            return switches() == before
-
-        until(rests, "no context switch while nobody is there")
 
 
 def test_what_a_resource_only_gateway_imports() -> None:
@@ -299,8 +268,20 @@ def test_what_a_resource_only_gateway_imports() -> None:
     assert done.stdout == "[]\n"
 
 
+def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards() -> None:
+    code = (
+        "import sys; from gateway.lean import without\n"
+        "with without('ssl', 'json'): import asyncio\n"
+        "print('ssl' in sys.modules); import ssl; print(ssl.OPENSSL_VERSION_INFO[0] > 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout == "False\nTrue\n"
+
+
 def test_a_port_in_use_is_named_with_what_to_do() -> None:
-    with daemon.listen("127.0.0.1", 0) as taken:
+    with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"127.0.0.1:{port}: .*choose another with --host or --port"):
-            daemon.listen("127.0.0.1", port)
+            listen("127.0.0.1", port)

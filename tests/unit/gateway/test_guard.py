@@ -132,7 +132,8 @@ def test_without_the_table_nothing_of_it_is_loaded_and_nothing_runs(tmp_path: Pa
 import sys, threading
 from pathlib import Path
 from gateway.config import load
-from gateway.daemon import Daemon, listen
+from gateway.daemon import Daemon
+from gateway.listeners import listen
 from tests.unit.gateway.harness import Client
 daemon = Daemon(load(Path({str(tmp_path / "robot.toml")!r})), listen("127.0.0.1", 0))
 thread = threading.Thread(target=daemon.run)

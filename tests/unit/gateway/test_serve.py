@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway import daemon
+from gateway.listeners import listen
 from gateway.main import main
 from tests.unit.gateway.harness import ROBOT
 
@@ -41,7 +41,7 @@ def test_a_wrong_file_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.
 def test_a_port_in_use_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "robot.toml"
     file.write_text(ROBOT, encoding="utf-8")
-    with daemon.listen("127.0.0.1", 0) as taken:
+    with listen("127.0.0.1", 0) as taken:
         assert main(["gateway", str(file), "--port", str(taken.getsockname()[1])]) == 1
     error = capsys.readouterr().err
     assert "cannot listen on 127.0.0.1:" in error

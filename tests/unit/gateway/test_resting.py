@@ -1,0 +1,201 @@
+"""A gateway that nobody needs becomes a small process that waits, and is back for whoever comes."""
+
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.daemon import Daemon
+from gateway.listeners import listen
+from gateway.loop import Loop
+from gateway.registry import Registry
+from tests.unit.gateway import processes
+from tests.unit.gateway.harness import DEADLINE_S, HEAD, ROBOT, Bench, Client, config, until
+
+Running = subprocess.Popen[str]
+CLOCK = b'{"jsonrpc":"2.0","id":1,"method":"clock.read"}\n'
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[Running]:
+    file = tmp_path / "robot.toml"
+    file.write_text(processes.RESTS_SOON, encoding="utf-8")
+    with processes.process(*processes.GATEWAY, str(file)) as running:
+        yield running
+
+
+def test_it_rests_in_little_memory_also_after_it_has_served_and_is_back(running: Running) -> None:
+    address = processes.address(running)
+    for _ in range(2):
+        with Client(address) as client:
+            assert client.call("resource.snapshot")["processes"]
+            assert (
+                client.call("robot.describe")["robot"] == "exo-test"
+            )  # by the modules that are the heaviest
+        until(lambda: processes.rests(running.pid), "it rests")
+        assert processes.resident_mb(running.pid) <= 16
+
+
+def test_at_rest_it_uses_no_tick_and_is_never_woken(running: Running) -> None:
+    with Client(processes.address(running)) as client:
+        client.call("resource.snapshot")
+    until(lambda: processes.rests(running.pid), "it rests")
+    before = processes.kernel_saw(running.pid)
+    time.sleep(1.0)
+    assert processes.kernel_saw(running.pid) == before
+
+
+def test_it_rests_too_where_nobody_has_come_yet(running: Running) -> None:
+    address = processes.address(running)
+    until(lambda: processes.rests(running.pid), "it rests")
+    with Client(address) as client:
+        assert client.call("clock.read")
+    assert running.poll() is None
+
+
+def test_nobody_is_lost_who_comes_while_it_goes_to_rest_or_comes_back(running: Running) -> None:
+    address = processes.address(running)
+    answered = 0
+    for turn in range(12):  # at different moments of its way there and back
+        with socket.create_connection(address, DEADLINE_S) as one:
+            one.sendall(CLOCK)
+            answered += one.makefile().readline().startswith('{"id":1,"result"')
+        time.sleep(0.05 + turn / 80)
+    assert answered == 12
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_it_at_rest(running: Running, number: signal.Signals) -> None:
+    processes.address(running)
+    until(lambda: processes.rests(running.pid), "it rests")
+    running.send_signal(number)
+    assert running.wait(DEADLINE_S) == 0
+
+
+def test_a_signal_is_met_on_the_way_there_and_back(tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(processes.RESTS_SOON.replace("0.05", "0"), encoding="utf-8")
+    for turn in range(6):
+        with processes.process(*processes.GATEWAY, str(file)) as running:
+            address = processes.address(running)
+            if turn % 2:
+                until(lambda: processes.rests(running.pid), "it rests")
+                socket.create_connection(address, DEADLINE_S).close()
+            time.sleep(turn * 0.03)
+            running.terminate()
+            assert running.wait(DEADLINE_S) == 0
+
+
+def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running, tmp_path: Path) -> None:
+    address, file = processes.address(running), tmp_path / "robot.toml"
+    until(lambda: processes.rests(running.pid), "it rests")
+    file.write_text("[robot]\n", encoding="utf-8")
+    with Client(address) as client:
+        message = client.line()
+        assert message is not None
+        assert message["error"]["message"] == f"{file}: [robot] lacks the key 'name'"
+    file.write_text(processes.RESTS_SOON, encoding="utf-8")
+    until(lambda: processes.rests(running.pid), "it rests again")
+    with Client(address) as client:
+        assert client.call("clock.read")
+
+
+# What keeps it
+
+
+@pytest.fixture
+def serve(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., tuple[Daemon, threading.Thread]]]:
+    """A daemon that ends when it is idle, in a thread."""
+    made: list[tuple[Daemon, threading.Thread]] = []
+
+    def serve(text: str = ROBOT, **options: Any) -> tuple[Daemon, threading.Thread]:
+        robot = config(tmp_path, text.replace("linger_s", 'records = "records"\nlinger_s'))
+        daemon = Daemon(robot, listen("127.0.0.1", 0), ends_idle=True, **options)
+        thread = threading.Thread(target=daemon.run, name="daemon")
+        thread.start()
+        made.append((daemon, thread))
+        return made[-1]
+
+    yield serve
+    for daemon, thread in made:
+        if thread.is_alive():
+            daemon.end()
+        thread.join(DEADLINE_S)
+        daemon._listener.close()
+
+
+def test_it_ends_idle_after_linger_s_and_was_not_told(serve: Callable[..., Any], bench: Bench) -> None:
+    daemon, thread = serve()
+    with Client(daemon.address) as client:
+        client.call("component.snapshot")
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+    assert (daemon.told, bench.left.stopped) == (False, 1)
+    assert daemon._listener.fileno() >= 0  # who comes now is not lost
+
+
+def _stays(thread: threading.Thread) -> bool:
+    thread.join(0.5)  # ten times linger_s
+    return thread.is_alive()
+
+
+def test_a_client_that_says_nothing_keeps_it(serve: Callable[..., Any]) -> None:
+    daemon, thread = serve()
+    with Client(daemon.address):
+        assert _stays(thread)
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+
+
+def test_a_held_stop_keeps_it_until_it_is_reset(serve: Callable[..., Any]) -> None:
+    daemon, thread = serve()
+    with Client(daemon.address) as client:
+        client.call("robot.stop", reason="test")
+    assert _stays(thread)
+    with Client(daemon.address) as client:
+        client.call("control.acquire", ttl_s=10)
+        assert client.call("robot.reset")["held"] is False
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+
+
+def test_a_trial_keeps_it_until_it_is_taken_back(serve: Callable[..., Any], bench: Bench) -> None:
+    daemon, thread = serve()
+    with Client(daemon.address) as client:
+        client.call("control.acquire", ttl_s=10)
+        client.call("parameter.write", changes={"gait.step_length": 0.45}, trial_s=100)
+    thread.join(DEADLINE_S)  # the lease ends with its connection, and so does the trial
+    assert not thread.is_alive()
+    assert bench.gait.node.objects[0x2001, 0] == (400).to_bytes(2, "little")
+
+
+def test_a_guard_keeps_it(serve: Callable[..., Any]) -> None:
+    _, thread = serve(ROBOT + "[guard.rule.lost]\nwatch = 'node_lost'\nactions = ['alarm']\n")
+    assert _stays(thread)
+
+
+def test_who_uses_the_paper_s_exchange_keeps_it(serve: Callable[..., Any]) -> None:
+    daemon, thread = serve(HEAD, classic=listen("127.0.0.1", 0))
+    with socket.create_connection(("127.0.0.1", daemon.classic_port), DEADLINE_S):
+        assert _stays(thread)
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+    daemon._classic._listener.close()
+
+
+def test_a_module_that_is_about_to_start_is_not_off(tmp_path: Path) -> None:
+    loop = Loop()
+    registry = Registry(config(tmp_path, HEAD), loop)
+    assert registry.off
+    future = registry.use("resource", None)
+    assert not registry.off
+    future.add_done_callback(lambda _module: registry.close(loop.stop))
+    loop.run()
+    loop.close()
+    assert registry.off
