@@ -34,7 +34,7 @@ class RangeOfMotion:
             self._high = angle
 
     def struck(self, whole: bool) -> float | None:
-        """Its leg's heel strike was found; the range (rad) since the last, where that was a `whole` stride."""
+        """Its leg's heel strike was found; the range (rad) since the last, where a `whole` stride ended."""
         seen = self._high - self._low
         self._low, self._high = math.inf, -math.inf
         if not whole or not math.isfinite(seen):

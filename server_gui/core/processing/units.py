@@ -20,6 +20,11 @@ class Unit:
     factor: Decimal = Decimal(1)
     digits: int = 2  # decimal places that are worth showing
 
+    @property
+    def scale(self) -> float:
+        """The factor for curves and texts, where the last digit does not count."""
+        return float(self.factor)
+
     def shown(self, value: float) -> Decimal:
         """An SI value in this unit, to more digits than a float has."""
         return _EXACT.multiply(Decimal(value), self.factor)
@@ -41,7 +46,7 @@ class Unit:
 
     def text(self, value: float | None) -> str:
         """For reading: rounded, without the unit; a dash where there is none."""
-        return "–" if value is None else f"{float(self.shown(value)):.{self.digits}f}"
+        return "–" if value is None else f"{value * self.scale:.{self.digits}f}"
 
     def editable(self, value: float) -> str:
         """For editing: the fewest digits that lead back to exactly this value."""

@@ -1,0 +1,185 @@
+"""Component-processing: a robot's samples become what is shown of its wearer and its joints."""
+
+import collections
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from server_gui.core.processing.foot_imu_events import FootImuEvents
+from server_gui.core.processing.gait_events import MAX_GAP_NS, EventKind, GaitEvent, Leg, Source
+from server_gui.core.processing.gait_measures import Gait, GaitMeasures, Stride
+from server_gui.core.processing.joint_measures import JointShown, RangeOfMotion, TrackingError
+from server_gui.core.processing.kinematic_events import KinematicEvents
+from server_gui.core.processing.pressure_events import PressureEvents
+from server_gui.core.processing.wiring import POSITION, TRUNK, Fed, Wiring, leg_of
+
+EVENTS = 64  # the newest that are kept
+WIRINGS = 64  # sets of columns that are known at a time; a stream of samples has one a component
+SILENT_NS = 500_000_000  # a source that told nothing for so long leaves its leg to the next best
+
+Columns = Mapping[str, Sequence[float | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """What is derived from a robot's samples, as it is now: times and angles in SI units."""
+
+    stamp_ns: int = 0  # the newest row, on the robot's clock
+    gait: Gait = field(default_factory=Gait)
+    sources: Mapping[Leg, Source | None] = field(default_factory=dict)  # what gives each leg's events
+    joints: Mapping[str, JointShown] = field(default_factory=dict)
+    events: tuple[GaitEvent, ...] = ()  # the newest, oldest first
+
+
+class ComponentProcessing:
+    """Takes rows in the order of time, live or from a recording, and keeps what is derived from them.
+
+    Each leg's events come from its insole where that tells something, else from an IMU on its foot, else from
+    hips and knees; after a change of the source the first event counts as one after a gap. A component that
+    is not trusted gives no events.
+    """
+
+    def __init__(self) -> None:
+        self.distrusted: frozenset[str] = frozenset()  # components that say themselves that they are wrong
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything: another robot, or one whose clock has begun anew."""
+        self._pressure = {leg: PressureEvents(leg) for leg in Leg}
+        self._foot_imu = {leg: FootImuEvents(leg) for leg in Leg}
+        self._kinematics = KinematicEvents()
+        self._heard_ns: dict[tuple[Leg, Source], int] = {}
+        self._source: dict[Leg, Source] = {}
+        self._angles = [0.0] * (TRUNK + 1)  # left hip and knee, right hip and knee, trunk: the newest of each
+        self._angles_ns = [0] * TRUNK  # when each of the joints' was taken; 0: never
+        self._measures = GaitMeasures()
+        self._ranges: dict[str, RangeOfMotion] = {}
+        self._errors: dict[str, TrackingError] = {}
+        self._events: collections.deque[GaitEvent] = collections.deque(maxlen=EVENTS)
+        self._wirings: dict[tuple[str, ...], Wiring] = {}
+        self._stamp_ns = 0
+
+    def take(self, stamps_ns: Sequence[int], columns: Columns) -> list[Stride]:
+        """Rows as a batch of a stream has them; the strides that they end."""
+        wiring = self._wiring(tuple(columns))
+        strides: list[Stride] = []
+        for row, stamp_ns in enumerate(stamps_ns):
+            self._stamp_ns = stamp_ns
+            self._joints(wiring, stamp_ns, row, columns)
+            for event in self._found(wiring, stamp_ns, row, columns):
+                stride = self._event(event)
+                if stride is not None:
+                    strides.append(stride)
+        return strides
+
+    def shown(self, now_ns: int | None = None) -> Derived:
+        """What is derived, at `now_ns` on the robot's clock; by default when the newest row was taken."""
+        now_ns = self._stamp_ns if now_ns is None else now_ns
+        names = self._ranges.keys() | self._errors.keys()
+        return Derived(
+            stamp_ns=self._stamp_ns,
+            gait=self._measures.now(now_ns),
+            sources={leg: self._best(leg, now_ns) for leg in Leg},
+            joints={name: self._joint(name, now_ns) for name in sorted(names)},
+            events=tuple(self._events),
+        )
+
+    # --- gait
+
+    def _found(self, wiring: Wiring, stamp_ns: int, row: int, columns: Columns) -> list[GaitEvent]:
+        """The events of every source; only those of each leg's best source count."""
+        found: list[GaitEvent] = []
+        for detectors, source, fed in (
+            (self._pressure, Source.PRESSURE, wiring.forces),
+            (self._foot_imu, Source.FOOT_IMU, wiring.pitch_rates),
+        ):
+            for leg, (channel, component) in fed:
+                value = columns[channel][row]
+                if value is None or component in self.distrusted:
+                    continue
+                self._heard_ns[leg, source] = stamp_ns
+                event = detectors[leg].feed(stamp_ns, value)
+                if event is not None and self._best(leg, stamp_ns) is source:
+                    found.append(self._continued(event, source))
+        if wiring.angles:
+            found += [
+                self._continued(event, Source.KINEMATICS)
+                for event in self._by_joints(wiring, stamp_ns, row, columns)
+                if self._best(event.leg, stamp_ns) is Source.KINEMATICS
+            ]
+        return found
+
+    def _by_joints(self, wiring: Wiring, stamp_ns: int, row: int, columns: Columns) -> list[GaitEvent]:
+        angles = self._angles
+        for place, channel in wiring.angles:
+            value = columns[channel][row]
+            if value is not None:
+                angles[place] = value
+                if place < TRUNK:
+                    self._angles_ns[place] = stamp_ns
+            elif place == TRUNK:
+                angles[place] = 0.0
+        if stamp_ns - min(self._angles_ns) > MAX_GAP_NS:
+            return []
+        self._heard_ns[Leg.LEFT, Source.KINEMATICS] = self._heard_ns[Leg.RIGHT, Source.KINEMATICS] = stamp_ns
+        left_hip, left_knee, right_hip, right_knee, trunk = angles
+        return self._kinematics.feed(stamp_ns, (left_hip, left_knee), (right_hip, right_knee), trunk)
+
+    def _best(self, leg: Leg, now_ns: int) -> Source | None:
+        for source in Source:
+            heard_ns = self._heard_ns.get((leg, source))
+            if heard_ns is not None and 0 <= now_ns - heard_ns <= SILENT_NS:
+                return source
+        return None
+
+    def _continued(self, event: GaitEvent, source: Source) -> GaitEvent:
+        before = self._source.get(event.leg)
+        self._source[event.leg] = source
+        return event if before is source else dataclasses.replace(event, after_gap=True)
+
+    def _event(self, event: GaitEvent) -> Stride | None:
+        self._events.append(event)
+        stride = self._measures.take(event)
+        if event.kind is EventKind.HEEL_STRIKE:
+            for name, ranged in self._ranges.items():
+                if leg_of(name) is event.leg:
+                    ranged.struck(stride is not None)
+        return stride
+
+    # --- joints
+
+    def _joints(self, wiring: Wiring, stamp_ns: int, row: int, columns: Columns) -> None:
+        for channel, joint in wiring.positions:
+            value = columns[channel][row]
+            if value is not None:
+                self._ranges[joint].take(value)
+        for channel, joint in wiring.errors:
+            value = columns[channel][row]
+            if value is not None:
+                self._errors[joint].take(stamp_ns, value)
+        for channel, joint in wiring.targets:
+            target, position = columns[channel][row], columns.get(f"{joint}.{POSITION}")
+            if target is not None and position is not None and (value := position[row]) is not None:
+                self._errors[joint].take(stamp_ns, target - value)
+
+    def _joint(self, name: str, now_ns: int) -> JointShown:
+        ranged, error = self._ranges.get(name), self._errors.get(name)
+        rms, largest = (None, None) if error is None else error.at(now_ns)
+        return JointShown(None if ranged is None else ranged.mean, rms, largest)
+
+    # --- wiring
+
+    def _wiring(self, channels: tuple[str, ...]) -> Wiring:
+        wiring = self._wirings.get(channels)
+        if wiring is None:
+            if len(self._wirings) >= WIRINGS:
+                self._wirings.clear()
+            wiring = self._wirings[channels] = Wiring.of(channels)
+            self._make_room(wiring.positions, wiring.errors + wiring.targets)
+        return wiring
+
+    def _make_room(self, positions: Sequence[Fed], errors: Sequence[Fed]) -> None:
+        for _, joint in positions:
+            self._ranges.setdefault(joint, RangeOfMotion())
+        for _, joint in errors:
+            self._errors.setdefault(joint, TrackingError())
