@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 # name → (where it lives, what it does). A module here is imported only when its command runs.
 COMMANDS: dict[str, tuple[str, str]] = {
     "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
+    "install-service": ("gateway.cli.install_service:main", "systemd units for a robot's file"),
     "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
     "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),
     "watch": ("gateway.cli.watch:main", "follow channels live"),
@@ -28,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "eds": ("eds.cli:main", "what an EDS or DCF file says, and what is wrong with it"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
+    "collect": ("server_gui.commands.collect:main", "record every robot into the store, without a window"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
     "sim": ("hil_sim.cli.sim:main", "the simulated robot, ready for a gateway; runs scenario files"),
     "sim-fault": ("hil_sim.cli.fault:main", "break something in a simulated robot that runs"),
@@ -64,7 +66,7 @@ def find(name: str) -> Callable[[list[str]], int]:
 def explain(error: Exception) -> str:
     """An exception as the sentences a user can act on."""
     if isinstance(error, ModuleNotFoundError) and error.name is not None:
-        return f"this command needs the package {error.name!r}; install gwrms[server] or gwrms[sim]"
+        return f"this command needs the package {error.name!r}; install gwrms[collect], [server] or [sim]"
     ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
     if ours or isinstance(error, OSError):
         return str(error)

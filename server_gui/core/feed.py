@@ -74,6 +74,7 @@ class Feed:
         self._following = following
         self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
         self._backoff = Backoff()
+        self._dropped = asyncio.Event()
         self._newest_entry: dict[str, Any] = {"n": 0}
 
     async def run(self) -> None:
@@ -113,13 +114,17 @@ class Feed:
     def _link_changed(self, state: ConnectionState) -> None:
         if state is ConnectionState.CONNECTED:
             self._backoff.reset()
+        else:
+            self._dropped.set()
         problem = self._client.link.problem
         self._tell(LinkChanged(state, None if problem is None else str(problem), time.monotonic_ns()))
 
     async def _follow(self) -> None:
         """Everything that goes on while one link lasts; ends by raising why it cannot go on."""
         following = self._following
+        self._dropped.clear()
         async with asyncio.TaskGroup() as group:
+            group.create_task(self._until_dropped())
             description = await self._client.describe()
             self._tell(Described(description))
             group.create_task(self._stream(self._channels(description)))
@@ -129,6 +134,11 @@ class Feed:
             group.create_task(self._repeat(following.resources_s, self._resources))
             if following.journal_s is not None:
                 group.create_task(self._repeat(following.journal_s, self._journal))
+
+    async def _until_dropped(self) -> None:
+        """Another link may be to another robot, or to one that has changed: then everything begins anew."""
+        await self._dropped.wait()
+        raise LinkLost("the link dropped")
 
     def _channels(self, description: Description) -> list[str]:
         known = (channel.name for channel in description.channels if channel.component != COMPUTER)

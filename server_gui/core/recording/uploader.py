@@ -50,6 +50,7 @@ class Uploader:
         self._store: Store | None = None
         self._ending = threading.Event()
         self._asked = threading.Event()
+        self._turned = threading.Event()  # it has looked at everything that waits
         self._thread = threading.Thread(target=self._run, name="uploader")
 
     def __enter__(self) -> Self:
@@ -59,12 +60,27 @@ class Uploader:
     def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def close(self) -> None:
-        """End after the segment that is being uploaded, and join the thread. Idempotent."""
+    def close(self, within_s: float | None = None) -> bool:
+        """End after the segment that is being uploaded, and join the thread. Idempotent.
+
+        False where that takes longer than `within_s`; the thread goes on then, and nothing is uploaded twice
+        however it ends.
+        """
         self._ending.set()
         self._asked.set()
         if self._thread.ident is not None:
-            self._thread.join()
+            self._thread.join(within_s)
+        return not self._thread.is_alive()
+
+    def drain(self, within_s: float) -> bool:
+        """Upload everything that waits, wanted or not; False where that fails or takes longer."""
+        until_s = time.monotonic() + within_s
+        while self._spool.waiting():
+            self._turned.clear()
+            self.now()
+            if not self._turned.wait(max(0.0, until_s - time.monotonic())) or self.state.problem is not None:
+                return False
+        return True
 
     def now(self) -> None:
         """Upload everything that waits, wanted or not."""
@@ -81,6 +97,7 @@ class Uploader:
             if self._empty(asked):
                 asked = False
                 backoff.reset()
+            self._turned.set()
             self._asked.wait(backoff.next_s())
 
     def _empty(self, asked: bool) -> bool:
@@ -99,6 +116,12 @@ class Uploader:
                 self.state = replace(self.state, problem=problem)
                 return False
             self._tell(waiting[done:])
+            log.info(
+                "batch %d is in the store after %.1f s, %d wait",
+                number,
+                self.state.upload_s,
+                len(waiting) - done,
+            )
         return True
 
     def _upload(self, number: int) -> None:

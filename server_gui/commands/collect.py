@@ -1,0 +1,177 @@
+"""`gwrms collect`: record every robot into the store, without a window; and how that goes."""
+
+import argparse
+import contextlib
+import logging
+import os
+from datetime import datetime
+from pathlib import Path
+
+import msgspec
+
+from gateway.cli.text import NONE, age, say, size, table
+from server_gui.core.fleet.collector import Collector, CollectorReport
+from server_gui.core.fleet.door import ask
+from server_gui.core.fleet.statistics import LinkReport
+from server_gui.core.settings import ServerSettings, SettingsError, add_robots, default_file, load
+from server_gui.terminal.ending import Ended, Ending
+
+log = logging.getLogger(__name__)
+
+LOOK_S = 0.5  # between looks whether it is to end
+HEADER = (
+    "robot", "address", "link", "since", "links", "rows/s", "rows", "size", "missed", "dropped", "newest",
+    "round trip", "clock",
+)  # fmt: skip
+RIGHT = range(4, len(HEADER))
+
+EPILOG = """What comes from a robot is safe in the spool on this computer first, and goes to the store a batch
+at a time; nothing is decimated, and what is missing is recorded as an event. Robots are followed each by
+itself: one that is off is tried again until it is there. End it with Ctrl-C or SIGTERM: sessions are ended,
+and what waits is uploaded as far as 20 s go.
+
+the server's file (without --config: ~/.config/gwrms/server.toml, if it is there)
+  [robots]
+  exo-01 = "192.0.2.7:7420"        # the name that it has in the store
+
+  [store]
+  url = "s3://bucket/prefix"       # default: a folder, file:///home/YOU/.local/share/gwrms/store
+
+  [recorder]
+  spool = "/var/lib/gwrms/spool"   # default: ~/.local/share/gwrms/spool
+  upload = "always"                # a batch a minute; idle: while no robot has sent anything for 10 s, and
+                                   # when more than 2 GiB wait; manual: with --upload
+  rate_hz = 100                    # rows a second; 0: every sample of every source
+  channels = ["*"]                 # names or globs
+  resources_s = 5                  # between looks at the robots' computers
+  batch_s = 60                     # of recording that go to the store together
+
+examples
+  gwrms collect --robot exo-01=192.0.2.7:7420 --operator Ada --notes "new insoles"
+  gwrms collect --status
+
+exit status
+  0 ended as asked, or a collector has answered --status or --upload; 1 it cannot record, or nobody answers;
+  2 usage"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms collect`."""
+    arguments = _parser().parse_args(argv)
+    settings = add_robots(load(arguments.config), dict(arguments.robot))
+    spool = settings.recorder.spool
+    if arguments.status:
+        return _status(spool, as_json=arguments.json)
+    if arguments.upload:
+        say(f"the collector uploads; batches that wait: {ask(spool, 'upload').decode()}")
+        return 0
+    if not settings.robots:
+        file = arguments.config or default_file()
+        raise SettingsError(f"no robot is named: write it into [robots] of {file}, or --robot NAME=HOST:PORT")
+    return _collect(settings, arguments.operator, arguments.notes)
+
+
+def _collect(settings: ServerSettings, operator: str, notes: str) -> int:
+    _log_to_stderr()
+    with Ending() as ending, contextlib.suppress(Ended), Collector(settings, operator, notes) as collector:
+        names = ", ".join(settings.robots)
+        log.info("recording %s into %s, for the store %s", names, settings.recorder.spool, settings.store.url)
+        while True:
+            ending.check()
+            collector.wait(LOOK_S)
+    log.info("ended")
+    if collector.hangs:
+        logging.shutdown()
+        os._exit(0)  # what an upload under way has done is found out at the next start
+    return 0
+
+
+def _log_to_stderr() -> None:
+    """A line each; in systemd's journal without the time, which it has itself."""
+    time = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
+    logging.basicConfig(level=logging.WARNING, format=f"{time}%(levelname)s %(message)s")
+    logging.getLogger("server_gui").setLevel(logging.INFO)
+
+
+def _status(spool: Path, *, as_json: bool) -> int:
+    answer = ask(spool, "status")
+    if as_json:
+        say(answer.decode())
+    else:
+        say(status_text(msgspec.json.decode(answer, type=CollectorReport)))
+    return 0
+
+
+def status_text(report: CollectorReport) -> str:
+    """What a collector says of itself, for people."""
+    recorder, uploader = report.recorder, report.uploader
+    rows = f"{recorder.recorded} rows since then, {recorder.waiting} wait for the disk, {recorder.lost} lost"
+    batches = (
+        f"{uploader.uploaded} batches uploaded, {uploader.waiting} wait (upload = {report.upload.value})"
+    )
+    lines = [
+        f"collecting since {_instant(report.began_utc_s)} (process {report.pid}, gwrms {report.version})",
+        f"spool  {report.spool}: {rows}",
+        f"store  {report.store}: {batches}; backlog {size(uploader.backlog_bytes)}",
+        *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
+        *([f"ALARM  {uploader.problem}"] if uploader.problem else []),
+    ]
+    robots = report.robots.items()
+    links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)
+    problems = [f"{name}: {link.problem}\n" for name, link in robots if link.problem is not None]
+    return "\n".join([*lines, "", links, *problems])
+
+
+def _row(name: str, link: LinkReport) -> tuple[str, ...]:
+    return (
+        name,
+        link.address,
+        link.state,
+        NONE if link.since_utc_s is None else _instant(link.since_utc_s),
+        str(link.links),
+        f"{link.rows_per_s:.0f}",
+        str(link.rows),
+        size(link.bytes),
+        str(link.missed),
+        str(link.dropped),
+        age(link.newest_age_s),
+        age(link.round_trip_s),
+        NONE if link.clock_uncertainty_s is None else f"±{1e3 * link.clock_uncertainty_s:.2f} ms",
+    )
+
+
+def _instant(utc_s: float) -> str:
+    return datetime.fromtimestamp(utc_s).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms collect",
+        description="Record every robot, whole, into the store; and ask how that goes.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--config", type=Path, metavar="FILE", help="the server's file")
+    parser.add_argument(
+        "--robot",
+        type=_robot,
+        action="append",
+        default=[],
+        metavar="NAME=HOST:PORT",
+        help="a robot beside those of the file; again for another one",
+    )
+    parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
+    parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
+    asking = parser.add_mutually_exclusive_group()
+    asking.add_argument("--status", action="store_true", help="ask the collector that runs how it goes")
+    asking.add_argument("--upload", action="store_true", help="tell it to upload what waits, now")
+    parser.add_argument("--json", action="store_true", help="with --status: one JSON object, for machines")
+    return parser
+
+
+def _robot(text: str) -> tuple[str, str]:
+    name, equals, address = text.partition("=")
+    if not (name and equals and address):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=HOST:PORT")
+    return name, address

@@ -1,0 +1,139 @@
+"""The server without a screen: fleet, recorder, spool, uploader, and the door where it is asked."""
+
+import concurrent.futures
+import importlib.metadata
+import logging
+import os
+import time
+from typing import Final, Self
+
+from msgspec import Struct
+
+from gateway.messages import ResourceSnapshotParams
+from ml.store import Store
+from server_gui.core.feed import ONCE, Following
+from server_gui.core.fleet.door import door
+from server_gui.core.fleet.fleet import Fleet
+from server_gui.core.fleet.statistics import LinkReport
+from server_gui.core.network import Network
+from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.uploader import Uploader, UploaderState
+from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload
+
+log = logging.getLogger(__name__)
+
+QUIET_S: Final = 10.0  # without a row of any robot: idle
+MOST_BACKLOG_BYTES: Final = 2 << 30  # more does not wait until the robots are quiet
+JOURNAL_S: Final = 5.0
+LAST_UPLOAD_S: Final = 20.0  # what waits at the end may take so long; the spool keeps the rest
+BREAK_OFF_S: Final = 5.0  # for an upload under way
+
+
+class CollectorReport(Struct, frozen=True):
+    """Everything that `gwrms collect --status` tells; seconds, UTC."""
+
+    version: str
+    pid: int
+    began_utc_s: float
+    spool: str
+    store: str
+    upload: Upload
+    robots: dict[str, LinkReport]
+    recorder: RecorderState
+    uploader: UploaderState
+
+
+class Collector:
+    """Records from entering to leaving; use it as a context manager, which ends every thread.
+
+    Leaving ends the sessions, and uploads what waits, for a while: what is not in the store then stays in the
+    spool. Where an upload hangs even so, `hangs` is set, and only the end of the process ends its thread.
+    """
+
+    def __init__(self, settings: ServerSettings, operator: str = "", notes: str = "") -> None:
+        self.hangs = False
+        self._settings = settings
+        self._began_s = time.time()
+        recorder = settings.recorder
+        self._spool = Spool(recorder.spool)
+        self._uploader = Uploader(self._spool, lambda: connect(settings.store), self._wanted)
+        self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
+        self._network = Network()
+        robots = {name: robot.where for name, robot in settings.robots.items()}
+        self._fleet = Fleet(robots, following(recorder), self._recorder, operator, notes)
+        self._running: concurrent.futures.Future[None] | None = None
+
+    def __enter__(self) -> Self:
+        self._uploader.__enter__()
+        self._recorder.__enter__()
+        self._network.__enter__()
+        self._running = self._network.run(self._run())
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._network.__exit__()
+        self._recorder.close()
+        if self._settings.recorder.upload is not Upload.MANUAL and not self._uploader.drain(LAST_UPLOAD_S):
+            log.warning("%d batches wait in the spool for the next start", len(self._spool.waiting()))
+        self.hangs = not self._uploader.close(BREAK_OFF_S)
+        self._spool.close()
+
+    def wait(self, within_s: float) -> None:
+        """Let it work so long; raises what has ended it, which is a mistake of ours."""
+        if self._running is not None and concurrent.futures.wait([self._running], within_s).done:
+            self._running.result()
+
+    async def _run(self) -> None:
+        answers = {"status": self._report, "upload": self._upload}
+        async with door(self._spool.folder, answers):
+            await self._fleet.run()
+
+    def _wanted(self) -> bool:
+        """Whether the next batch may go to the store now."""
+        match self._settings.recorder.upload:
+            case Upload.ALWAYS:
+                return True
+            case Upload.MANUAL:
+                return False
+            case Upload.IDLE:
+                newest_ns = self._fleet.newest_ns
+                quiet = newest_ns is None or time.monotonic_ns() - newest_ns > QUIET_S * 1e9
+                return quiet or self._uploader.state.backlog_bytes > MOST_BACKLOG_BYTES
+
+    def _upload(self) -> int:
+        """Begin to upload; how many batches wait."""
+        self._uploader.now()
+        return len(self._spool.waiting())
+
+    def _report(self) -> CollectorReport:
+        settings = self._settings
+        return CollectorReport(
+            version=importlib.metadata.version("gwrms"),
+            pid=os.getpid(),
+            began_utc_s=self._began_s,
+            spool=str(self._spool.folder),
+            store=settings.store.url,
+            upload=settings.recorder.upload,
+            robots=self._fleet.report(),
+            recorder=self._recorder.state,
+            uploader=self._uploader.state,
+        )
+
+
+def following(recorder: RecordingSettings) -> Following:
+    """What is asked of each robot: everything that the store has a table for."""
+    return Following(
+        client="gwrms collect",
+        channels=recorder.channels,
+        rate_hz=recorder.rate_hz,
+        look_s=ONCE,
+        resources=ResourceSnapshotParams(include=["disk", "network", "thermal", "kernel"]),
+        resources_s=recorder.resources_s,
+        journal_s=JOURNAL_S,
+    )
+
+
+def connect(store: StoreSettings) -> Store:
+    """The store that the server's file names."""
+    return Store(store.url, store.shards, store.several_writers)

@@ -1,0 +1,92 @@
+"""Every robot of the fleet, each followed by itself in the network's one thread."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from gateway.client import Address
+from server_gui.core.events import Event
+from server_gui.core.feed import Feed, Following
+from server_gui.core.fleet.keeping import Keeping
+from server_gui.core.fleet.saying import Saying
+from server_gui.core.fleet.statistics import LinkReport, LinkStatistics
+from server_gui.core.recording.recorder import Recorder
+
+log = logging.getLogger(__name__)
+
+AGAIN_S: Final = 5.0  # before a robot that a mistake of ours has ended is followed anew
+
+Show = Callable[[str, Event], None]
+
+
+class Member:
+    """One robot: what its feed tells is kept first, then counted, said and shown."""
+
+    def __init__(
+        self, robot: str, address: Address, following: Following, keeping: Keeping, show: Show | None
+    ) -> None:
+        self.statistics = LinkStatistics(address)
+        self._robot = robot
+        self._address = address
+        self._following = following
+        self._keeping = keeping
+        self._saying = Saying(robot, address)
+        self._show = show
+
+    async def run(self) -> None:
+        """Follow the robot until cancelled; a mistake of ours about it ends no other's recording."""
+        while True:
+            try:
+                await Feed(self._address, self._tell, self._following).run()
+            except Exception:
+                log.exception("%s: internal error; it is followed anew in %g s", self._robot, AGAIN_S)
+            await asyncio.sleep(AGAIN_S)
+
+    def report(self) -> LinkReport:
+        """How its link does now."""
+        return self.statistics.report(self._keeping.session)
+
+    def _tell(self, event: Event) -> None:
+        self._keeping.take(event)
+        self.statistics.take(event)
+        self._saying.take(event)
+        if self._show is not None:
+            self._show(self._robot, event)
+
+
+class Fleet:
+    """The robots of a server; everything that they send goes to the recorder, before `show` is told of it.
+
+    For the network's thread, but for `newest_ns`.
+    """
+
+    def __init__(
+        self,
+        robots: Mapping[str, Address],
+        following: Following,
+        recorder: Recorder,
+        operator: str = "",
+        notes: str = "",
+        show: Show | None = None,
+    ) -> None:
+        self._members = {
+            robot: Member(robot, address, following, Keeping(robot, recorder, operator, notes), show)
+            for robot, address in robots.items()
+        }
+
+    async def run(self) -> None:
+        """Follow all of them until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            for member in self._members.values():
+                group.create_task(member.run())
+
+    def report(self) -> dict[str, LinkReport]:
+        """How each robot's link does now."""
+        return {robot: member.report() for robot, member in self._members.items()}
+
+    @property
+    def newest_ns(self) -> int | None:
+        """When the newest row of any robot came, on our monotonic clock."""
+        found = [member.statistics.newest_ns for member in self._members.values()]
+        return max((at_ns for at_ns in found if at_ns is not None), default=None)

@@ -1,0 +1,116 @@
+"""How a robot's link does: counted from the feed's events, in the network's thread."""
+
+import collections
+import time
+from typing import Final
+
+from msgspec import Struct
+
+from gateway.client import Address, ClockOffset, ConnectionState
+from server_gui.core.events import Described, Event, LinkChanged, Resources, Telemetry
+from server_gui.core.recording.rows import KEYS, VALUE
+
+RATE_S: Final = 5  # rows a second are counted over so long
+SECOND_NS: Final = 1_000_000_000
+
+
+class LinkReport(Struct, frozen=True):
+    """A robot's link now, for people and machines; what is not known yet is None. Seconds, UTC."""
+
+    address: str
+    state: str
+    problem: str | None  # why there is no link
+    since_utc_s: float | None  # when the state began
+    calls_itself: str | None
+    links: int  # made since the start
+    session: str
+    rows: int
+    rows_per_s: float
+    bytes: int  # that its rows take in the spool
+    missed: int  # notifications that never came
+    dropped: int  # rows that the robot threw away
+    newest_age_s: float | None  # since rows came
+    round_trip_s: float | None
+    clock_offset_s: float | None  # the robot's monotonic clock minus ours
+    clock_uncertainty_s: float | None
+
+
+class LinkStatistics:
+    """One robot's counters."""
+
+    def __init__(self, address: Address) -> None:
+        self.state = ConnectionState.IDLE
+        self.newest_ns: int | None = None  # when rows came, on our monotonic clock
+        self._address = address
+        self._problem: str | None = None
+        self._since_s: float | None = None
+        self._calls_itself: str | None = None
+        self._links = 0
+        self._rows = 0
+        self._bytes = 0
+        self._missed = 0
+        self._dropped = 0
+        self._stream = (0, 0)  # link and stream; what the robot dropped is counted anew with each
+        self._dropped_before = 0
+        self._round_trip_ns: int | None = None
+        self._clock: ClockOffset | None = None
+        self._recent: collections.deque[tuple[int, int]] = collections.deque(
+            maxlen=RATE_S + 1
+        )  # second, rows
+
+    def take(self, event: Event) -> None:
+        """Count what an event tells."""
+        match event:
+            case Telemetry():
+                self._telemetry(event)
+            case Resources():
+                self._round_trip_ns = event.round_trip_ns
+            case Described():
+                self._calls_itself = event.description.robot
+            case LinkChanged():
+                self._links += event.state is ConnectionState.CONNECTED
+                self.state, self._problem, self._since_s = event.state, event.problem, time.time()
+
+    def report(self, session: str) -> LinkReport:
+        """How it stands now."""
+        now_ns = time.monotonic_ns()
+        return LinkReport(
+            address=str(self._address),
+            state=self.state.value,
+            problem=self._problem,
+            since_utc_s=self._since_s,
+            calls_itself=self._calls_itself,
+            links=self._links,
+            session=session,
+            rows=self._rows,
+            rows_per_s=self._rows_per_s(now_ns),
+            bytes=self._bytes,
+            missed=self._missed,
+            dropped=self._dropped,
+            newest_age_s=None if self.newest_ns is None else (now_ns - self.newest_ns) / 1e9,
+            round_trip_s=None if self._round_trip_ns is None else self._round_trip_ns / 1e9,
+            clock_offset_s=None if self._clock is None else self._clock.offset_ns / 1e9,
+            clock_uncertainty_s=None if self._clock is None else self._clock.uncertainty_ns / 1e9,
+        )
+
+    def _telemetry(self, event: Telemetry) -> None:
+        batch = event.batch
+        rows = len(batch.stamps_ns)
+        self._rows += rows
+        self._bytes += VALUE.itemsize * rows * (KEYS + len(batch.columns))
+        self._missed += batch.missed
+        self._clock = event.clock
+        self.newest_ns = batch.received_ns
+        stream = (batch.link, event.stream)
+        if stream != self._stream:
+            self._stream, self._dropped_before = stream, self._dropped
+        self._dropped = self._dropped_before + batch.dropped
+        second = batch.received_ns // SECOND_NS
+        if not self._recent or self._recent[-1][0] != second:
+            self._recent.append((second, 0))
+        self._recent[-1] = (second, self._recent[-1][1] + rows)
+
+    def _rows_per_s(self, now_ns: int) -> float:
+        """Over the last whole seconds."""
+        now = now_ns // SECOND_NS
+        return sum(rows for second, rows in self._recent if now - RATE_S <= second < now) / RATE_S
