@@ -4,11 +4,12 @@ import collections
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from server_gui.core.processing.foot_imu_events import FootImuEvents
 from server_gui.core.processing.gait_events import MAX_GAP_NS, EventKind, GaitEvent, Leg, Source
 from server_gui.core.processing.gait_measures import Gait, GaitMeasures, Stride
-from server_gui.core.processing.joint_measures import JointShown, RangeOfMotion, TrackingError
+from server_gui.core.processing.joint_measures import Error, Extremes, TrackingError
 from server_gui.core.processing.kinematic_events import KinematicEvents
 from server_gui.core.processing.pressure_events import PressureEvents
 from server_gui.core.processing.wiring import POSITION, TRUNK, Fed, Wiring, leg_of
@@ -20,6 +21,13 @@ SILENT_NS = 500_000_000  # a source that told nothing for so long leaves its leg
 Columns = Mapping[str, Sequence[float | None]]
 
 
+class Found(NamedTuple):
+    """What some rows brought."""
+
+    events: list[GaitEvent]
+    strides: list[Stride]
+
+
 @dataclass(frozen=True, slots=True)
 class Derived:
     """What is derived from a robot's samples, as it is now: times and angles in SI units."""
@@ -27,7 +35,7 @@ class Derived:
     stamp_ns: int = 0  # the newest row, on the robot's clock
     gait: Gait = field(default_factory=Gait)
     sources: Mapping[Leg, Source | None] = field(default_factory=dict)  # what gives each leg's events
-    joints: Mapping[str, JointShown] = field(default_factory=dict)
+    errors: Mapping[str, Error] = field(default_factory=dict)  # of joints that follow a target
     events: tuple[GaitEvent, ...] = ()  # the newest, oldest first
 
 
@@ -53,34 +61,35 @@ class ComponentProcessing:
         self._angles = [0.0] * (TRUNK + 1)  # left hip and knee, right hip and knee, trunk: the newest of each
         self._angles_ns = [0] * TRUNK  # when each of the joints' was taken; 0: never
         self._measures = GaitMeasures()
-        self._ranges: dict[str, RangeOfMotion] = {}
+        self._ranges: dict[str, Extremes] = {}
         self._errors: dict[str, TrackingError] = {}
         self._events: collections.deque[GaitEvent] = collections.deque(maxlen=EVENTS)
         self._wirings: dict[tuple[str, ...], Wiring] = {}
         self._stamp_ns = 0
 
-    def take(self, stamps_ns: Sequence[int], columns: Columns) -> list[Stride]:
-        """Rows as a batch of a stream has them; the strides that they end."""
+    def take(self, stamps_ns: Sequence[int], columns: Columns) -> Found:
+        """Rows as a batch of a stream has them."""
         wiring = self._wiring(tuple(columns))
-        strides: list[Stride] = []
+        taken = Found([], [])
         for row, stamp_ns in enumerate(stamps_ns):
             self._stamp_ns = stamp_ns
             self._joints(wiring, stamp_ns, row, columns)
             for event in self._found(wiring, stamp_ns, row, columns):
+                taken.events.append(event)
                 stride = self._event(event)
                 if stride is not None:
-                    strides.append(stride)
-        return strides
+                    taken.strides.append(stride)
+        return taken
 
     def shown(self, now_ns: int | None = None) -> Derived:
         """What is derived, at `now_ns` on the robot's clock; by default when the newest row was taken."""
         now_ns = self._stamp_ns if now_ns is None else now_ns
-        names = self._ranges.keys() | self._errors.keys()
+        errors = ((name, error.at(now_ns)) for name, error in self._errors.items())
         return Derived(
             stamp_ns=self._stamp_ns,
             gait=self._measures.now(now_ns),
             sources={leg: self._best(leg, now_ns) for leg in Leg},
-            joints={name: self._joint(name, now_ns) for name in sorted(names)},
+            errors={name: error for name, error in errors if error is not None},
             events=tuple(self._events),
         )
 
@@ -139,12 +148,11 @@ class ComponentProcessing:
 
     def _event(self, event: GaitEvent) -> Stride | None:
         self._events.append(event)
-        stride = self._measures.take(event)
-        if event.kind is EventKind.HEEL_STRIKE:
-            for name, ranged in self._ranges.items():
-                if leg_of(name) is event.leg:
-                    ranged.struck(stride is not None)
-        return stride
+        if event.kind is EventKind.TOE_OFF:
+            return self._measures.take(event)
+        ranges = {name: seen.end() for name, seen in self._ranges.items() if leg_of(name) is event.leg}
+        known = {name: moved for name, moved in ranges.items() if moved is not None}
+        return self._measures.take(event, known)
 
     # --- joints
 
@@ -162,11 +170,6 @@ class ComponentProcessing:
             if target is not None and position is not None and (value := position[row]) is not None:
                 self._errors[joint].take(stamp_ns, target - value)
 
-    def _joint(self, name: str, now_ns: int) -> JointShown:
-        ranged, error = self._ranges.get(name), self._errors.get(name)
-        rms, largest = (None, None) if error is None else error.at(now_ns)
-        return JointShown(None if ranged is None else ranged.mean, rms, largest)
-
     # --- wiring
 
     def _wiring(self, channels: tuple[str, ...]) -> Wiring:
@@ -180,6 +183,6 @@ class ComponentProcessing:
 
     def _make_room(self, positions: Sequence[Fed], errors: Sequence[Fed]) -> None:
         for _, joint in positions:
-            self._ranges.setdefault(joint, RangeOfMotion())
+            self._ranges.setdefault(joint, Extremes())
         for _, joint in errors:
             self._errors.setdefault(joint, TrackingError())

@@ -23,6 +23,7 @@ class Stride:
     stance: float  # share of the stride from heel strike to toe off
     step_s: float | None  # from the other foot's heel strike in this stride to the one that ends it
     double_support: float | None  # share of the stride with both feet down
+    ranges: Mapping[str, float] = field(default_factory=dict)  # of motion, of the leg's joints (rad)
 
     @property
     def time_s(self) -> float:
@@ -57,6 +58,7 @@ class Gait:
     cadence_spm: float | None = None
     double_support: float | None = None
     legs: Mapping[Leg, LegGait] = field(default_factory=lambda: {leg: LegGait() for leg in Leg})
+    ranges: Mapping[str, float] = field(default_factory=dict)  # of motion a stride, by joint (rad)
     symmetry: Mapping[str, float | None] = field(default_factory=dict)
 
 
@@ -76,15 +78,18 @@ class GaitMeasures:
     def __init__(self) -> None:
         self._legs = {leg: _Leg() for leg in Leg}
 
-    def take(self, event: GaitEvent) -> Stride | None:
-        """Take one event; the stride that it ends, where it does and nothing of it was missed."""
+    def take(self, event: GaitEvent, ranges: Mapping[str, float] | None = None) -> Stride | None:
+        """Take one event; the stride that it ends, where it does and nothing of it was missed.
+
+        `ranges` are what the leg's joints have moved since its heel strike before (rad).
+        """
         leg, other = self._legs[event.leg], self._legs[event.leg.other]
         if event.after_gap:
             leg.forget()
         if event.kind is EventKind.TOE_OFF:
             leg.off_ns = event.stamp_ns
             return None
-        stride = leg.ended(event, other)
+        stride = leg.ended(event, other, ranges or {})
         leg.strike_ns = event.stamp_ns
         if stride is not None:
             leg.strides.append(stride)
@@ -112,6 +117,7 @@ def summary(strides: Mapping[Leg, Iterable[Stride]]) -> Gait:
         cadence_spm=None if step_s is None else 60.0 / step_s,
         double_support=_mean(stride.double_support for stride in both),
         legs=legs,
+        ranges=_mean_ranges(both),
         symmetry={name: symmetry_index(left, right) for name, (left, right) in sides.items()},
     )
 
@@ -128,7 +134,7 @@ class _Leg:
         self.strike_ns: int | None = None
         self.off_ns: int | None = None
 
-    def ended(self, strike: GaitEvent, other: "_Leg") -> Stride | None:
+    def ended(self, strike: GaitEvent, other: "_Leg", ranges: Mapping[str, float]) -> Stride | None:
         """The stride that `strike` ends, where its own toe off was seen."""
         began_ns, off_ns, ended_ns = self.strike_ns, self.off_ns, strike.stamp_ns
         if began_ns is None or off_ns is None or not began_ns < off_ns < ended_ns:
@@ -141,7 +147,8 @@ class _Leg:
             step_s = (ended_ns - other.strike_ns) / 1e9
             if other.off_ns is not None and began_ns <= other.off_ns <= other.strike_ns <= off_ns:
                 both = ((other.off_ns - began_ns) + (off_ns - other.strike_ns)) / time_ns
-        return Stride(strike.leg, began_ns, ended_ns, (off_ns - began_ns) / time_ns, step_s, both)
+        stance = (off_ns - began_ns) / time_ns
+        return Stride(strike.leg, began_ns, ended_ns, stance, step_s, both, ranges)
 
 
 def _leg_gait(strides: list[Stride]) -> LegGait:
@@ -156,6 +163,14 @@ def _leg_gait(strides: list[Stride]) -> LegGait:
         swing=None if stance is None else 1.0 - stance,
         variability=spread,
     )
+
+
+def _mean_ranges(strides: list[Stride]) -> dict[str, float]:
+    names = dict.fromkeys(name for stride in strides for name in stride.ranges)
+    return {
+        name: statistics.fmean(stride.ranges[name] for stride in strides if name in stride.ranges)
+        for name in names
+    }
 
 
 def _mean(values: Iterable[float | None]) -> float | None:

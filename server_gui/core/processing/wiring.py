@@ -53,6 +53,13 @@ class Wiring:
             targets=tuple(name for name in all_with(TARGET) if name.component not in told),
         )
 
+    @property
+    def channels(self) -> set[str]:
+        """Every channel that something is derived from."""
+        told = (*(name for _, name in self.forces + self.pitch_rates), *self.positions, *self.errors)
+        targets = {name.channel for name in self.targets}
+        return {name.channel for name in told} | {channel for _, channel in self.angles} | targets
+
 
 def leg_of(component: str) -> Leg | None:
     """The leg that a component is on, None where its name does not say."""
