@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
 import msgspec
@@ -74,6 +74,21 @@ class Store:
                 f"the store {self.url} is for one writer alone: no other may open it for writing"
             )
         self._open: dict[str, DeltaTable] = {}
+
+    @classmethod
+    def existing(cls, url: str | None = None) -> Self:
+        """A store that somebody has used already, to read or tidy it; nothing is made.
+
+        Raises:
+            NoSuchTable: there is none.
+
+        """
+        url = checked_url(url or default_url())
+        folder = Path(urlsplit(url).path) if url.startswith("file://") else None
+        there = (folder / _ABOUT).exists() if folder else Objects(url).read(_ABOUT) is not None
+        if not there:
+            raise NoSuchTable(f"there is no store at {url} yet: nothing has been uploaded to it")
+        return cls(url, several_writers=False)
 
     def append(
         self, table: Table, location: str, schema: pa.Schema, batches: Batches, writer: str, sequence: int

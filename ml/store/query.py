@@ -1,0 +1,99 @@
+"""SQL over the store's tables, for reading only: DuckDB, with everything but the tables locked away."""
+
+import contextlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import duckdb
+import pyarrow as pa
+
+from ml.store import reading
+from ml.store.errors import StoreError, translated
+from ml.store.store import Store
+from ml.store.tables import TABLES
+
+BATCH_ROWS: Final = 50_000
+_CLOSED: Final[dict[str, str | bool | int | float | list[str]]] = {
+    "enable_external_access": "false",  # no file, no network, no extension
+    "autoinstall_known_extensions": "false",
+    "autoload_known_extensions": "false",
+    "temp_directory": "",
+}
+_SETTINGS: Final = ("python_enable_replacements=false", "TimeZone='UTC'", "lock_configuration=true")
+_KIND: Final = re.compile(r"^(\w+ )*Error: ")
+_DOTTED: Final = re.compile(r'Referenced table "(\w+)" not found')
+
+
+class QueryError(StoreError):
+    """The SQL cannot be run; the message says why and where in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a query finds; the rows come while they are read."""
+
+    schema: pa.Schema
+    batches: Iterator[pa.RecordBatch]
+
+
+@contextlib.contextmanager
+def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
+    """Run one SELECT over the tables `telemetry`, `sessions`, …, each as one view, whatever its shards.
+
+    Files, row groups and columns that the query does not need are not read. With `robot` the views hold that
+    robot's rows only, and only its shard is opened.
+
+    Raises:
+        QueryError: it is no SELECT, or cannot be run.
+        StoreError: the store cannot be read.
+
+    """
+    with contextlib.closing(duckdb.connect(config=_CLOSED)) as connection:
+        with _said():
+            kinds = [statement.type for statement in connection.extract_statements(sql)]
+        if kinds != [duckdb.StatementType.SELECT]:
+            raise QueryError("one SELECT at a time: a query only reads (SHOW TABLES and DESCRIBE do too)")
+        for name in _asked(sql):
+            with translated(f"{store.url}/{name} cannot be read"):
+                rows = connection.from_arrow(reading.dataset(store, TABLES[name], robot))
+            (rows if robot is None else rows.filter(_is("robot", robot))).create_view(name)
+        for setting in _SETTINGS:
+            connection.execute(f"SET {setting}")
+        with _said():
+            reader = connection.sql(sql).to_arrow_reader(BATCH_ROWS)
+        with contextlib.closing(reader):
+            yield Result(reader.schema, _read(reader, store))
+
+
+def _asked(sql: str) -> list[str]:
+    """The tables whose names are in the text, or all: a table that is not opened costs nothing."""
+    words = {word.lower() for word in re.findall(r"\w+", sql)}
+    return [name for name in TABLES if name in words] or list(TABLES)
+
+
+def _is(column: str, value: str) -> str:
+    return "{} = '{}'".format(column, value.replace("'", "''"))
+
+
+def _read(reader: pa.RecordBatchReader, store: Store) -> Iterator[pa.RecordBatch]:
+    while True:
+        try:
+            with _said(), translated(f"{store.url} cannot be read"):
+                batch = reader.read_next_batch()
+        except StopIteration:
+            return
+        yield batch
+
+
+@contextlib.contextmanager
+def _said() -> Iterator[None]:
+    """DuckDB's errors in its words, which show the place."""
+    try:
+        yield
+    except duckdb.Error as error:
+        text = re.sub(r"\n\n+", "\n", _KIND.sub("", str(error))).strip()
+        if dotted := _DOTTED.search(text):
+            text += f'\nA channel\'s name has a dot: write it in double quotes, "{dotted[1]}.…".'
+        raise QueryError(text) from None

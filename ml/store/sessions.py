@@ -1,0 +1,253 @@
+"""Recorded sessions: what is known of each, what happened in it, and its telemetry in time's order."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Final
+
+import msgspec
+import pyarrow as pa
+import pyarrow.dataset
+import pyarrow.parquet as pq
+
+from ml.store import reading
+from ml.store.errors import StoreError, translated
+from ml.store.files import filesystem
+from ml.store.reading import DataFile
+from ml.store.store import Store
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
+
+ROWS_AT_ONCE: Final = 100_000  # of telemetry, about
+SHORTEST: Final = timedelta(seconds=1)  # that is read at once
+KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
+_ORDER: Final = [(name, "ascending") for name in ("utc", "connection", "stream", "seq", "row")]
+_AT_ONCE: Final = 8  # footers that are read at a time
+
+
+class NoSuchSession(StoreError):
+    """No session, or more than one, has a name that begins so."""
+
+
+class Session(msgspec.Struct, frozen=True):
+    """What is known of a session. `ended` is None while it goes on, and where its server died.
+
+    Its telemetry is from `first` to before `last`, None where it has none. `parameters` are the values at
+    its start, `units` each channel's unit as the robot described it, `versions` software by name.
+    """
+
+    robot: str
+    session: str
+    began: datetime | None = None
+    ended: datetime | None = None
+    first: datetime | None = None
+    last: datetime | None = None
+    rows: int = 0
+    size_bytes: int = 0
+    uploaded: bool = True
+    configuration_hash: str = ""
+    operator: str = ""
+    notes: str = ""
+    parameters: dict[str, Any] = {}
+    units: dict[str, Any] = {}
+    versions: dict[str, Any] = {}
+
+    @property
+    def length(self) -> timedelta:
+        """From its first row to its last."""
+        return self.last - self.first if self.first and self.last else timedelta(0)
+
+
+class Channel(msgspec.Struct, frozen=True):
+    """A channel of a session; `samples` are its values that are not null."""
+
+    name: str
+    unit: str | None
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """The telemetry of a session as the log knows it."""
+
+    files: Sequence[DataFile]
+
+    @property
+    def first(self) -> datetime | None:
+        return min((file.first for file in self.files if file.first), default=None)
+
+    @property
+    def last(self) -> datetime | None:
+        return max((file.last for file in self.files if file.last), default=None)
+
+    @property
+    def rows(self) -> int:
+        return sum(file.rows for file in self.files)
+
+    @property
+    def size_bytes(self) -> int:
+        return sum(file.size_bytes for file in self.files)
+
+
+def sessions(store: Store, robot: str | None = None) -> list[Session]:
+    """Every session, oldest first; of one robot where it is named."""
+    extents: dict[tuple[str, str], list[DataFile]] = {}
+    for file in reading.files(store, TELEMETRY, robot):
+        extents.setdefault((file.robot or "", file.session or ""), []).append(file)
+    found = [
+        made(fields, Extent(extents.get((fields["robot"], fields["session"]), ())))
+        for fields in newest(_rows(store, SESSIONS, robot))
+    ]
+    return sorted(found, key=lambda session: (session.session, session.robot))
+
+
+def find(store: Store, name: str, robot: str | None = None) -> Session:
+    """The session whose name is this, or alone begins so.
+
+    Raises:
+        NoSuchSession: none, or several do.
+
+    """
+    known = sessions(store, robot)
+    exactly = [session for session in known if session.session == name]
+    found = exactly or [session for session in known if session.session.startswith(name)]
+    if not found:
+        raise NoSuchSession(f"{store.url} has no session {name!r} (gwrms sessions ls lists them)")
+    if len(found) > 1:
+        names = ", ".join(f"{session.session} of {session.robot}" for session in found[:5])
+        raise NoSuchSession(f"{len(found)} sessions begin with {name!r}: {names}; give more of the name")
+    return found[0]
+
+
+def newest(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of the rows of each session the one that holds: the newest."""
+    by_time = sorted(rows, key=lambda row: (row["utc"], row.get("batch") or 0, row.get("number") or 0))
+    return list({(row["robot"], row["session"]): row for row in by_time}.values())
+
+
+def made(fields: dict[str, Any], extent: Extent, uploaded: bool = True) -> Session:
+    """A session from its row in the table, and its telemetry's extent."""
+    known = {name: value for name, value in fields.items() if value is not None}
+    tables = {
+        name: msgspec.json.decode(known.pop(name, "{}")) for name in ("parameters", "units", "versions")
+    }
+    found = {
+        "first": extent.first,
+        "last": extent.last,
+        "rows": extent.rows,
+        "size_bytes": extent.size_bytes,
+        "uploaded": uploaded,
+    }
+    return msgspec.convert(known | tables | found, Session)
+
+
+def channels(store: Store, session: Session) -> list[Channel]:
+    """The channels that have values in this session, from its files' footers."""
+    known = reading.units(store, TELEMETRY, session.robot)
+    samples: dict[str, int] = {}
+    with ThreadPoolExecutor(_AT_ONCE, "footers") as pool:
+        for found in pool.map(lambda file: footer(store, file), _files(store, session)):
+            for name, count in _samples(found).items():
+                samples[name] = samples.get(name, 0) + count
+    own = set(TELEMETRY.schema.names)
+    return [
+        Channel(name, known.get(name), count)
+        for name, count in sorted(samples.items())
+        if count and name not in own
+    ]
+
+
+def footer(store: Store, file: DataFile) -> pq.FileMetaData:
+    """What the file says of itself; raises `StoreError` where it is not there or damaged."""
+    with (
+        translated(f"{store.url}/{file.location}/{file.path} cannot be read"),
+        filesystem(f"{store.url}/{file.location}").open_input_file(file.path) as opened,
+    ):
+        return pq.read_metadata(opened)
+
+
+def happenings(store: Store, session: Session, table: Table = EVENTS) -> list[dict[str, Any]]:
+    """The session's rows of `events`, or of `labels`, in time's order."""
+    named = pyarrow.dataset.field("session") == session.session
+    return sorted(_rows(store, table, session.robot, named), key=lambda row: row["utc"])
+
+
+def labels(store: Store, session: Session) -> list[dict[str, Any]]:
+    """What somebody says that robot and wearer did."""
+    return happenings(store, session, LABELS)
+
+
+def telemetry(
+    store: Store,
+    session: Session,
+    names: Sequence[str],
+    begin: datetime | None = None,
+    end: datetime | None = None,
+) -> Iterator[pa.Table]:
+    """The rows from `begin` up to before `end`, in time's order, some at a time.
+
+    The columns are `utc`, `stamp_ns` and these channels; rows in which all of them are null are left out.
+    """
+    if session.first is None or session.last is None or not session.rows or not names:
+        return
+    begin = max(begin or session.first, session.first)
+    end = min(end or session.last, session.last)
+    step = max(session.length * ROWS_AT_ONCE / session.rows, SHORTEST)
+    with translated(f"the telemetry of {session.session} in {store.url} cannot be read"):
+        rows = _of_session(store, session)
+        while begin < end:
+            found = rows.to_table(
+                columns=[name for name, _ in _ORDER] + ["stamp_ns", *names],
+                filter=_between(begin, min(begin + step, end)) & _any(names),
+            )
+            yield found.sort_by(_ORDER).select([*KEYS, *names])
+            begin += step
+
+
+def _of_session(store: Store, session: Session) -> pyarrow.dataset.Dataset:
+    whole = reading.dataset(store, TELEMETRY, session.robot)
+    column = pyarrow.dataset.field
+    fragments = whole.get_fragments(
+        (column("robot") == session.robot) & (column("session") == session.session)
+    )
+    files = pyarrow.dataset.ParquetFileFormat()
+    return pyarrow.dataset.FileSystemDataset(list(fragments), whole.schema, files)
+
+
+def _between(begin: datetime, end: datetime) -> pyarrow.dataset.Expression:
+    utc = pyarrow.dataset.field("utc")
+    return (utc >= begin) & (utc < end)
+
+
+def _any(names: Sequence[str]) -> pyarrow.dataset.Expression:
+    first, *others = (pyarrow.dataset.field(name).is_valid() for name in names)
+    for other in others:
+        first = first | other
+    return first
+
+
+def _rows(
+    store: Store, table: Table, robot: str | None, where: pyarrow.dataset.Expression | None = None
+) -> list[dict[str, Any]]:
+    if robot is not None:
+        named = pyarrow.dataset.field("robot") == robot
+        where = named if where is None else where & named
+    with translated(f"{store.url}/{table.name} cannot be read"):
+        found: list[dict[str, Any]] = reading.dataset(store, table).to_table(filter=where).to_pylist()
+    return found
+
+
+def _files(store: Store, session: Session) -> list[DataFile]:
+    files = reading.files(store, TELEMETRY, session.robot)
+    return [file for file in files if (file.robot, file.session) == (session.robot, session.session)]
+
+
+def _samples(metadata: pq.FileMetaData) -> dict[str, int]:
+    """How many values of each column are not null."""
+    found: dict[str, int] = {}
+    for group in range(metadata.num_row_groups):
+        for number in range(metadata.num_columns):
+            column = metadata.row_group(group).column(number)
+            nulls = column.statistics.null_count if column.is_stats_set else 0
+            found[column.path_in_schema] = found.get(column.path_in_schema, 0) + column.num_values - nulls
+    return found

@@ -1,0 +1,70 @@
+"""What is exported of a session."""
+
+import fnmatch
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import pyarrow as pa
+
+from ml.store import sessions
+from ml.store.errors import StoreError
+from ml.store.sessions import Channel, Session
+from ml.store.store import Store
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Channels by names or globs, and the time from `begin` to before `end`."""
+
+    channels: Sequence[str] = ("*",)
+    begin: datetime | None = None
+    end: datetime | None = None
+
+    def of(self, known: Sequence[Channel]) -> list[Channel]:
+        """The channels that are wanted; raises `StoreError` where a name or glob means none."""
+        names = [each.name for each in known]
+        for glob in self.channels:
+            if not any(fnmatch.fnmatchcase(name, glob) for name in names):
+                raise StoreError(f"the session has no channel {glob!r} (gwrms sessions show lists them)")
+        return [each for each in known if any(fnmatch.fnmatchcase(each.name, glob) for glob in self.channels)]
+
+    def holds(self, row: Row) -> bool:
+        """Whether the row's time is wanted."""
+        utc = row["utc"]
+        return (self.begin is None or utc >= self.begin) and (self.end is None or utc < self.end)
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A session or a part of it. `tables` are its rows in time's order: `utc`, `stamp_ns`, the channels."""
+
+    session: Session
+    channels: Sequence[Channel]
+    tables: Iterable[pa.Table]
+    events: Sequence[Row]
+    labels: Sequence[Row]
+
+
+def choose(store: Store, session: Session, choice: Choice) -> Recording:
+    """What is wanted of the session; telemetry is read while `tables` is.
+
+    Raises:
+        StoreError: there is nothing of it, or the store cannot be read.
+
+    """
+    known = sessions.channels(store, session)
+    if not known:
+        raise StoreError(f"the session {session.session} has no telemetry in {store.url}")
+    channels = choice.of(known)
+    names = [each.name for each in channels]
+    return Recording(
+        session,
+        channels,
+        sessions.telemetry(store, session, names, choice.begin, choice.end),
+        list(filter(choice.holds, sessions.happenings(store, session))),
+        list(filter(choice.holds, sessions.labels(store, session))),
+    )

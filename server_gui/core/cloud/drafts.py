@@ -1,0 +1,17 @@
+"""A file that is there whole or not at all."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+
+@contextlib.contextmanager
+def draft(file: Path) -> Iterator[Path]:
+    """Another name to write to within the block; it becomes `file` where that ends well, else it goes."""
+    written = file.with_name(f".{file.name}.{os.getpid()}.part")
+    try:
+        yield written
+        written.replace(file)
+    finally:
+        written.unlink(missing_ok=True)

@@ -1,0 +1,48 @@
+"""A session as one table in a file: CSV or Parquet, with the channels' units."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import msgspec
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from ml.store.sessions import KEYS, Channel
+from ml.store.tables import TELEMETRY, field
+from server_gui.core.cloud.chosen import Recording
+from server_gui.core.cloud.drafts import draft
+
+
+def write_csv(file: Path, recording: Recording) -> int:
+    """Columns like `left_knee.position [rad]`; a value that is missing is empty. How many rows."""
+    schema = _schema(recording.channels)
+    names = [f"{each.name} [{unit}]" if (unit := _unit(each)) else each.name for each in schema]
+    header = pa.schema([(name, each.type) for name, each in zip(names, schema, strict=True)])
+    with draft(file) as written, pyarrow.csv.CSVWriter(written, header) as writer:
+        return _write(writer, (table.rename_columns(names) for table in recording.tables))
+
+
+def write_parquet(file: Path, recording: Recording) -> int:
+    """A column a channel with `unit` in its metadata; the session, as JSON, in the file's. How many rows."""
+    schema = _schema(recording.channels).with_metadata({"session": msgspec.json.encode(recording.session)})
+    with draft(file) as written, pq.ParquetWriter(written, schema, compression="zstd") as writer:
+        return _write(writer, (table.cast(schema) for table in recording.tables))
+
+
+def _write(writer: pq.ParquetWriter | pyarrow.csv.CSVWriter, tables: Iterable[pa.Table]) -> int:
+    rows = 0
+    for table in tables:
+        writer.write_table(table)
+        rows += table.num_rows
+    return rows
+
+
+def _schema(channels: Sequence[Channel]) -> pa.Schema:
+    keys = [TELEMETRY.schema.field(name) for name in KEYS]
+    return pa.schema([*keys, *(field(each.name, pa.float64(), each.unit) for each in channels)])
+
+
+def _unit(column: pa.Field) -> str:
+    unit: bytes = (column.metadata or {}).get(b"unit", b"")
+    return unit.decode()
