@@ -10,6 +10,8 @@ from rich.console import Console, RenderableType
 from rich.layout import Layout
 from rich.live import Live
 
+from server_gui.core.processing.gait_measures import Gait
+from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.robot import Robot
 from server_gui.terminal import panels
 from server_gui.terminal.controls import Controls
@@ -20,7 +22,7 @@ PICTURE_SIZE = (118, 27)
 WIDE_COLUMNS, WIDE_LINES = 110, 27
 
 
-def draw(robot: Robot, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
+def draw(robot: Robot, gait: Gait, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
     """One frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24."""
     columns, lines = size
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
@@ -33,7 +35,7 @@ def draw(robot: Robot, controls: Controls, where: str, size: tuple[int, int]) ->
     )
     page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(robot, look), ratio=2))
     page["left"].split_column(
-        Layout(panels.feet_and_trunk(robot, look), size=6),
+        Layout(panels.feet_and_trunk(robot, gait, look), size=6),
         Layout(panels.parameters(robot, controls, look)),
     )
     return page
@@ -42,8 +44,9 @@ def draw(robot: Robot, controls: Controls, where: str, size: tuple[int, int]) ->
 class Dashboard:
     """Shows a robot in the terminal until `tick` says that it is enough, or the user quits."""
 
-    def __init__(self, robot: Robot, controls: Controls, where: str) -> None:
+    def __init__(self, robot: Robot, processing: RobotProcessing, controls: Controls, where: str) -> None:
         self._robot = robot
+        self._processing = processing
         self._controls = controls
         self._where = where
 
@@ -56,17 +59,20 @@ class Dashboard:
         with Keyboard() as keyboard, live:
             next_frame = time.monotonic()
             while tick() and not self._controls.wants_to_quit:
-                live.update(draw(self._robot, self._controls, self._where, console.size), refresh=True)
+                live.update(self._frame(console.size), refresh=True)
                 next_frame = max(next_frame + FRAME_S, time.monotonic())
                 for key in keyboard.wait(next_frame - time.monotonic()):
                     self._controls.press(key)
 
+    def _frame(self, size: tuple[int, int]) -> RenderableType:
+        return draw(self._robot, self._processing.derived().gait, self._controls, self._where, size)
 
-def save_picture(path: Path, robot: Robot, controls: Controls, where: str) -> None:
+
+def save_picture(path: Path, robot: Robot, gait: Gait, controls: Controls, where: str) -> None:
     """The frame of this moment as an SVG file."""
     width, height = PICTURE_SIZE
     console = Console(record=True, width=width, height=height, file=io.StringIO(), force_terminal=True)
-    console.print(draw(robot, controls, where, PICTURE_SIZE), height=height)
+    console.print(draw(robot, gait, controls, where, PICTURE_SIZE), height=height)
     svg = console.export_svg(title="gwrms demo")
     # rich names a font on somebody's server; a picture of ours asks nobody for anything.
     path.write_text(re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL), encoding="utf-8")

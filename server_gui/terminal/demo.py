@@ -115,13 +115,13 @@ def _view(session: Session, options: Options, where: str, check: Callable[[], No
         session.update()
         return ends is None or time.monotonic() < ends
 
-    Dashboard(session.robot, controls, where).run(tick)
+    Dashboard(session.robot, session.processing, controls, where).run(tick)
     _picture(options.picture, session, controls, where)
 
 
 def _picture(path: Path | None, session: Session, controls: Controls, where: str) -> None:
     if path is not None:
-        save_picture(path, session.robot, controls, where)
+        save_picture(path, session.robot, session.processing.derived().gait, controls, where)
 
 
 def _wait_whole(session: Session, check: Callable[[], None]) -> None:
@@ -148,11 +148,15 @@ def _headless(session: Session, seconds: float | None, check: Callable[[], None]
             check()
             session.update()
             if time.monotonic() >= next_line:
-                headless.say(headless.line(session.robot, next_line - began))
+                headless.say(
+                    headless.line(session.robot, session.processing.derived().gait, next_line - began)
+                )
                 next_line += LINE_S
             time.sleep(TICK_S)
     finally:
-        headless.say(headless.table(summary, session.robot))  # also of a run that was cut short
+        headless.say(
+            headless.table(summary, session.processing.derived().gait, session.robot)
+        )  # also of a run that was cut short
     failures = summary.failures()
     if failures:
         raise DemoFailed(f"this was no walk: {'; '.join(failures)}")

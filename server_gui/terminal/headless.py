@@ -4,13 +4,15 @@ import math
 import sys
 
 from gateway.client import ConnectionState
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_measures import Gait
 from server_gui.core.robot import Robot
 from server_gui.core.summary import Range, Summary
 
 NONE = "–"
 
 
-def line(robot: Robot, elapsed_s: float) -> str:
+def line(robot: Robot, gait: Gait, elapsed_s: float) -> str:
     """What is now, in one line."""
     joints = " ".join(_degrees(robot.values.get(f"{name}.position")) for name in robot.names("joint"))
     feet = "/".join(_newtons(robot.values.get(f"{name}.force")) for name in robot.names("insole"))
@@ -19,7 +21,7 @@ def line(robot: Robot, elapsed_s: float) -> str:
     wrong = ", ".join(f"{part.name} {part.state}" for part in robot.not_ok()) or "all ok"
     return (
         f"{elapsed_s:5.0f} s  {_link(robot)}  joints {joints} °  feet {feet} N  "
-        f"trunk {tilts} °  cpu {NONE if cpu is None else f'{cpu:.0f}'} %  {wrong}"
+        f"trunk {tilts} °  {_cadence(gait)}  cpu {NONE if cpu is None else f'{cpu:.0f}'} %  {wrong}"
     )
 
 
@@ -31,7 +33,7 @@ def _link(robot: Robot) -> str:
     return f"{'STALE ' if robot.is_stale() else ''}age {age} {robot.rate_hz():.0f} Hz"
 
 
-def table(summary: Summary, robot: Robot) -> str:
+def table(summary: Summary, gait: Gait, robot: Robot) -> str:
     """What the run showed."""
     link = robot.link
     lines = [
@@ -42,6 +44,7 @@ def table(summary: Summary, robot: Robot) -> str:
         f"{'foot':<14}{'loaded':>26}",
         *(f"{name:<14}{_share(foot.loaded_share):>26}" for name, foot in summary.feet.items()),
         f"the weight changed feet {summary.alternations} times",
+        f"at last {_cadence(gait)}, on the ground {_stances(gait)}",
         "",
         f"{'component':<14}{'worst state':>26}",
         *(f"{name:<14}{state:>26}" for name, state in summary.worst.items()),
@@ -49,6 +52,15 @@ def table(summary: Summary, robot: Robot) -> str:
         f"{summary.rows} rows, {link.dropped} dropped, {link.missed} batches missed, {link.links} links",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _cadence(gait: Gait) -> str:
+    return f"{NONE if gait.cadence_spm is None else f'{gait.cadence_spm:.0f}'} steps/min"
+
+
+def _stances(gait: Gait) -> str:
+    shares = ((leg, gait.legs[leg].stance) for leg in Leg)
+    return ", ".join(f"{leg} {NONE if share is None else f'{100 * share:.0f}'} %" for leg, share in shares)
 
 
 def say(text: str) -> None:

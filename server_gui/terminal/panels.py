@@ -13,6 +13,8 @@ from rich.text import Text
 from gateway.client import ConnectionState
 from gateway.messages import ParameterInfo, ParameterValue, Written
 from server_gui.core.events import Failed
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_measures import Gait
 from server_gui.core.robot import Robot
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.marks import (
@@ -136,8 +138,8 @@ def _part_state(robot: Robot, name: str) -> Text:
     return text
 
 
-def feet_and_trunk(robot: Robot, look: Look) -> RenderableType:
-    """What each foot carries, and how the trunk leans."""
+def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
+    """What each foot carries, how the trunk leans, and how the wearer walks."""
     stale = robot.is_stale()
     grid = Table.grid(expand=True, padding=(0, 1))
     grid.add_column(no_wrap=True)
@@ -158,7 +160,19 @@ def feet_and_trunk(robot: Robot, look: Look) -> RenderableType:
             grid.add_row(
                 f"{name} {words}", number, Text(needle(tilt, -TILT_RAD, TILT_RAD, look.foot), style=colour)
             )
-    return _panel(grid, "Feet and trunk", robot)
+    return _panel(grid, "Feet and trunk", robot, _walk(gait, look))
+
+
+def _walk(gait: Gait, look: Look) -> str:
+    """Steps a minute and, where there is room, each foot's share of its stride on the ground."""
+    if gait.cadence_spm is None:
+        return ""
+    cadence = f"{gait.cadence_spm:.0f} steps/min"
+    stances = [gait.legs[leg].stance for leg in Leg]
+    if not look.roomy or None in stances:
+        return cadence
+    shares = " / ".join(f"{100 * stance:.0f}" for stance in stances if stance is not None)
+    return f"{cadence}, stance {shares} %"
 
 
 def parameters(robot: Robot, controls: Controls, look: Look) -> RenderableType:

@@ -9,6 +9,7 @@ from server_gui.core.events import Looked, Telemetry
 from server_gui.core.feed import Feed, Following
 from server_gui.core.mailbox import Mailbox
 from server_gui.core.network import Network
+from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.robot import Robot
 from server_gui.core.summary import Summary
 
@@ -20,10 +21,11 @@ FOLLOWING = Following(
 
 
 class Session:
-    """Use it as a context manager; call `update` often, then read `robot`."""
+    """Use it as a context manager; call `update` often, then read `robot` and `processing`."""
 
     def __init__(self, address: Address) -> None:
         self.robot = Robot()
+        self.processing = RobotProcessing()
         self.summary: Summary | None = None
         self._mailbox = Mailbox()
         self._network = Network()
@@ -44,6 +46,7 @@ class Session:
             self._following.result()  # it ends only by a mistake of ours, which must not stay unseen
         for event in self._mailbox.drain():
             self.robot.apply(event)
+            self.processing.apply(event)
             if self.summary is None:
                 continue
             if isinstance(event, Telemetry):

@@ -64,7 +64,7 @@ class LinkMonitor:
         self._trips: collections.deque[int] = collections.deque(maxlen=TRIPS)
         self._jitter_ns: float | None = None
         self._transit_ns: int | None = None
-        self._dropped = 0  # by the robot on this link, until now
+        self._dropped: dict[int, int] = {}  # by the robot on this link until now, by stream
         self._link: int | None = None
         self._began_ns: int | None = None
         self._newest_ns: int | None = None
@@ -81,15 +81,16 @@ class LinkMonitor:
         if round_trip_ns is not None:
             self._trips.append(round_trip_ns)
 
-    def take(self, batch: Batch, age_ns: int | None) -> None:
+    def take(self, stream: int, batch: Batch, age_ns: int | None) -> None:
         """A batch came; `age_ns` is how old its newest row was then."""
         if batch.link != self._link:
-            self._link, self._dropped, self._transit_ns = batch.link, 0, None
+            self._link, self._transit_ns = batch.link, None
+            self._dropped.clear()
         second, rows = self._second(batch.received_ns), len(batch.stamps_ns)
         second.rows += rows
         # A notification that never came held about as many rows as this one.
-        second.lost += max(0, batch.dropped - self._dropped) + batch.missed * max(1, rows)
-        self._dropped = batch.dropped
+        second.lost += max(0, batch.dropped - self._dropped.get(stream, 0)) + batch.missed * max(1, rows)
+        self._dropped[stream] = batch.dropped
         if age_ns is not None:
             second.age_ns = max(age_ns, second.age_ns or 0)
         if rows:

@@ -25,8 +25,8 @@ class RobotProcessing:
     def apply(self, event: Event) -> None:
         """Take one fact."""
         match event:
-            case Telemetry(batch=batch, age_ns=age_ns):
-                self.communication.take(batch, age_ns)
+            case Telemetry(batch=batch):
+                self.communication.take(event.stream, batch, event.age_ns)
                 self.component.take(batch.stamps_ns, batch.columns)
             case Resources():
                 self.resource.take(event.snapshot)

@@ -35,6 +35,8 @@ from server_gui.core.events import (
     StopAnswered,
     Telemetry,
 )
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_measures import Gait, LegGait
 from server_gui.core.robot import Robot
 from server_gui.terminal import headless, marks
 from server_gui.terminal.controls import Controls, neighbour, step_of
@@ -94,9 +96,11 @@ def a_robot(at_ns: int = 0) -> Robot:
     return robot
 
 
-def screen(robot: Robot, controls: Controls, size: tuple[int, int] = (118, 27)) -> str:
+def screen(
+    robot: Robot, controls: Controls, size: tuple[int, int] = (118, 27), gait: Gait | None = None
+) -> str:
     console = Console(width=size[0], height=size[1], file=io.StringIO(), record=True, force_terminal=True)
-    console.print(draw(robot, controls, "127.0.0.1:7420", size), height=size[1])
+    console.print(draw(robot, gait or Gait(), controls, "127.0.0.1:7420", size), height=size[1])
     return console.export_text()
 
 
@@ -312,9 +316,20 @@ def test_empty_robot_can_be_drawn() -> None:
 def test_headless_line_has_a_dash_for_what_is_missing() -> None:
     robot = a_robot()
     _feed(robot, {"left_knee.position": [None], "left_insole.force": [300.4]})
-    line = headless.line(robot, 7.0)
+    line = headless.line(robot, Gait(), 7.0)
     assert "joints – °" in line
     assert "feet 300 N" in line
+    assert "– steps/min" in line
+
+
+@pytest.mark.parametrize(
+    ("size", "words"), [((118, 27), "74 steps/min, stance 61 / 58 %"), ((80, 24), "74 steps/min")]
+)
+def test_dashboard_shows_how_the_wearer_walks(size: tuple[int, int], words: str) -> None:
+    legs = {Leg.LEFT: LegGait(stance=0.612), Leg.RIGHT: LegGait(stance=0.58)}
+    robot = a_robot()
+    assert words in screen(robot, Controls(robot, Recorder()), size, Gait(True, 74.2, legs=legs))
+    assert "steps/min" not in screen(robot, Controls(robot, Recorder()), size)
 
 
 def _feed(robot: Robot, columns: dict[str, list[float | None]]) -> None:
