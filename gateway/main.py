@@ -30,6 +30,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
     "collect": ("server_gui.commands.collect:main", "record every robot into the store, without a window"),
+    "sessions": (
+        "server_gui.commands.sessions:main",
+        "recordings: list, look into, export as CSV, Parquet, MCAP",
+    ),
+    "query": ("server_gui.commands.query:main", "SQL over everything recorded"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
     "sim": ("hil_sim.cli.sim:main", "the simulated robot, ready for a gateway; runs scenario files"),
     "sim-fault": ("hil_sim.cli.fault:main", "break something in a simulated robot that runs"),
