@@ -1,0 +1,52 @@
+"""All robots of the window, which one is looked at, and how things are shown."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from server_gui.core.desk.news import News
+from server_gui.core.desk.station import Station
+from server_gui.core.processing.units import Units
+
+
+@dataclass(slots=True)
+class Shown:
+    """How things are shown."""
+
+    units: Units = field(default_factory=Units)
+    revision: int = 0
+
+    def change(self, units: Units) -> None:
+        """Show in other units from now on."""
+        self.units = units
+        self.revision += 1
+
+
+class Desk:
+    """The stations in their order; `selected` is None while there is none."""
+
+    def __init__(self) -> None:
+        self.stations: list[Station] = []
+        self.selected: Station | None = None
+        self.news = News()
+        self.shown = Shown()
+        self.on_select: list[Callable[[Station | None], None]] = []
+
+    def __iter__(self) -> Iterator[Station]:
+        return iter(self.stations)
+
+    def add(self, station: Station) -> None:
+        """Another robot; the first is selected."""
+        self.stations.append(station)
+        if self.selected is None:
+            self.select(station)
+
+    def select(self, station: Station | None) -> None:
+        """Look at another robot. Staged edits belong to their robot and stay with it."""
+        self.selected = station
+        for told in self.on_select:
+            told(station)
+
+    def stop_all(self, reason: str) -> None:
+        """STOP to every robot, one after another without waiting."""
+        for station in self.stations:
+            station.stop(reason)

@@ -1,0 +1,259 @@
+"""One robot at the desk: its state, its past, and what is asked of it. For the window's thread."""
+
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
+from typing import Final
+
+from gateway.client import ConnectionState
+from gateway.messages import Lease, ParameterInfo, ResourceSnapshot, Stopped, Written
+from server_gui.core.desk.answers import Deliver, Result, when_done
+from server_gui.core.desk.commands import Commands
+from server_gui.core.desk.control import Control
+from server_gui.core.desk.edits import Change, Edits
+from server_gui.core.desk.link import LEASE_S
+from server_gui.core.desk.news import News, NewsKind
+from server_gui.core.desk.rings import Rings
+from server_gui.core.desk.stopping import Stopping
+from server_gui.core.desk.watch import Watch
+from server_gui.core.desk.writing import WriteState, Writing
+from server_gui.core.events import Described, Event, Resources, Telemetry
+from server_gui.core.processing.component import ComponentProcessing
+from server_gui.core.processing.resource import ResourceProcessing
+from server_gui.core.processing.units import Units
+from server_gui.core.robot import Robot
+
+WATCH_NS: Final = 200_000_000  # between looks for news
+OVERDUE_S: Final = 2.0  # after a trial's end its values are looked at again
+
+
+class Station:
+    """`take` brings what has come, the others ask; `deliver` brings answers into the window's thread."""
+
+    def __init__(self, name: str, address: str, commands: Commands, deliver: Deliver, news: News) -> None:
+        self.name = name
+        self.address = address
+        self.robot = Robot()
+        self.rings = Rings()
+        self.components = ComponentProcessing()
+        self.computer = ResourceProcessing()
+        self.processes: ResourceSnapshot | None = None  # the newest look with a process table
+        self.processes_at_ns: int | None = None
+        self.stopping = Stopping()
+        self.control = Control()
+        self.edits = Edits()
+        self.writing = Writing()
+        self._commands = commands
+        self._deliver = deliver
+        self._news = news
+        self._watch = Watch(self.tell)
+        self._watched_ns = 0
+        self._boot_id: str | None = None
+
+    @property
+    def title(self) -> str:
+        """What the robot calls itself, or what we call it while it has not spoken."""
+        return self.robot.description.robot if self.robot.description is not None else self.name
+
+    @property
+    def known(self) -> dict[str, ParameterInfo]:
+        """The parameters that can be changed, in the robot's order."""
+        found = self.robot.description.parameters if self.robot.description is not None else []
+        return {info.name: info for info in found if info.read_only is None}
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether there is a link now."""
+        return self.robot.link.state is ConnectionState.CONNECTED
+
+    def tell(self, kind: NewsKind, text: str) -> None:
+        """Note something about this robot."""
+        self._news.add(kind, self.title, text)
+
+    # --- what has come
+
+    def take(self, events: Iterable[Event]) -> None:
+        """Apply what has come, and look for what is new."""
+        for event in events:
+            self.robot.apply(event)
+            match event:
+                case Telemetry():
+                    self._telemetry(event)
+                case Described():
+                    self._described(event)
+                case Resources():
+                    self._resources(event)
+        now_ns = time.monotonic_ns()
+        if now_ns - self._watched_ns >= WATCH_NS:
+            self._watched_ns = now_ns
+            self._watch.look(self.robot)
+            self._end_trial_if_over(now_ns)
+
+    def _telemetry(self, event: Telemetry) -> None:
+        self.rings.take(event.batch.stamps_ns, event.batch.columns)
+        self.components.take(event.batch.stamps_ns, event.batch.columns)
+
+    def _described(self, event: Described) -> None:
+        description = event.description
+        if self._boot_id not in (None, description.boot_id):
+            self.rings.clear()
+            self.components.restart()
+            self.tell(NewsKind.STATE, "the robot's computer has started anew")
+        self._boot_id = description.boot_id
+        self.stopping.held = description.stop.held
+        gone = self.edits.vanished(self.known)
+        if gone:
+            self.tell(NewsKind.WARNING, f"staged edits dropped, the robot no longer has {', '.join(gone)}")
+
+    def _resources(self, event: Resources) -> None:
+        if isinstance(event.snapshot.processes, list):
+            self.processes, self.processes_at_ns = event.snapshot, event.at_ns
+        self.computer.take(event.snapshot)
+
+    # --- STOP and reset
+
+    def stop(self, reason: str) -> None:
+        """Quick stop on every drive: first of all it is sent."""
+        future = self._commands.stop(reason)
+        number = self.stopping.sent()
+        when_done(
+            future,
+            self._deliver,
+            lambda stopped: self._stopped(number, stopped),
+            lambda error: self._stop_failed(number, error),
+        )
+
+    def _stopped(self, number: int, stopped: Stopped) -> None:
+        self.stopping.answered(number, stopped)
+        self.tell(NewsKind.STOP, self.stopping.text)
+
+    def _stop_failed(self, number: int, error: Exception) -> None:
+        self.stopping.failed(number, str(error))
+        self.tell(NewsKind.STOP, self.stopping.text)
+
+    def reset(self) -> None:
+        """End a held stop; enables nothing."""
+
+        def done(held: bool, problems: dict[str, str]) -> None:
+            self.stopping.was_reset(held)
+            said = "; ".join(f"{name}: {why}" for name, why in problems.items())
+            self.tell(NewsKind.STOP, f"stop still held: {said}" if held else "stop reset, every drive is off")
+
+        self._ask(
+            self._commands.reset(),
+            lambda reset: done(reset.held, reset.problems),
+            "reset",
+        )
+
+    # --- the lease
+
+    def take_control(self) -> None:
+        """Become the one writer."""
+        self.control.asked()
+        when_done(self._commands.take_control(), self._deliver, self._control_taken, self._control_refused)
+
+    def release_control(self) -> None:
+        """Let others write; a trial goes back with it."""
+        self._ask(self._commands.release_control(), lambda _: self._control_gone(), "release")
+
+    def lost_control(self) -> None:
+        """The link that held the lease has dropped."""
+        if self.control.until_ns is not None:
+            self.tell(NewsKind.CONTROL, "control lost with the link")
+        self._control_gone()
+
+    def _control_taken(self, lease: Lease) -> None:
+        self.control.taken(lease)
+        self.tell(NewsKind.CONTROL, "this window has control")
+
+    def _control_refused(self, error: Exception) -> None:
+        self.control.refused(str(error))
+        self.tell(NewsKind.CONTROL, str(error))
+
+    def _control_gone(self) -> None:
+        self.control.gone()
+        if self.writing.trial is not None:
+            self.writing.reverted("the trial went back with control")
+
+    # --- parameters
+
+    def difference(self, units: Units) -> tuple[Change, ...]:
+        """What would be written."""
+        return self.edits.difference(self.robot.parameters, self.known, units)
+
+    def write(self, changes: tuple[Change, ...], trial_s: float | None = None) -> None:
+        """Write exactly these changes in one transaction."""
+        self.writing.began(changes)
+        future = self._commands.write({change.name: change.new for change in changes}, trial_s)
+        when_done(
+            future,
+            self._deliver,
+            lambda written: self._written(changes, written),
+            lambda error: self._write_failed(changes, error),
+        )
+
+    def _written(self, changes: tuple[Change, ...], written: Written) -> None:
+        self.control.renewed(LEASE_S)
+        self.writing.done(written)
+        self.edits.drop(*(change.name for change in changes))
+        self.tell(NewsKind.PARAMETER, ", ".join(_line(change, written) for change in changes))
+
+    def _write_failed(self, changes: tuple[Change, ...], error: Exception) -> None:
+        self.writing.failed(changes, error)
+        self.tell(NewsKind.PARAMETER, f"{self.writing.state.value}: {error}")
+
+    def keep_trial(self) -> None:
+        """Make what is on trial stay."""
+        if self.writing.trial is not None:
+            self._ask(self._commands.confirm(self.writing.trial.write), lambda _: self._kept(), "keep")
+
+    def end_trial(self) -> None:
+        """Take back what is on trial, now."""
+        if self.writing.trial is not None:
+            self._ask(self._commands.revert(self.writing.trial.write), lambda _: self._taken_back(), "revert")
+
+    def stage_undo(self) -> None:
+        """Stage the inverse of the latest write, to be reviewed and written like any edit."""
+        if self.writing.undo:
+            for name, value in self.writing.undo.pop().items():
+                self.edits.stage(name, value, self.robot.parameters.get(name))
+
+    def _kept(self) -> None:
+        self.writing.kept()
+        self.tell(NewsKind.PARAMETER, self.writing.text)
+
+    def _taken_back(self, how: str = "taken back: the values from before are in force") -> None:
+        self.writing.reverted(how)
+        self.tell(NewsKind.PARAMETER, how)
+
+    def _end_trial_if_over(self, now_ns: int) -> None:
+        trial = self.writing.trial
+        if trial is None or now_ns - trial.until_ns < OVERDUE_S * 1e9:
+            return
+        held = self.robot.parameters
+        back = all(name in held and held[name].value == value for name, value in trial.before.items())
+        if back:
+            self._taken_back("the trial's time is over: the robot has taken it back")
+        else:
+            self.writing.trial = None
+            self.writing.say(
+                WriteState.UNKNOWN, "the trial's time is over, but other values are held: look at them"
+            )
+            self.tell(NewsKind.WARNING, self.writing.text)
+
+    # --- the rest
+
+    def show_processes(self, wanted: bool) -> None:
+        """Ask for the process table from now on, or no more."""
+        self._commands.show_processes(wanted)
+
+    def _ask(self, future: "Future[Result]", done: Callable[[Result], None], what: str) -> None:
+        when_done(future, self._deliver, done, lambda error: self.tell(NewsKind.WARNING, f"{what}: {error}"))
+
+
+def _line(change: Change, written: Written) -> str:
+    before, after = written.before.get(change.name), written.after.get(change.name)
+    unit = change.unit
+    old = "?" if before is None else unit.editable(before)
+    new = "?" if after is None else unit.editable(after)
+    return f"{change.name} {old} → {new} {unit.symbol}".rstrip()

@@ -1,0 +1,50 @@
+"""Where each leg is in its stride, from the gait events."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from server_gui.core.processing.component import Derived
+from server_gui.core.processing.gait_events import EventKind, GaitEvent, Leg
+
+# Phases of a stride and where each ends, in % from heel strike: Perry & Burnfield, Gait Analysis, 2nd ed.
+PHASES: Final[tuple[tuple[str, float], ...]] = (
+    ("loading response", 12.0),
+    ("mid-stance", 31.0),
+    ("terminal stance", 50.0),
+    ("pre-swing", 62.0),
+    ("initial swing", 75.0),
+    ("mid-swing", 87.0),
+    ("terminal swing", 100.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LegPhase:
+    """One leg now: `percent` of its stride since heel strike, 0–100."""
+
+    percent: float
+    phase: str
+
+
+def leg_phase(derived: Derived, leg: Leg, now_ns: int) -> LegPhase | None:
+    """Where a leg is at `now_ns` on the robot's clock; None where nobody walks, or no stride is known yet."""
+    stride_s = derived.gait.legs[leg].stride_s
+    strike = _newest_strike(derived.events, leg)
+    if not derived.gait.walking or stride_s is None or strike is None:
+        return None
+    percent = min(max((now_ns - strike.stamp_ns) / 1e9 / stride_s * 100.0, 0.0), 100.0)
+    return LegPhase(percent, phase_at(percent))
+
+
+def phase_at(percent: float) -> str:
+    """The phase's name at a percentage of the stride."""
+    return next((name for name, end in PHASES if percent < end), PHASES[-1][0])
+
+
+def _newest_strike(events: Iterable[GaitEvent], leg: Leg) -> GaitEvent | None:
+    found = None
+    for event in events:
+        if event.leg is leg and event.kind is EventKind.HEEL_STRIKE:
+            found = event
+    return found
