@@ -101,13 +101,13 @@ class PressureEvents:
     def _remember(self, stamp_ns: int, force: float) -> None:
         """Extremes of the last seconds, by which lost thresholds are found again."""
         if stamp_ns >= self._block_ends_ns or not self._blocks:
-            self._find_again()
+            self._find_again(force)
             self._blocks.append([force, force])
             self._block_ends_ns = stamp_ns + BLOCK_NS
         block = self._blocks[-1]
         block[0], block[1] = min(block[0], force), max(block[1], force)
 
-    def _find_again(self) -> None:
+    def _find_again(self, force: float) -> None:
         """Where drift has left the thresholds outside of what a stepping foot shows, follow the foot."""
         if len(self._blocks) < BLOCKS:
             return
@@ -116,3 +116,4 @@ class PressureEvents:
         unloaded = [block[1] < low + (high - low) / 4 for block in self._blocks]
         if outside and high - low > self._peak / 2 and sum(b > a for a, b in pairwise(unloaded)) >= 2:
             self._floor = low
+            self._begin(force)

@@ -1,0 +1,1 @@
+"""Processing: gait, units, resources and the link."""
