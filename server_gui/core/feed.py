@@ -18,6 +18,7 @@ from gateway.client import (
     LinkLost,
     LinkSettings,
     NotConnected,
+    ProtocolError,
     RemoteError,
 )
 from gateway.client.backoff import Backoff
@@ -166,6 +167,8 @@ class Feed:
     async def _journal(self) -> None:
         """Tell the newest entries when there are new ones, without a hole as far as the robot has them."""
         journal = await self._client.journal()
+        if any(not isinstance(entry.get("n"), int) or "hash" not in entry for entry in journal.entries):
+            raise ProtocolError("the robot's journal has entries without a number or a hash")
         if journal.entries and journal.entries[0]["n"] > self._newest_entry["n"] + 1:
             journal = await self._client.journal(WHOLE_JOURNAL)
         if journal.entries and journal.entries[-1] != self._newest_entry:
@@ -177,7 +180,7 @@ class Feed:
             wait_s = period_s
             try:
                 await look()
-            except (RemoteError, CallTimeout) as error:
+            except (RemoteError, CallTimeout, ProtocolError) as error:
                 self._tell(Failed("a look at the robot", str(error)))
                 wait_s = min(period_s, AGAIN_S)
             await asyncio.sleep(wait_s)

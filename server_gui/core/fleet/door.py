@@ -41,8 +41,9 @@ async def door(folder: Path, answers: Answers) -> AsyncIterator[None]:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     with _short(folder) as name:
         listener.bind(name)
-    server = await asyncio.start_unix_server(serve, sock=listener)
+    server = await asyncio.start_unix_server(serve, sock=listener, start_serving=False)
     try:
+        await server.start_serving()
         yield
     finally:
         server.close()

@@ -195,3 +195,40 @@ def until(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < deadline_s, "it did not happen"
         time.sleep(0.01)
+
+
+def test_an_uploader_is_emptied_at_the_end_whatever_is_wanted(spool: Spool, folder_url: str) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+    with Uploader(spool, lambda: Store(folder_url), lambda: False) as uploader:
+        assert uploader.drain(WAIT_S)
+        assert spool.waiting() == []
+        assert uploader.drain(0.0)
+
+
+def test_emptying_a_spool_ends_when_the_store_cannot_be_reached(spool: Spool) -> None:
+    def connect() -> Store:
+        raise StoreUnreachable("no network")
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+    with Uploader(spool, connect) as uploader:
+        assert not uploader.drain(WAIT_S)
+        assert spool.waiting() == [1]
+
+
+def test_what_a_library_raises_is_no_end_and_quotes_nothing(spool: Spool, folder_url: str) -> None:
+    raised = threading.Event()
+
+    def connect() -> Store:
+        if not raised.is_set():
+            raised.set()
+            raise RuntimeError("the key is 0123456789")
+        return Store(folder_url)
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+    with Uploader(spool, connect) as uploader:
+        until(lambda: uploader.state.problem == "internal error, RuntimeError")
+        uploader.now()
+        until(lambda: uploader.state.uploaded == 1)

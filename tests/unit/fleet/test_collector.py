@@ -1,0 +1,151 @@
+"""The collector as a whole: it records, answers, uploads when it may, and ends in bounded time."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from ml.store import Store
+from ml.store.tables import TELEMETRY
+from server_gui.core.fleet import collector as module
+from server_gui.core.fleet.collector import Collector, CollectorReport
+from server_gui.core.fleet.door import NobodyCollects, ask
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.spool import Spool
+from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings, Upload
+from tests.fake_robot import FakeRobot
+
+WAIT_S = 30.0
+
+
+@pytest.fixture
+def robot() -> Iterator[FakeRobot]:
+    with FakeRobot() as robot:
+        yield robot
+
+
+@pytest.fixture
+def settings(robot: FakeRobot, tmp_path: Path, folder_url: str) -> ServerSettings:
+    return ServerSettings(
+        {"exo-fake": RobotSettings(robot.address)},
+        StoreSettings(folder_url),
+        RecordingSettings(spool=tmp_path / "spool", batch_s=1.0, resources_s=0.1),
+    )
+
+
+def upload(settings: ServerSettings, when: Upload) -> ServerSettings:
+    return msgspec.structs.replace(settings, recorder=msgspec.structs.replace(settings.recorder, upload=when))
+
+
+def report(settings: ServerSettings) -> CollectorReport:
+    return msgspec.json.decode(ask(settings.recorder.spool, "status"), type=CollectorReport)
+
+
+def until(collector: Collector, condition: Callable[[], object]) -> None:
+    deadline_s = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < deadline_s
+        collector.wait(0.01)
+
+
+def answers(settings: ServerSettings) -> bool:
+    try:
+        return bool(ask(settings.recorder.spool, "status"))
+    except NobodyCollects:
+        return False
+
+
+def rows(settings: ServerSettings) -> int:
+    return report(settings).robots["exo-fake"].rows
+
+
+def test_what_was_recorded_is_in_the_store_when_it_has_ended(settings: ServerSettings) -> None:
+    with Collector(settings, "Ada", "a try") as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: rows(settings) > 20)
+        told = report(settings)
+    assert not collector.hangs
+    store = Store(settings.store.url)
+    assert store.dataset(TELEMETRY.location("exo-fake", 1)).count_rows() >= told.robots["exo-fake"].rows
+    assert store.dataset("sessions").to_table(columns=["operator"])["operator"].to_pylist()[-1] == "Ada"
+    assert store.dataset("resources").count_rows() > 0
+    assert (told.recorder.lost, told.uploader.problem, told.upload) == (0, None, Upload.ALWAYS)
+    with Spool(settings.recorder.spool) as spool:
+        assert spool.waiting() == []
+
+
+def test_a_second_collector_on_one_spool_is_refused(settings: ServerSettings) -> None:
+    with (
+        Collector(settings),
+        pytest.raises(SpoolUnusable, match=r"another server records into .* end it first"),
+    ):
+        Collector(settings)
+
+
+def test_by_hand_means_when_somebody_asks(settings: ServerSettings) -> None:
+    settings = upload(settings, Upload.MANUAL)
+    with Collector(settings) as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: report(settings).uploader.waiting)
+        assert report(settings).uploader.uploaded == 0
+        assert int(ask(settings.recorder.spool, "upload")) >= 1
+        until(collector, lambda: report(settings).uploader.uploaded)
+    with Spool(settings.recorder.spool) as spool:
+        assert spool.waiting()  # the last batch waits for somebody too
+
+
+def test_idle_means_while_no_robot_sends(
+    settings: ServerSettings, robot: FakeRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "QUIET_S", 3.0)
+    settings = upload(settings, Upload.IDLE)
+    with Collector(settings) as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: report(settings).uploader.waiting)
+        assert not collector._wanted()
+        robot.frozen = True
+        until(collector, collector._wanted)
+        until(collector, lambda: report(settings).uploader.uploaded)
+
+
+def test_idle_does_not_wait_for_ever(settings: ServerSettings, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_BACKLOG_BYTES", 0)
+    settings = upload(settings, Upload.IDLE)
+    with Collector(settings) as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: report(settings).uploader.uploaded)
+
+
+def test_an_upload_that_hangs_does_not_keep_it_from_ending(
+    settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hanging, let_go = threading.Event(), threading.Event()
+
+    def connect(store: StoreSettings) -> Store:
+        hanging.set()
+        let_go.wait(WAIT_S)
+        return Store(store.url)
+
+    monkeypatch.setattr(module, "connect", connect)
+    monkeypatch.setattr(module, "LAST_UPLOAD_S", 0.1)
+    monkeypatch.setattr(module, "BREAK_OFF_S", 0.1)
+    with Collector(settings) as collector:
+        until(collector, hanging.is_set)
+    assert collector.hangs
+    let_go.set()
+    assert collector._uploader.close(WAIT_S)
+    with Spool(settings.recorder.spool) as spool:
+        assert spool.waiting()
+
+
+def test_a_robot_that_is_off_keeps_nothing_from_working(settings: ServerSettings, robot: FakeRobot) -> None:
+    robots = {**settings.robots, "exo-off": RobotSettings("127.0.0.1:1")}
+    settings = msgspec.structs.replace(settings, robots=robots)
+    with Collector(settings) as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: rows(settings) > 5)
+        until(collector, lambda: report(settings).robots["exo-off"].problem)
+        assert "no gateway at 127.0.0.1:1" in str(report(settings).robots["exo-off"].problem)

@@ -1,0 +1,91 @@
+"""`gwrms collect` as a command: what it refuses, what it says, and that it needs no window."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gateway import main
+from gateway.client import Address
+from server_gui.commands.collect import status_text
+from server_gui.core.fleet.collector import CollectorReport
+from server_gui.core.fleet.statistics import LinkStatistics
+from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
+from server_gui.core.recording.uploader import UploaderState
+from server_gui.core.settings import Upload
+
+HEAVY = ("PySide6", "pyqtgraph", "sklearn", "duckdb")
+
+
+@pytest.fixture(autouse=True)
+def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--robot", "exo-01"], "'exo-01' is not NAME=HOST:PORT"),
+        (["--status", "--upload"], "not allowed with"),
+        (["now"], "unrecognized arguments"),
+    ],
+)
+def test_wrong_usage_is_2(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main.main(["collect", *arguments])
+    assert ended.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "no robot is named: write it into [robots] of"),
+        (["--robot", "a=:1", "--robot", "b=:1"], "[robots] b: 127.0.0.1:1 is a already"),
+        (["--config", "nowhere.toml"], "nowhere.toml: is not there"),
+        (["--status"], "no collector runs on the spool"),
+        (["--upload"], "no collector runs on the spool"),
+    ],
+)
+def test_what_cannot_be_done_is_a_sentence_and_1(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main.main(["collect", *arguments]) == 1
+    said = capsys.readouterr()
+    assert words in said.err
+    assert said.out == ""
+
+
+def test_nothing_that_a_window_needs_is_imported() -> None:
+    script = f"import sys, server_gui.commands.collect; print([n for n in {HEAVY} if n in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_a_status_says_what_people_ask_first() -> None:
+    alarm = Alarm(AlarmKind.DISK_FULL, "recording has stopped: the disk of /spool is nearly full")
+    report = CollectorReport(
+        version="1.0",
+        pid=5,
+        began_utc_s=1.0,
+        spool="/spool",
+        store="s3://bucket/prefix",
+        upload=Upload.IDLE,
+        robots={"exo-01": LinkStatistics(Address("192.0.2.7")).report("")},
+        recorder=RecorderState(12, 3, 4, 0.01, (alarm,)),
+        uploader=UploaderState(2, 7, 5 << 20, 0.5, "no network"),
+    )
+    text = status_text(report)
+    for words in (
+        "12 rows",
+        "4 lost",
+        "ALARM  recording has stopped",
+        "ALARM  no network",
+        "2 batches uploaded, 7 wait (upload = idle)",
+        "5.0 MiB",
+        "192.0.2.7:7420",
+        "idle",
+    ):
+        assert words in text
