@@ -1,7 +1,11 @@
 """Small objects of the store beside its tables, and how S3 is reached."""
 
 import configparser
+import itertools
 import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +17,7 @@ from ml.store.errors import translated
 
 CONNECT_TIMEOUT_S: Final = 5
 TIMEOUT_S: Final = 60
+PIECE_BYTES: Final = 8 << 20
 _CLIENT: Final = ("connect_timeout", "timeout", "allow_http")
 RETRIES: Final = 3  # within one request; who calls us tries again later, with patience
 _PROFILE: Final = {  # what a profile's lines are called in the libraries
@@ -24,8 +29,18 @@ _PROFILE: Final = {  # what a profile's lines are called in the libraries
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Object:
+    """An object as a listing shows it; `tag` is the service's entity tag."""
+
+    path: str
+    size_bytes: int
+    changed: datetime
+    tag: str
+
+
 class Objects:
-    """Whole objects under a URL, read and written at once."""
+    """Objects under a URL: small ones read and written at once, large ones piece by piece."""
 
     def __init__(self, url: str) -> None:
         self.url = url
@@ -53,6 +68,27 @@ class Objects:
         """Every object below a folder."""
         with translated(f"{self.url}/{folder} cannot be listed"):
             return sorted(found["path"] for chunk in obstore.list(self._objects, folder) for found in chunk)
+
+    def listing(self, folder: str = "") -> Iterator[Object]:
+        """Every object below a folder, in no order."""
+        with translated(f"{self.url}/{folder} cannot be listed"):
+            for found in itertools.chain.from_iterable(obstore.list(self._objects, folder or None)):
+                tag = (found["e_tag"] or "").strip('"')
+                yield Object(found["path"], found["size"], found["last_modified"], tag)
+
+    def pieces(self, found: Object, offset: int = 0) -> Iterator[bytes]:
+        """An object's content from a byte on, a request a piece: a slow network carries that in time."""
+        for start in range(offset, found.size_bytes, PIECE_BYTES):
+            end = min(start + PIECE_BYTES, found.size_bytes)
+            with translated(f"{self.url}/{found.path} cannot be read"):
+                piece = bytes(obstore.get_range(self._objects, found.path, start=start, end=end))
+            yield piece
+
+    def write(self, path: str, pieces: Iterable[bytes]) -> str:
+        """Write an object, whole or not at all, over what is there; the service's entity tag."""
+        with translated(f"{self.url}/{path} cannot be written"):
+            done = obstore.put(self._objects, path, iter(pieces), chunk_size=PIECE_BYTES)
+            return (done["e_tag"] or "").strip('"')
 
     def remove(self, path: str) -> None:
         """Delete an object, if it is there."""

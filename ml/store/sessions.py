@@ -13,7 +13,6 @@ import pyarrow.parquet as pq
 
 from ml.store import reading
 from ml.store.errors import StoreError, translated
-from ml.store.files import filesystem
 from ml.store.reading import DataFile
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
@@ -161,7 +160,7 @@ def footer(store: Store, file: DataFile) -> pq.FileMetaData:
     """What the file says of itself; raises `StoreError` where it is not there or damaged."""
     with (
         translated(f"{store.url}/{file.location}/{file.path} cannot be read"),
-        filesystem(f"{store.url}/{file.location}").open_input_file(file.path) as opened,
+        store.files.open_input_file(f"{file.location}/{file.path}") as opened,
     ):
         return pq.read_metadata(opened)
 

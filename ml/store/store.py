@@ -1,5 +1,6 @@
 """A store by its URL: tables that are appended to exactly once, by several servers at a time."""
 
+import functools
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,7 @@ from deltalake import (
     write_deltalake,
 )
 from deltalake.exceptions import CommitFailedError
+from pyarrow.fs import FileSystem, SubTreeFileSystem
 
 from ml.store import durable
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
@@ -120,6 +122,31 @@ class Store:
             f"{self.url}/{location} cannot be written: {ATTEMPTS} times another writer was faster"
         )
 
+    def replace(self, table: Table, location: str, rows: pa.RecordBatchReader, where: str) -> None:
+        """Put these rows in the place of those that meet the condition, all at once.
+
+        Raises:
+            StoreError: it is not known whether that was done; repeat it.
+
+        """
+        with translated(f"{self.url}/{location} cannot be written"):
+            delta = self._writable(table, location)
+            write_deltalake(
+                delta,
+                rows,
+                mode="overwrite",
+                predicate=where,
+                schema_mode="merge",
+                writer_properties=writer_properties(rows.schema),
+                post_commithook_properties=NO_HOOKS,
+            )
+
+    @functools.cached_property
+    def files(self) -> FileSystem:
+        """The store's files, for Arrow; for any thread."""
+        with translated(f"the store {self.url} cannot be opened"):
+            return filesystem(self.url)
+
     def table(self, location: str, version: int | None = None) -> DeltaTable:
         """The table as it is now, or was at `version`.
 
@@ -134,7 +161,7 @@ class Store:
         """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
         delta = self.table(location, version)
         with translated(f"{self.url}/{location}"):
-            return delta.to_pyarrow_dataset(filesystem=filesystem(self._uri(location)))
+            return delta.to_pyarrow_dataset(filesystem=SubTreeFileSystem(location, self.files))
 
     def units(self, location: str) -> dict[str, str | None]:
         """Each column's unit, None where none was given; nothing where there is no table yet."""

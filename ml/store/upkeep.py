@@ -1,7 +1,8 @@
 """Keeping a store in order: small files become few, old rows go, what a model names stays."""
 
 import hashlib
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Final
@@ -9,10 +10,11 @@ from urllib.parse import unquote
 
 import msgspec
 import pyarrow as pa
+import pyarrow.dataset
 from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError
 
-from ml.store import durable
+from ml.store import durable, reading
 from ml.store.errors import NoSuchTable, StoreError, translated
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table
@@ -59,13 +61,22 @@ def pins(store: Store) -> list[Pin]:
     return [msgspec.json.decode(data, type=Pin) for data in found if data is not None]
 
 
-def compact(store: Store, tables: Sequence[Table] = tuple(TABLES.values())) -> list[Compacted]:
-    """Put small files together; nothing that is written meanwhile is disturbed, and old versions stay."""
+def compact(
+    store: Store, tables: Sequence[Table] = tuple(TABLES.values()), *, dry_run: bool = False
+) -> list[Compacted]:
+    """Put small files together; nothing that is written meanwhile is disturbed, and old versions stay.
+
+    With `dry_run` nothing is done; what is told is about what would be.
+    """
+    if dry_run:
+        return [found for table in tables for found in _compactable(store, table)]
     return [_compact(store, location) for location in _locations(store, tables)]
 
 
-def retain(store: Store, tables: Sequence[Table], before: datetime) -> dict[str, int]:
-    """Remove rows older than `before` (with a time zone); how many went, by location.
+def retain(
+    store: Store, tables: Sequence[Table], before: datetime, *, dry_run: bool = False
+) -> dict[str, int]:
+    """Remove rows older than `before` (with a time zone); how many went, or would go, by location.
 
     They stay readable in old versions until `vacuum`.
     """
@@ -74,6 +85,11 @@ def retain(store: Store, tables: Sequence[Table], before: datetime) -> dict[str,
     went: dict[str, int] = {}
     for location in _locations(store, tables):
         with translated(f"{store.url}/{location} cannot be changed"):
+            if dry_run:
+                went[location] = store.dataset(location).count_rows(
+                    filter=pyarrow.dataset.field("utc") < before
+                )
+                continue
             delta = store.table(location)
             found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
             _make_last(store, location, delta)
@@ -82,7 +98,11 @@ def retain(store: Store, tables: Sequence[Table], before: datetime) -> dict[str,
 
 
 def vacuum(
-    store: Store, tables: Sequence[Table] = tuple(TABLES.values()), grace: timedelta = GRACE
+    store: Store,
+    tables: Sequence[Table] = tuple(TABLES.values()),
+    grace: timedelta = GRACE,
+    *,
+    dry_run: bool = False,
 ) -> list[str]:
     """Delete files that no version newer than `grace` needs, nor one that is pinned; their names."""
     kept: dict[str, list[int]] = {}
@@ -91,14 +111,29 @@ def vacuum(
     gone: list[str] = []
     for location in _locations(store, tables):
         with translated(f"{store.url}/{location} cannot be cleaned"):
-            gone += store.table(location).vacuum(
+            found = store.table(location).vacuum(
                 retention_hours=int(grace / timedelta(hours=1)),
                 enforce_retention_duration=False,
-                dry_run=False,
+                dry_run=dry_run,
                 keep_versions=sorted(kept.get(location, [])) or None,
                 post_commithook_properties=NO_HOOKS,
             )
+            gone += [f"{location}/{unquote(name)}" for name in found]
     return gone
+
+
+def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
+    """How many files each of the table's locations has, and would have."""
+    small: dict[str, dict[tuple[str | None, str | None], list[int]]] = {}
+    counts: Counter[str] = Counter()
+    for file in reading.files(store, table):
+        counts[file.location] += 1
+        if file.size_bytes < TARGET_BYTES:
+            partitions = small.setdefault(file.location, {})
+            partitions.setdefault((file.robot, file.session), []).append(file.size_bytes)
+    for location, count in counts.items():
+        spared = (len(sizes) - -(-sum(sizes) // TARGET_BYTES) for sizes in small.get(location, {}).values())
+        yield Compacted(location, count, count - sum(spared))
 
 
 def _compact(store: Store, location: str) -> Compacted:

@@ -1,5 +1,6 @@
 """One frozen segment into the store, exactly once, whatever happened before."""
 
+import contextlib
 import functools
 from collections import defaultdict
 from collections.abc import Iterator
@@ -11,6 +12,14 @@ from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.segment import Segment
+from server_gui.core.recording.spool import Spool
+
+
+def send(spool: Spool, number: int, store: Store) -> None:
+    """Bring a frozen segment of the spool into the store, and tell the spool; raises as `upload` does."""
+    with contextlib.closing(spool.read(number)) as segment:
+        upload(segment, spool.id, store)
+    spool.uploaded(number)
 
 
 def upload(segment: Segment, spool: str, store: Store) -> None:

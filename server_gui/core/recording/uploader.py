@@ -13,7 +13,7 @@ from ml.store.errors import StoreError
 from ml.store.store import Store
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import upload
+from server_gui.core.recording.upload import send
 
 log = logging.getLogger(__name__)
 
@@ -127,12 +127,7 @@ class Uploader:
     def _upload(self, number: int) -> None:
         began_s = time.monotonic()
         self._store = self._store or self._connect()
-        segment = self._spool.read(number)
-        try:
-            upload(segment, self._spool.id, self._store)
-        finally:
-            segment.close()
-        self._spool.uploaded(number)
+        send(self._spool, number, self._store)
         took_s = time.monotonic() - began_s
         self.state = replace(self.state, uploaded=self.state.uploaded + 1, upload_s=took_s, problem=None)
 

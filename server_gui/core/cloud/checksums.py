@@ -1,0 +1,54 @@
+"""Whether what arrived is what was sent: MD5 against the entity tag that an S3 service gives."""
+
+import hashlib
+import re
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from ml.store.errors import StoreError
+from ml.store.objects import Object, Objects
+
+_PLAIN: Final = re.compile(r"[0-9a-f]{32}")
+
+
+class Digest:
+    """Of an object's pieces: what a service would call it that got it in one go, or in these pieces."""
+
+    def __init__(self) -> None:
+        self._whole = hashlib.md5(usedforsecurity=False)
+        self._pieces = hashlib.md5(usedforsecurity=False)
+        self._count = 0
+
+    def of(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
+        """The same pieces, counted in."""
+        for piece in pieces:
+            self._whole.update(piece)
+            self._pieces.update(hashlib.md5(piece, usedforsecurity=False).digest())
+            self._count += 1
+            yield piece
+
+    @property
+    def tags(self) -> tuple[str, str]:
+        """Entity tags as S3 makes them."""
+        return self._whole.hexdigest(), f"{self._pieces.hexdigest()}-{self._count}"
+
+
+def proven(objects: Objects, found: Object, digest: Digest) -> bool:
+    """Whether the object's content is proven to be what was read or written; False: its size alone is.
+
+    A tag that is an MD5 but another one may be of a service that encrypts; then the object is read again.
+
+    Raises:
+        StoreError: it is not the same.
+
+    """
+    if found.tag in digest.tags:
+        return True
+    if not _PLAIN.fullmatch(found.tag):
+        return False
+    again = Digest()
+    for _ in again.of(objects.pieces(found)):
+        pass
+    if again.tags != digest.tags:
+        raise StoreError(f"{objects.url}/{found.path} was altered on its way; try again")
+    return True

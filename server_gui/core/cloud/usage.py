@@ -1,0 +1,59 @@
+"""What a store holds: its tables, and who takes how much of it."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
+
+from ml.store import reading
+from ml.store.objects import Object
+from ml.store.reading import DataFile
+from ml.store.store import Store
+from ml.store.tables import TABLES
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """A table's, or a robot's in it, in the newest version; `robot` is None where rows are not kept apart."""
+
+    table: str
+    robot: str | None
+    files: int
+    rows: int
+    size_bytes: int
+    first: datetime | None
+    last: datetime | None
+
+
+def by_table(store: Store) -> list[Usage]:
+    """Each table that something was written to."""
+    found = {name: list(reading.files(store, table)) for name, table in TABLES.items()}
+    return [_usage(name, None, files) for name, files in found.items() if files]
+
+
+def by_robot(store: Store) -> Iterator[Usage]:
+    """Each table's robots, where they have files of their own."""
+    for name, table in TABLES.items():
+        files: dict[str | None, list[DataFile]] = defaultdict(list)
+        for file in reading.files(store, table):
+            files[file.robot].append(file)
+        for robot, of_robot in sorted(files.items(), key=str):
+            yield _usage(name, robot, of_robot)
+
+
+def below(store: Store, prefix: str) -> list[Object]:
+    """Every object there."""
+    return sorted(store.objects.listing(prefix), key=lambda found: found.path)
+
+
+def _usage(table: str, robot: str | None, files: Iterable[DataFile]) -> Usage:
+    files = list(files)
+    return Usage(
+        table,
+        robot,
+        len(files),
+        sum(file.rows for file in files),
+        sum(file.size_bytes for file in files),
+        min((file.first for file in files if file.first), default=None),
+        max((file.last for file in files if file.last), default=None),
+    )
