@@ -107,11 +107,15 @@ def find(store: Store, name: str, robot: str | None = None) -> Session:
         NoSuchSession: none, or several do.
 
     """
-    known = sessions(store, robot)
+    return among(sessions(store, robot), name, store.url)
+
+
+def among(known: Sequence[Session], name: str, where: str) -> Session:
+    """The one of these whose name is this, or alone begins so; raises as `find`."""
     exactly = [session for session in known if session.session == name]
     found = exactly or [session for session in known if session.session.startswith(name)]
     if not found:
-        raise NoSuchSession(f"{store.url} has no session {name!r} (gwrms sessions ls lists them)")
+        raise NoSuchSession(f"{where} has no session {name!r} (gwrms sessions ls lists them)")
     if len(found) > 1:
         names = ", ".join(f"{session.session} of {session.robot}" for session in found[:5])
         raise NoSuchSession(f"{len(found)} sessions begin with {name!r}: {names}; give more of the name")
