@@ -17,13 +17,24 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from hil_sim.gait.activity import Activity
+from hil_sim.gait.timetable import Entry
 from server_gui.core.processing.component import ComponentProcessing
 from server_gui.core.processing.foot_imu_events import FootImuEvents
 from server_gui.core.processing.gait_events import EventKind, GaitEvent, Leg
 from server_gui.core.processing.recording import summarise
 from tests.unit.processing.scoring import Score, matched
-from tests.unit.processing.walks import FORCES, Walk, kind_of, record, tour
+from tests.unit.processing.walks import FORCES, Walk, kind_of, record
 
+GAITS = (
+    Activity.WALK,
+    Activity.STAIRS_UP,
+    Activity.STAIRS_DOWN,
+    Activity.RAMP_UP,
+    Activity.RAMP_DOWN,
+    Activity.TURN_LEFT,
+    Activity.TURN_RIGHT,
+)
 EACH_S, SECONDS = 15.0, 124.0
 PEOPLE = (0, 3, 6)
 LEAST_F1 = 0.98  # of events from pressure
@@ -45,9 +56,15 @@ def main(argv: Sequence[str] = ()) -> int:
 # --- the simulator
 
 
+def tour() -> list[Entry]:
+    """Every gait, then sitting, standing up and a stumble."""
+    gaits = [Entry(gait, EACH_S) for gait in GAITS]
+    return [Entry(Activity.STAND, 2.0), *gaits, Entry(Activity.SIT, 7.0), Entry(Activity.STUMBLE)]
+
+
 def against_truth() -> int:
     with tempfile.TemporaryDirectory() as folder:
-        walks = [record(tour(EACH_S), SECONDS, Path(folder) / "truth", person, person) for person in PEOPLE]
+        walks = [record(tour(), SECONDS, Path(folder) / "truth", person, person) for person in PEOPLE]
     least = 1.0
     for source, left_out in (("pressure", ()), ("kinematics", FORCES)):
         total: Scores = {}

@@ -137,7 +137,7 @@ class ComponentProcessing:
     def _best(self, leg: Leg, now_ns: int) -> Source | None:
         for source in Source:
             heard_ns = self._heard_ns.get((leg, source))
-            if heard_ns is not None and 0 <= now_ns - heard_ns <= SILENT_NS:
+            if heard_ns is not None and abs(now_ns - heard_ns) <= SILENT_NS:
                 return source
         return None
 

@@ -46,7 +46,7 @@ def matched(
     return pairs
 
 
-def score(true_ns: Sequence[float], found_ns: Sequence[float]) -> Score:
-    pairs = matched(true_ns, found_ns)
+def score(true_ns: Sequence[float], found_ns: Sequence[float], tolerance_ns: float = TOLERANCE_NS) -> Score:
+    pairs = matched(true_ns, found_ns, tolerance_ns)
     errors = [found - true for found, true in pairs.items() if true is not None]
     return Score(len(true_ns), len(found_ns), errors)

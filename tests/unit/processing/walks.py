@@ -11,21 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hil_sim.exoskeleton import Exoskeleton
-from hil_sim.gait.activity import Activity
 from hil_sim.gait.timetable import Entry
 from hil_sim.truth import TruthFile
 from server_gui.core.processing.gait_events import GaitEvent
 
 FORCES = ("left_insole.force", "right_insole.force")
-GAITS = (
-    Activity.WALK,
-    Activity.STAIRS_UP,
-    Activity.STAIRS_DOWN,
-    Activity.RAMP_UP,
-    Activity.RAMP_DOWN,
-    Activity.TURN_LEFT,
-    Activity.TURN_RIGHT,
-)
 
 
 @dataclass(frozen=True)
@@ -47,12 +37,6 @@ class Walk:
 
 def kind_of(event: GaitEvent) -> str:
     return f"{event.leg}_{event.kind}"
-
-
-def tour(each_s: float) -> list[Entry]:
-    """Every gait once, then sitting, standing up and a stumble."""
-    gaits = [Entry(gait, each_s) for gait in GAITS]
-    return [Entry(Activity.STAND, 2.0), *gaits, Entry(Activity.SIT, 7.0), Entry(Activity.STUMBLE, 10.0)]
 
 
 def record(entries: Iterable[Entry], seconds: float, file: Path, seed: int = 0, person: int = 0) -> Walk:

@@ -1,0 +1,62 @@
+"""Units for people: out and back without losing a digit."""
+
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server_gui.core.processing.units import UNITS, Unit, Units, percent_body_weight
+
+ALL = [unit for units in UNITS.values() for unit in units] + [percent_body_weight(81.4)]
+values = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(st.sampled_from(ALL), values)
+def test_there_and_back_is_the_very_same_value(unit: Unit, value: float) -> None:
+    assert unit.si_value(unit.shown(value)) == value
+
+
+@given(st.sampled_from(ALL), st.floats(-1e12, 1e12))
+def test_what_stands_in_an_edit_field_is_the_value_itself(unit: Unit, value: float) -> None:
+    assert unit.si_value(unit.editable(value)) == value
+
+
+@given(st.sampled_from(ALL), st.decimals(-10000, 10000, allow_nan=False, places=3))
+def test_what_was_typed_stands_there_again(unit: Unit, typed: Decimal) -> None:
+    assert Decimal(unit.editable(unit.si_value(typed))) == typed
+
+
+@pytest.mark.parametrize(
+    ("quantity", "si", "value", "text"),
+    [
+        ("position", "rad", 3.141592653589793, "180.0"),
+        ("force", "N", 812.4, "812"),
+        ("cell_3", "Pa", 73_000.0, "73.0"),
+        ("cop_x", "m", 0.1234, "123"),
+        ("load_share", "", 0.5, "0.500"),
+        ("something", "lx", 2.0, "2.000"),
+        ("position", "rad", None, "–"),
+    ],
+)
+def test_usual_units(quantity: str, si: str, value: float | None, text: str) -> None:
+    assert Units().unit(quantity, si).text(value) == text
+
+
+def test_a_quantity_has_its_own_choice() -> None:
+    units = Units(by_si={"m": "cm", "N": "% BW"}, by_quantity={"cop_x": "m"}, body_mass=80.0)
+    assert units.unit("cop_x", "m").symbol == "m"
+    assert units.unit("cop_y", "m").symbol == "cm"
+    assert units.unit("force", "N").text(80.0 * 9.80665) == "100.0"
+
+
+def test_what_cannot_be_is_refused_in_words() -> None:
+    with pytest.raises(ValueError, match=r"position in rad cannot be shown in kPa: choose from °, rad"):
+        Units(by_si={"rad": "kPa"}).unit("position", "rad")
+    with pytest.raises(ValueError, match="cannot be shown in % BW"):
+        Units(by_si={"N": "% BW"}).unit("force", "N")
+    with pytest.raises(ValueError, match="body mass of 0"):
+        percent_body_weight(0)
+    for typed in ("", "1,5", "nan", "inf", "12 °"):
+        with pytest.raises(ValueError, match="is not a number in °"):
+            UNITS["rad"][0].si_value(typed)
