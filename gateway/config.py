@@ -46,6 +46,8 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     `records` is the folder of journal, held stop and pending reverts, relative to the robot's file.
     `classic_port` serves the process list as the paper's daemon does, for comparison.
+    Beyond `max_cpu_percent` of a core, streams send fewer rows. For a client that is slow, `buffer_kb` of its
+    streams wait; one that takes nothing for `stuck_s` is dropped.
     """
 
     host: str = "127.0.0.1"
@@ -54,6 +56,9 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
     records: str | None = None
     classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None
+    max_cpu_percent: Annotated[float, Meta(gt=0)] | None = None
+    buffer_kb: Annotated[int, Meta(ge=64, le=65_536)] = 1024
+    stuck_s: Annotated[float, Meta(gt=0, le=3600)] = 30.0
 
 
 class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):

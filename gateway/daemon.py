@@ -110,7 +110,8 @@ class Daemon:
         return _signals(self._loop.wake_writer, self.end)
 
     def _open(self, connection: socket.socket, address: Any) -> None:
-        session = Session(self._loop, connection, f"{address[0]}:{address[1]}", self._service.handle)
+        peer, stuck_s = f"{address[0]}:{address[1]}", self._config.gateway.stuck_s
+        session = Session(self._loop, connection, peer, self._service.handle, stuck_s)
         if len(self._sessions) >= MAX_SESSIONS:
             message = f"{MAX_SESSIONS} clients are connected, which is the most; end one of them"
             session.send(wire.encode_error(None, wire.refuse(wire.Kind.UNAVAILABLE, message)))

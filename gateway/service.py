@@ -4,10 +4,11 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gateway import messages, wire
 from gateway.boot import boot_id
+from gateway.budget import Budget
 from gateway.config import RobotConfig
 from gateway.futures import gather, then
 from gateway.loop import Loop
@@ -17,6 +18,9 @@ from gateway.registry import MODULES, Module, Registry, Spec
 from gateway.session import Answer, Session
 from gateway.sources import channel_info, check_globs, merge, narrow
 from gateway.streams import Streams
+
+if TYPE_CHECKING:
+    from gateway.cost import Costs
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +55,9 @@ class Service:
 
     def __init__(self, config: RobotConfig, loop: Loop, specs: Mapping[str, Spec] = MODULES) -> None:
         self.registry = Registry(config, loop, specs)
-        self.streams = Streams(loop)
+        self._budget = Budget(loop, config.gateway.max_cpu_percent)
+        self.streams = Streams(loop, config.gateway.buffer_kb * 1024, self._budget)
+        self._sessions: dict[Session, Costs | None] = {}  # that are open; how each sees the costs
         self._config = config
         self._loop = loop
         self._boot_id = boot_id()
@@ -60,6 +66,7 @@ class Service:
             "hello": self._hello,
             "clock.read": lambda _session, _params: self._clock(),
             "robot.describe": self._describe,
+            "gateway.cost": self._cost,
             "stream.start": self._stream_start,
             "stream.stop": self._stream_stop,
         }
@@ -99,7 +106,12 @@ class Service:
 
     def opened(self, session: Session) -> None:
         """A client has come."""
-        session.on_close(lambda: self.registry.leave(session))
+        self._sessions[session] = None
+        session.on_close(lambda: self._closed(session))
+
+    def _closed(self, session: Session) -> None:
+        del self._sessions[session]
+        self.registry.leave(session)
 
     def handle(self, session: Session, request: wire.Request) -> Answer:
         """The answer to one request, now or later.
@@ -156,6 +168,7 @@ class Service:
             guard=self._guard_info(),
             trials=robot.trials,
             records=robot.records,
+            budget=self._budget.info,
         )
 
     def _guard_info(self) -> messages.GuardInfo:
@@ -166,6 +179,22 @@ class Service:
             return messages.GuardInfo(configured=True, problem=self._guard_problem)
         info: messages.GuardInfo = guard.info()
         return info
+
+    def _cost(self, session: Session, _params: messages.Params) -> Answer:
+        return then(self._use("resource", session), lambda resource: self._look_at_costs(session, resource))
+
+    def _look_at_costs(self, session: Session, resource: Any) -> messages.GatewayCost:
+        from gateway.cost import Costs  # for who asks
+
+        costs = self._sessions.get(session) or Costs()
+        if not session.closed:
+            self._sessions[session] = costs
+        component: Any = self.registry.running("component")
+        buses = {} if component is None else component.robot.buses
+        phases = self.registry.phases
+        return costs.look(
+            resource.own_rss_bytes(), phases, buses, self._sessions, self.streams, self._budget.info
+        )
 
     def _stream_start(self, session: Session, params: messages.StreamStartParams) -> Answer:
         modules: dict[str, Future[Any]] = {name: self._use(name, session) for name in params.modules}

@@ -1,9 +1,10 @@
 """One client's connection: lines in, answers and streams out, everything bounded.
 
 Where a client is slow, it is the client that loses: its requests wait, its streams drop rows, and one that
-takes nothing for `STUCK_S` is closed. Nobody else waits for it.
+takes nothing for `stuck_s` is closed. Nobody else waits for it.
 """
 
+import functools
 import logging
 import selectors
 import socket
@@ -11,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Protocol
+from typing import Concatenate, ParamSpec, Protocol
 
 from msgspec import UNSET
 
@@ -26,12 +27,12 @@ QUEUED_LINES = 256  # requests waiting to be handled before reading pauses
 PENDING = 64  # requests waiting for a device before the next is handled
 OUTPUT_BYTES = 1024 * 1024  # answers not yet taken before the next request is handled
 STREAM_BYTES = 64 * 1024  # output not yet taken before streams hold back
-STUCK_S = 30.0  # a client that takes nothing for so long is dropped
 
 # Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
 
 Answer = object | Future[object]
+P = ParamSpec("P")
 
 
 class Outlet(Protocol):
@@ -39,6 +40,24 @@ class Outlet(Protocol):
 
     def next_line(self) -> bytes | None:
         """The next notification, or `None` when there is none yet."""
+
+
+def _spends(work: "Callable[Concatenate[Session, P], None]") -> "Callable[Concatenate[Session, P], None]":
+    """Put down on the session's account what the thread works in this method and all that it calls."""
+
+    @functools.wraps(work)
+    def metered(session: "Session", /, *args: P.args, **options: P.kwargs) -> None:
+        if session.spending:
+            work(session, *args, **options)
+            return
+        session.spending, began_ns = True, time.thread_time_ns()
+        try:
+            work(session, *args, **options)
+        finally:
+            session.cpu_ns += time.thread_time_ns() - began_ns
+            session.spending = False
+
+    return metered
 
 
 class Session:
@@ -50,14 +69,19 @@ class Session:
         connection: socket.socket,
         peer: str,
         handle: "Callable[[Session, wire.Request], Answer]",
+        stuck_s: float,
     ) -> None:
         self.peer = peer
         self.who = peer  # how the journal calls it
+        self.cpu_ns = 0  # that the loop has worked for it
+        self.requests = self.received_bytes = self.sent_bytes = 0
         self.outlets: dict[int, Outlet] = {}
         self.closed = False
         self._loop = loop
         self._socket = connection
         self._handle = handle
+        self._stuck_s = stuck_s
+        self.spending = False  # whether what is worked now is put down already
         self._splitter = wire.LineSplitter()
         self._queue: deque[wire.Request | wire.BadLine] = deque()
         self._scheduled = False
@@ -71,6 +95,11 @@ class Session:
         _prepare(connection)
         self._watch()
 
+    @property
+    def waiting_bytes(self) -> int:
+        """Of answers and streams that the client has not taken."""
+        return self._output_bytes
+
     def on_close(self, farewell: Callable[[], None]) -> None:
         """Call `farewell` when the connection has ended."""
         self._farewells.append(farewell)
@@ -81,6 +110,7 @@ class Session:
             self._enqueue(line)
             self._flush()
 
+    @_spends
     def pump(self) -> None:
         """Send what the streams have, as far as the client keeps up."""
         if self.closed:
@@ -112,6 +142,7 @@ class Session:
 
     # Reading
 
+    @_spends
     def _on_ready(self, events: int) -> None:
         if events & selectors.EVENT_WRITE:
             self._flush()
@@ -128,6 +159,7 @@ class Session:
             log.info("%s: %s", self.peer, error)
             self.close()
             return
+        self.received_bytes += len(data)
         self._input_ended = not data
         for line in self._splitter.feed(data) if data else self._splitter.end():
             self._take(line)
@@ -160,6 +192,7 @@ class Session:
             self._scheduled = True
             self._loop.post(self._run_next)
 
+    @_spends
     def _run_next(self) -> None:
         self._scheduled = False
         if not self.closed and self._queue:
@@ -172,6 +205,7 @@ class Session:
         if isinstance(request, wire.BadLine):
             self.send(wire.encode_error(request.id, request))
             return
+        self.requests += 1
         try:
             answer = self._handle(self, request)
         except Exception as error:  # noqa: BLE001 - whatever it is, this client is told and the others never notice
@@ -182,6 +216,7 @@ class Session:
         else:
             self._answer(request, answer)
 
+    @_spends
     def _complete(self, request: wire.Request, future: Future[object]) -> None:
         self._pending -= 1
         self._answer(request, outcome(future))
@@ -217,6 +252,7 @@ class Session:
             while self._output:
                 sent = self._socket.send(self._output[0])
                 sent_any = True
+                self.sent_bytes += sent
                 self._output_bytes -= sent
                 if sent < len(self._output[0]):
                     self._output[0] = self._output[0][sent:]
@@ -232,7 +268,7 @@ class Session:
             self._moved_ns = time.monotonic_ns()
         if self._output and self._stuck is None:
             self._moved_ns = time.monotonic_ns()
-            self._stuck = self._loop.call_later(STUCK_S, self._check_stuck)
+            self._stuck = self._loop.call_later(self._stuck_s, self._check_stuck)
         self._schedule()
         self._watch()
         self._finish_if_done()
@@ -241,11 +277,11 @@ class Session:
         self._stuck = None
         if not self._output:
             return
-        still_s = STUCK_S - (time.monotonic_ns() - self._moved_ns) / 1e9
+        still_s = self._stuck_s - (time.monotonic_ns() - self._moved_ns) / 1e9
         if still_s > 0:
             self._stuck = self._loop.call_later(still_s, self._check_stuck)
         else:
-            log.warning("%s takes nothing for %g s; closed", self.peer, STUCK_S)
+            log.warning("%s takes nothing for %g s; closed", self.peer, self._stuck_s)
             self.close()
 
     def _watch(self) -> None:

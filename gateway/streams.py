@@ -1,92 +1,28 @@
 """Streams: samples become rows, rows become batches, a batch is encoded once for all who asked for the same.
 
-A feed belongs to everybody with the same channels and rate. Each subscriber has an outlet that numbers its
-notifications and, when its client is slow, drops the oldest rows and counts them.
+A feed belongs to everybody with the same channels and rate. Where the gateway has a budget, it is the rate of
+all feeds that gives way.
 """
 
 import itertools
 import threading
 import time
-from collections import deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-
-import msgspec
 
 from drivers.samples import Sample
 from gateway import wire
+from gateway.budget import Budget
 from gateway.loop import Loop, Timer
-from gateway.messages import STREAM_DATA
+from gateway.outlets import Batch, Outlet, encode_batch
 from gateway.session import Session
 from gateway.sources import Selection
 
 BATCH_S = 0.010  # ticks faster than this travel together
 GATHER_S = 0.002  # how long a source's own samples wait for company
-OUTLET_BYTES = 1024 * 1024  # what waits for one slow subscriber
+MOST_STREAMS = 32  # of one client
 CATCH_UP_S = 1.0  # ticks missed for longer than this are lost, not made up
 TAP_SAMPLES = 10_000  # what one source may have waiting; the loop empties it every few milliseconds
-
-_encoder = msgspec.json.Encoder()
-
-
-class _Notification(msgspec.Struct, frozen=True):
-    stream: int
-    seq: int
-    dropped: int
-    stamp_ns: msgspec.Raw
-    columns: msgspec.Raw
-
-
-@dataclass(frozen=True, slots=True)
-class Batch:
-    """Encoded rows that any number of subscribers share."""
-
-    rows: int
-    stamps: msgspec.Raw
-    columns: msgspec.Raw
-    size: int
-
-
-def encode_batch(stamps: Sequence[int], columns: dict[str, Sequence[float | None]]) -> Batch:
-    """Rows as they go on the wire; NaN becomes null."""
-    stamp_bytes, column_bytes = _encoder.encode(stamps), _encoder.encode(columns)
-    size = len(stamp_bytes) + len(column_bytes)
-    return Batch(len(stamps), msgspec.Raw(stamp_bytes), msgspec.Raw(column_bytes), size)
-
-
-class Outlet:
-    """One subscriber of a feed."""
-
-    def __init__(self, number: int, session: Session) -> None:
-        self.number = number
-        self.session = session
-        self._seq = itertools.count()
-        self._dropped = 0
-        self._batches: deque[Batch] = deque()
-        self._bytes = 0
-
-    def offer(self, batch: Batch) -> None:
-        """Take a batch for the client; the oldest make room for it."""
-        self._batches.append(batch)
-        self._bytes += batch.size
-        while self._bytes > OUTLET_BYTES and len(self._batches) > 1:
-            self.lose(self._take().rows)
-
-    def lose(self, rows: int) -> None:
-        """Count rows that this subscriber never gets."""
-        self._dropped += rows
-
-    def next_line(self) -> bytes | None:
-        if not self._batches:
-            return None
-        batch = self._take()
-        data = _Notification(self.number, next(self._seq), self._dropped, batch.stamps, batch.columns)
-        return wire.encode_notification(STREAM_DATA, data)
-
-    def _take(self) -> Batch:
-        batch = self._batches.popleft()
-        self._bytes -= batch.size
-        return batch
 
 
 class Tap:
@@ -122,10 +58,18 @@ class Tap:
 
 
 class Feed:
-    """What every feed does: taps in, batches out, closed with its last subscriber."""
+    """What every feed does: taps in, batches out, closed with its last subscriber.
 
-    def __init__(self, loop: Loop, selections: Sequence[Selection], filled: Callable[[], None]) -> None:
+    Of what it is asked for, it gives one row of `shed`, as the gateway's budget allows.
+    """
+
+    def __init__(
+        self, loop: Loop, selections: Sequence[Selection], rate_hz: float, filled: Callable[[], None]
+    ) -> None:
         self.outlets: list[Outlet] = []
+        self.rate_hz = rate_hz
+        self.channels = sum(len(selection.indices) for selection in selections)
+        self.shed = 1
         self._loop = loop
         self._closed = False
         self._timer: Timer | None = None
@@ -137,6 +81,16 @@ class Feed:
             self._timer.cancel()
         for tap in self._taps:
             tap.close()
+
+    def shed_to(self, shed: int) -> None:
+        """Give one row of so many from now on."""
+        self.shed = shed
+
+    def _spent(self, began_ns: int) -> None:
+        """Put down what the thread has worked since then for all of them together."""
+        share_ns = (time.thread_time_ns() - began_ns) // max(1, len(self.outlets))
+        for outlet in self.outlets:
+            outlet.session.cpu_ns += share_ns
 
     def _give(self, batch: Batch) -> None:
         for outlet in tuple(self.outlets):
@@ -155,9 +109,8 @@ class TickFeed(Feed):
     """
 
     def __init__(self, loop: Loop, selections: Sequence[Selection], rate_hz: float) -> None:
-        super().__init__(loop, selections, filled=lambda: None)
-        self._period_ns = round(1e9 / rate_hz)
-        self._ticks_per_batch = max(1, round(BATCH_S * rate_hz))
+        super().__init__(loop, selections, rate_hz, filled=lambda: None)
+        self.shed_to(1)
         self._next_ns = time.monotonic_ns()
         self._cells: list[tuple[int, float | None] | None] = []
         self._stale_after_ns: list[int] = []
@@ -166,6 +119,12 @@ class TickFeed(Feed):
         for selection in selections:
             self._add(selection)
         self._timer = loop.call_later(0.0, self._tick)
+
+    def shed_to(self, shed: int) -> None:
+        """Never below a row a second, where more were asked for."""
+        super().shed_to(min(shed, max(1, int(self.rate_hz))))
+        self._period_ns = round(1e9 * self.shed / self.rate_hz)
+        self._ticks_per_batch = max(1, round(BATCH_S * self.rate_hz / self.shed))
 
     def _add(self, selection: Selection) -> None:
         latest = selection.source.latest
@@ -179,7 +138,7 @@ class TickFeed(Feed):
     def _tick(self) -> None:
         if self._closed:
             return
-        now_ns = time.monotonic_ns()
+        began_ns, now_ns = time.thread_time_ns(), time.monotonic_ns()
         self._skip_what_is_too_old(now_ns)
         self._forget_what_is_gone()
         rows: list[list[float | None]] = []
@@ -197,7 +156,10 @@ class TickFeed(Feed):
             self._apply(*update)
             update = next(updates, None)
         if rows:
-            self._give(encode_batch(stamps, dict(zip(self._names, zip(*rows, strict=True), strict=True))))
+            columns = dict(zip(self._names, zip(*rows, strict=True), strict=True))
+            batch = encode_batch(stamps, columns, self.shed)
+            self._spent(began_ns)
+            self._give(batch)
         last_of_batch_ns = self._next_ns + (self._ticks_per_batch - 1) * self._period_ns
         self._timer = self._loop.call_later((last_of_batch_ns - time.monotonic_ns()) / 1e9, self._tick)
 
@@ -243,7 +205,8 @@ class SampleFeed(Feed):
     """
 
     def __init__(self, loop: Loop, selections: Sequence[Selection]) -> None:
-        super().__init__(loop, selections, filled=lambda: loop.post(self._filled))
+        super().__init__(loop, selections, 0.0, filled=lambda: loop.post(self._filled))
+        self._came: Counter[tuple[int, ...]] = Counter()  # samples of each kind
 
     def _filled(self) -> None:
         if self._timer is None and not self._closed:
@@ -251,45 +214,67 @@ class SampleFeed(Feed):
 
     def _flush(self) -> None:
         self._timer = None
-        for tap in self._taps:
+        for number, tap in enumerate(self._taps):
             samples, lost = tap.drain()
             if lost:
                 self._lose(lost)
+            if self.shed > 1:
+                samples = [sample for sample in samples if self._is_kept((number, *sample.indices))]
             for indices, group in itertools.groupby(samples, key=lambda sample: sample.indices):
                 self._send(tap.selection, indices, list(group))
 
+    def _is_kept(self, kind: tuple[int, ...]) -> bool:
+        self._came[kind] += 1
+        return self._came[kind] % self.shed == 0
+
     def _send(self, selection: Selection, indices: tuple[int, ...], samples: list[Sample]) -> None:
-        channels = selection.source.channels
+        began_ns, channels = time.thread_time_ns(), selection.source.channels
         columns: dict[str, Sequence[float | None]] = {
             channels[index].name: [sample.values[place] for sample in samples]
             for place, index in enumerate(indices)
             if index in selection.indices
         }
         if columns:
-            self._give(encode_batch([sample.stamp_ns for sample in samples], columns))
+            batch = encode_batch([sample.stamp_ns for sample in samples], columns, self.shed)
+            self._spent(began_ns)
+            self._give(batch)
 
 
 class Streams:
-    """All streams of the gateway."""
+    """All streams of the gateway; `buffer_bytes` is what may wait for one client's."""
 
-    def __init__(self, loop: Loop) -> None:
+    def __init__(self, loop: Loop, buffer_bytes: int, budget: Budget) -> None:
         self._loop = loop
+        self._buffer_bytes = buffer_bytes
+        self._budget = budget
+        budget.shed = self._shed
         self._numbers = itertools.count(1)
         self._feeds: dict[tuple[float, tuple[str, ...]], Feed] = {}
 
     def start(self, session: Session, selections: Iterable[Selection], rate_hz: float) -> int:
-        """Subscribe a session; its connection's end ends the stream. Returns the stream's number."""
+        """Subscribe a session; its connection's end ends the stream. Returns the stream's number.
+
+        Raises:
+            RpcError: it has `MOST_STREAMS` already.
+
+        """
+        if len(session.outlets) >= MOST_STREAMS:
+            most = f"a client may have {MOST_STREAMS} streams; end one, or ask for more channels in one"
+            raise wire.refuse(wire.Kind.UNAVAILABLE, most)
         chosen = list(selections)
         key = (rate_hz, tuple(name for selection in chosen for name in selection.names))
         feed = self._feeds.get(key)
         if feed is None:
             feed = TickFeed(self._loop, chosen, rate_hz) if rate_hz else SampleFeed(self._loop, chosen)
             self._feeds[key] = feed
-        outlet = Outlet(next(self._numbers), session)
+            feed.shed_to(self._budget.factor)
+            self._budget.watch(on=True)
+        outlet = Outlet(next(self._numbers), session, feed, self._buffer_bytes)
         feed.outlets.append(outlet)
         if not session.outlets:
             session.on_close(lambda: self._forget(session))
         session.outlets[outlet.number] = outlet
+        self._share(session)
         return outlet.number
 
     def stop(self, session: Session, number: int) -> bool:
@@ -298,7 +283,22 @@ class Streams:
             return False
         del session.outlets[number]
         self._remove(lambda outlet: outlet.number == number)
+        self._share(session)
         return True
+
+    def of(self, session: Session) -> list[Outlet]:
+        """A client's streams."""
+        return [one for feed in self._feeds.values() for one in feed.outlets if one.session is session]
+
+    def _share(self, session: Session) -> None:
+        """All streams of a client have its buffer together."""
+        outlets = self.of(session)
+        for outlet in outlets:
+            outlet.most_bytes = self._buffer_bytes // len(outlets)
+
+    def _shed(self, factor: int) -> None:
+        for feed in self._feeds.values():
+            feed.shed_to(factor)
 
     def _forget(self, session: Session) -> None:
         self._remove(lambda outlet: outlet.session is session)
@@ -309,3 +309,5 @@ class Streams:
             if not feed.outlets:
                 del self._feeds[key]
                 feed.close()
+        if not self._feeds:
+            self._budget.watch(on=False)

@@ -59,6 +59,7 @@ class CanBus:
         self.problem: str | None = None  # why it is not open, in words
         self.state = BusState.ACTIVE  # as the controller's error frames say, where the interface has them
         self.frames = 0
+        self.sent = self.sent_bytes = 0  # frames, and what they carried
         self.opened = 0  # times
         self.failed_handlers = 0
         self.unclaimed: set[int] = set()  # identifiers that came and nobody asked for
@@ -139,6 +140,8 @@ class CanBus:
             if transport is None:
                 raise Unavailable(f"bus {self.name} is not open: {self.problem or 'nobody holds it'}")
             transport.send(can_id, data)
+            self.sent += 1
+            self.sent_bytes += len(data)
 
     def start_node(self, node_id: int) -> None:
         """Let a node that came up send its PDOs (NMT start): a master's part, an observer does nothing.

@@ -14,6 +14,7 @@ from gateway.messages import (
     Confirmed,
     Description,
     Enabled,
+    GatewayCost,
     JournalEntries,
     ModuleName,
     ParameterValues,
@@ -86,6 +87,10 @@ class Robot:
     def components(self, *channels: str) -> Snapshot:
         """The newest value of the channels (globs; none means all)."""
         return self._wait(self._client.components(*channels))
+
+    def cost(self) -> GatewayCost:
+        """What monitoring costs the robot; rates are since the last call, None the first time."""
+        return self._wait(self._client.cost())
 
     def status(self) -> Snapshot:
         """The merged set that status prediction needs."""

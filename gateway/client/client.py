@@ -16,6 +16,7 @@ from gateway.messages import (
     Done,
     Enabled,
     EnableParams,
+    GatewayCost,
     JournalEntries,
     Lease,
     ModuleName,
@@ -95,6 +96,10 @@ class Client:
     async def components(self, *channels: str) -> Snapshot:
         """The newest value of the channels (globs; none means all)."""
         return await self.link.call("component.snapshot", SnapshotParams(list(channels) or None), Snapshot)
+
+    async def cost(self) -> GatewayCost:
+        """What monitoring costs the robot; rates are since the last call, None the first time."""
+        return await self.link.call("gateway.cost", Params(), GatewayCost)
 
     async def status(self) -> Snapshot:
         """The merged set that status prediction needs."""

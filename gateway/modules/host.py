@@ -31,6 +31,9 @@ class Host:
     def meter(self) -> "Meter":
         return Meter(self._counters)
 
+    def own_rss_bytes(self) -> int:
+        return self._counters.own_rss_bytes()
+
     def close(self) -> None:
         """Give back what is held for the next look; its meters must not be used again."""
         self._counters.close()

@@ -114,6 +114,10 @@ class ResourceModule:
         """For another asker, whose percentages are since its own last look."""
         return self._host.meter()
 
+    def own_rss_bytes(self) -> int:
+        """What the gateway holds."""
+        return self._host.own_rss_bytes()
+
     def selections(self) -> list[Selection]:
         return [whole(self._source)]
 

@@ -4,7 +4,7 @@ import itertools
 import json
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from hypothesis import given
@@ -12,10 +12,13 @@ from hypothesis import strategies as st
 
 from drivers.component import Kind
 from gateway import streams
+from gateway.budget import Budget
 from gateway.loop import Loop
 from gateway.modules.component import ComponentSource
+from gateway.outlets import Batch, Outlet, encode_batch
+from gateway.session import Session
 from gateway.sources import merge, narrow, whole
-from gateway.streams import Batch, Outlet, SampleFeed, TickFeed, encode_batch
+from gateway.streams import SampleFeed, Streams, TickFeed
 from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
 
 MS = 1_000_000
@@ -26,14 +29,19 @@ class FakeSession:
 
     def __init__(self) -> None:
         self.pumped = 0
+        self.cpu_ns = 0
+        self.closed = False
+        self.outlets: dict[int, Outlet] = {}
+        self.on_close = lambda farewell: None
 
     def pump(self) -> None:
         self.pumped += 1
 
 
-def outlet() -> Outlet:
+def outlet(most_bytes: int = 1 << 20) -> Outlet:
     session: Any = FakeSession()
-    return Outlet(1, session)
+    feed: Any = None
+    return Outlet(1, session, feed, most_bytes)
 
 
 def taken(one: Outlet) -> list[dict[str, Any]]:
@@ -178,15 +186,31 @@ def test_a_source_that_outruns_the_loop_loses_and_it_is_counted(monkeypatch: pyt
     finish(feed)
 
 
-def test_a_slow_client_loses_the_oldest_rows_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_client_loses_the_oldest_rows_and_is_told() -> None:
     batches = [encode_batch([n, n + 1], {"knee.position": [float(n), None]}) for n in range(100, 120, 2)]
-    monkeypatch.setattr(streams, "OUTLET_BYTES", 3 * batches[0].size)
-    one = outlet()
+    one = outlet(3 * batches[0].size)
     for batch in batches:
         one.offer(batch)
     data = taken(one)
     assert [stamp_ns for stamp_ns, _ in rows(data)] == [114, 115, 116, 117, 118, 119]
     assert [(each["seq"], each["dropped"]) for each in data] == [(0, 14), (1, 14), (2, 14)]
+
+
+def test_all_streams_of_a_client_have_one_buffer_together() -> None:
+    batch = encode_batch([1], {"knee.position": [1.0]})
+    loop, session = Loop(), cast("Session", FakeSession())
+    started = Streams(loop, 12 * batch.size, Budget(loop, None))
+    numbers = [started.start(session, [whole(ComponentSource(knee()))], rate_hz) for rate_hz in (10, 20, 30)]
+    for _ in range(20):
+        for outlet in started.of(session):
+            outlet.offer(batch)
+    assert [outlet.waiting_bytes for outlet in started.of(session)] == [4 * batch.size] * 3
+    started.stop(session, numbers[0])
+    assert [outlet.most_bytes for outlet in started.of(session)] == [6 * batch.size] * 2
+    for number in numbers[1:]:
+        started.stop(session, number)
+    assert loop._patience_s() is None
+    loop.close()
 
 
 @given(st.lists(st.one_of(st.integers(1, 5), st.none()), max_size=60))
@@ -195,7 +219,7 @@ def test_rows_sent_and_rows_dropped_are_all_rows(steps: list[int | None]) -> Non
     one = outlet()
     offered = received = dropped = 0
     seqs: list[int] = []
-    limit = streams.OUTLET_BYTES
+    limit = one.most_bytes
     for step in [*steps, *[None] * 60]:
         if step is None:
             line = one.next_line()
@@ -210,7 +234,7 @@ def test_rows_sent_and_rows_dropped_are_all_rows(steps: list[int | None]) -> Non
             one.offer(Batch(batch.rows, batch.stamps, batch.columns, size=limit // 3))
             offered += step
     assert seqs == list(range(len(seqs)))
-    assert received + one._dropped == offered
+    assert received + one.dropped == offered
 
 
 def test_selections_are_merged_channel_by_channel() -> None:
@@ -280,6 +304,12 @@ def test_status_and_component_in_one_stream_have_each_channel_once(client: Clien
     names = list(client.data()["columns"])
     assert len(names) == len(set(names))
     assert {"left_knee.position", "left_knee.statusword", "resource.cpu_percent"} <= set(names)
+
+
+def test_one_stream_too_many_is_refused(client: Client) -> None:
+    for _ in range(streams.MOST_STREAMS):
+        client.call("stream.start", modules=["component"], rate_hz=1)
+    assert client.refused("stream.start", modules=["component"], rate_hz=1).kind == "unavailable"
 
 
 def test_a_stream_of_nothing_is_refused(client: Client) -> None:

@@ -1,0 +1,76 @@
+"""The share of a core that the gateway may use: beyond it, streams give way, and nothing else ever does."""
+
+import logging
+import time
+from collections.abc import Callable
+
+from gateway.loop import Loop, Timer
+from gateway.messages import BudgetInfo
+
+log = logging.getLogger(__name__)
+
+LOOK_S = 1.0
+OVER_LOOKS, UNDER_LOOKS = 2, 5  # in a row, before more or less is shed
+MOST = 64  # one row of so many is always sent
+_UNDER = 0.45  # of the most: twice the rows would still be within
+
+
+class Budget:
+    """Looks at the process's own CPU while there are streams; `factor` n means: one row of n is sent.
+
+    `shed` is called with each new factor. Without a most there is nothing to look at.
+    """
+
+    def __init__(self, loop: Loop, most_percent: float | None) -> None:
+        self.most_percent = most_percent
+        self.factor = 1
+        self.shed: Callable[[int], None] = lambda _factor: None
+        self._loop = loop
+        self._timer: Timer | None = None
+        self._looked_ns = self._cpu_ns = self._over = self._under = 0
+
+    @property
+    def info(self) -> BudgetInfo | None:
+        """As clients are told."""
+        return None if self.most_percent is None else BudgetInfo(self.most_percent, self.factor)
+
+    def watch(self, *, on: bool) -> None:
+        """Begin, or end; idempotent."""
+        if on and self.most_percent is not None and self._timer is None:
+            self._remember()
+            self._timer = self._loop.call_later(LOOK_S, self._look)
+        elif not on and self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+            self.factor, self._over, self._under = 1, 0, 0
+
+    def judge(self, percent: float) -> None:
+        """Shed twice as much, or half, when the share was too high, or low enough, for a while."""
+        most = self.most_percent
+        if most is None:
+            return
+        self._over = self._over + 1 if percent > most else 0
+        self._under = self._under + 1 if percent < _UNDER * most else 0
+        if self._over == OVER_LOOKS and self.factor < MOST:
+            self._set(2 * self.factor, percent)
+        elif self._under == UNDER_LOOKS and self.factor > 1:
+            self._set(self.factor // 2, percent)
+
+    def _set(self, factor: int, percent: float) -> None:
+        self.factor, self._over, self._under = factor, 0, 0
+        log.warning(
+            "the gateway uses %.1f %% of a core, and may use %g: streams now send one row of %d",
+            percent,
+            self.most_percent,
+            factor,
+        )
+        self.shed(factor)
+
+    def _look(self) -> None:
+        looked_ns, cpu_ns = self._looked_ns, self._cpu_ns
+        self._remember()
+        self.judge(100 * (self._cpu_ns - cpu_ns) / (self._looked_ns - looked_ns))
+        self._timer = self._loop.call_later(LOOK_S, self._look)
+
+    def _remember(self) -> None:
+        self._looked_ns, self._cpu_ns = time.monotonic_ns(), time.process_time_ns()
