@@ -160,5 +160,9 @@ def _complaints(found: LinkQuality) -> list[tuple[Health, bool, str]]:
         (Health.FAIR, AGE_FAIR_S < age <= AGE_POOR_S, late),
         (Health.FAIR, jitter > JITTER_FAIR_S, f"rows come unevenly, by {1000.0 * jitter:.0f} ms"),
         (Health.FAIR, trip > TRIP_FAIR_S, f"an answer takes {1000.0 * trip:.0f} ms"),
-        (Health.FAIR, found.reconnects > 0, f"the link was made again {found.reconnects} times in a minute"),
+        (
+            Health.FAIR,
+            found.reconnects > 0,
+            f"the link was made again in the last minute, {found.reconnects}×",
+        ),
     ]

@@ -71,36 +71,44 @@ class Regression:
 def regressions(before: Sequence[SessionUse], after: Sequence[SessionUse]) -> list[Regression]:
     """What costs more in `after` than in `before`, the greatest ratio first.
 
-    A process counts that was seen in both, whose median is a tenth and `MEASURES` more, and for which chance
-    is refused by the rank-sum test at `P` over all comparisons together.
+    A process counts that was seen in both, if its median is a tenth and `MEASURES` more, if three quarters of
+    the sessions after lie above three quarters of those before, and if chance is refused by the rank-sum
+    test at `P` over all comparisons together.
     """
+    names = sorted(_names(before) & _names(after))
     compared = [
         (name, measure, old, new)
-        for name in sorted(_names(before) & _names(after))
+        for name in names
         for measure in MEASURES
-        if len(old := _all(before, name, measure)) and len(new := _all(after, name, measure))
+        if (old := _series(before, name, measure)) and (new := _series(after, name, measure))
     ]
-    found = [_judge(before, after, *pair, limit=P / len(compared)) for pair in compared]
+    versions = _versions(before), _versions(after)
+    found = [_judge(*pair, versions, P / len(compared)) for pair in compared]
     known = [regression for regression in found if regression is not None]
     return sorted(known, key=lambda one: -one.after / max(one.before, MEASURES[one.measure]))
 
 
 def _judge(
-    before: Sequence[SessionUse],
-    after: Sequence[SessionUse],
     name: str,
     measure: str,
-    old: Floats,
-    new: Floats,
+    before: list[Floats],
+    after: list[Floats],
+    versions: tuple[str, str],
     limit: float,
 ) -> Regression | None:
+    """`before` and `after` have a series of minutes a session."""
+    old, new = np.concatenate(before), np.concatenate(after)
     was, now = float(np.median(old)), float(np.median(new))
     if now < RATIO * was or now - was < MEASURES[measure]:
         return None
-    p = rank_sum_p(old, new)
-    if p >= limit:
+    if np.quantile(_medians(after), 0.25) <= np.quantile(_medians(before), 0.75):
         return None
-    return Regression(name, measure, _versions(before), _versions(after), was, now, p)
+    p = rank_sum_p(old, new)
+    return Regression(name, measure, *versions, was, now, p) if p < limit else None
+
+
+def _medians(sessions: list[Floats]) -> list[float]:
+    return [float(np.median(minutes)) for minutes in sessions]
 
 
 def _versions(sessions: Sequence[SessionUse]) -> str:
@@ -122,6 +130,5 @@ def _names(sessions: Sequence[SessionUse]) -> set[str]:
     return {name for session in sessions for name in session.processes}
 
 
-def _all(sessions: Sequence[SessionUse], name: str, measure: str) -> Floats:
-    found = [use.processes[name][measure] for use in sessions if measure in use.processes.get(name, {})]
-    return np.concatenate(found) if found else np.empty(0)
+def _series(sessions: Sequence[SessionUse], name: str, measure: str) -> list[Floats]:
+    return [use.processes[name][measure] for use in sessions if measure in use.processes.get(name, {})]
