@@ -22,7 +22,7 @@ class FootImuEvents:
     """
 
     def __init__(self, leg: Leg) -> None:
-        self.leg = leg
+        self._leg = leg
         self._continuity = Continuity()
         self._swinging = False
         self._since_ns = 0  # the present phase began
@@ -85,7 +85,7 @@ class FootImuEvents:
 
     def _event(self, kind: EventKind, stamp_ns: int, known_ns: int) -> GaitEvent:
         after_gap, self._after_gap = self._after_gap, False
-        return GaitEvent(self.leg, kind, stamp_ns, known_ns, after_gap)
+        return GaitEvent(self._leg, kind, stamp_ns, known_ns, after_gap)
 
 
 def _least(seen: collections.deque[float]) -> float:

@@ -27,15 +27,9 @@ class KinematicEvents:
         self._continuity = Continuity()
 
     def feed(
-        self,
-        stamp_ns: int,
-        left: tuple[float, float] | None,
-        right: tuple[float, float] | None,
-        trunk: float = 0.0,
+        self, stamp_ns: int, left: tuple[float, float], right: tuple[float, float], trunk: float = 0.0
     ) -> list[GaitEvent]:
-        """Hip and knee of each leg at one moment, None where one is missing; `trunk` leans forward."""
-        if left is None or right is None:
-            return []
+        """Hip and knee of each leg at one moment; `trunk` leans forward."""
         follows = self._continuity.take(stamp_ns)
         if follows is Follows.OLD:
             return []

@@ -23,8 +23,8 @@ class PressureEvents:
     """
 
     def __init__(self, leg: Leg) -> None:
-        self.leg = leg
-        self.down: bool | None = None  # whether the foot is on the ground; None: not known
+        self._leg = leg
+        self._down = False  # whether the foot is on the ground
         self._continuity = Continuity()
         self._last_ns, self._last = 0, 0.0
         self._crossed_ns: int | None = None  # where the present state may have ended
@@ -54,14 +54,14 @@ class PressureEvents:
 
     def _begin(self, force: float) -> None:
         """The foot is where the first sample has it: what was in the gap is not guessed."""
-        self.down = force > self._threshold(LAND_SHARE)
+        self._down = force > self._threshold(LAND_SHARE)
         self._crossed_ns, self._after_gap = None, True
         self._highest = force
         self._blocks.clear()
 
     def _judge(self, stamp_ns: int, force: float) -> GaitEvent | None:
-        threshold = self._threshold(LIFT_SHARE if self.down else LAND_SHARE)
-        if (force > threshold) == self.down:
+        threshold = self._threshold(LIFT_SHARE if self._down else LAND_SHARE)
+        if (force > threshold) == self._down:
             self._crossed_ns = None
             self._stay(force)
             return None
@@ -72,7 +72,7 @@ class PressureEvents:
         return self._turn(stamp_ns, force)
 
     def _stay(self, force: float) -> None:
-        if self.down:
+        if self._down:
             self._highest = max(self._highest, force)
         else:
             self._floor = min(self._floor, force)
@@ -84,13 +84,13 @@ class PressureEvents:
 
     def _turn(self, stamp_ns: int, force: float) -> GaitEvent:
         crossed_ns = stamp_ns if self._crossed_ns is None else self._crossed_ns
-        kind = EventKind.TOE_OFF if self.down else EventKind.HEEL_STRIKE
-        event = GaitEvent(self.leg, kind, crossed_ns, stamp_ns, self._after_gap)
-        if self.down:
+        kind = EventKind.TOE_OFF if self._down else EventKind.HEEL_STRIKE
+        event = GaitEvent(self._leg, kind, crossed_ns, stamp_ns, self._after_gap)
+        if self._down:
             self._peaks.append(self._highest - self._floor)
             self._peak = statistics.median(self._peaks)
             self._floor = force
-        self.down, self._highest = not self.down, force
+        self._down, self._highest = not self._down, force
         self._crossed_ns, self._after_gap = None, False
         self._blocks.clear()
         return event
