@@ -39,10 +39,13 @@ class UnsafeStore(StoreError):
     """The store does not keep two writers from overwriting each other."""
 
 
-_REFUSED: Final = re.compile(r"401 Unauthorized|403 Forbidden|lacked the necessary privileges")
+_REFUSED: Final = re.compile(
+    r"401 Unauthorized|403 Forbidden|lacked the necessary privileges|"
+    r"HTTP status 40[13]|AWS Error ACCESS_DENIED"
+)
 _NO_TABLE: Final = re.compile(r"[Nn]ot a Delta table|[Nn]o files in log segment|LogSegment end version")
-_CODE: Final = re.compile(r"<Code>(\w+)</Code>|(\d{3} [A-Z][A-Za-z ]+)")
-_ANSWERED: Final = re.compile(r"status code|<\w|HTTP")
+_CODE: Final = re.compile(r"<Code>(\w+)</Code>|(\d{3} [A-Z][A-Za-z ]+)|(AWS Error \w+)|(HTTP status \d+)")
+_ANSWERED: Final = re.compile(r"status code|<\w|HTTP|AWS Error")
 _COLOUR: Final = re.compile(r"\x1b\[\d*m")
 _REASONS: Final = (
     "Connection refused",

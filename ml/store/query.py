@@ -23,6 +23,7 @@ _CLOSED: Final[dict[str, str | bool | int | float | list[str]]] = {
 }
 _SETTINGS: Final = ("python_enable_replacements=false", "TimeZone='UTC'", "lock_configuration=true")
 _KIND: Final = re.compile(r"^(\w+ )*Error: ")
+_READING: Final = "reading the Arrow source failed: IOError: "
 _DOTTED: Final = re.compile(r'Referenced table "(\w+)" not found')
 
 
@@ -51,7 +52,7 @@ def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
 
     """
     with contextlib.closing(duckdb.connect(config=_CLOSED)) as connection:
-        with _said():
+        with _said(store):
             kinds = [statement.type for statement in connection.extract_statements(sql)]
         if kinds != [duckdb.StatementType.SELECT]:
             raise QueryError("one SELECT at a time: a query only reads (SHOW TABLES and DESCRIBE do too)")
@@ -61,10 +62,18 @@ def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
             (rows if robot is None else rows.filter(_is("robot", robot))).create_view(name)
         for setting in _SETTINGS:
             connection.execute(f"SET {setting}")
-        with _said():
-            reader = connection.sql(sql).to_arrow_reader(BATCH_ROWS)
+        with _said(store):
+            reader = _run(connection, sql)
         with contextlib.closing(reader):
             yield Result(reader.schema, _read(reader, store))
+
+
+def _run(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.RecordBatchReader:
+    try:
+        return connection.sql(sql).to_arrow_reader(BATCH_ROWS)
+    except (duckdb.BinderException, duckdb.CatalogException):
+        connection.execute(sql)  # fails in the same way, and says where in the text
+        raise
 
 
 def _asked(sql: str) -> list[str]:
@@ -80,7 +89,7 @@ def _is(column: str, value: str) -> str:
 def _read(reader: pa.RecordBatchReader, store: Store) -> Iterator[pa.RecordBatch]:
     while True:
         try:
-            with _said(), translated(f"{store.url} cannot be read"):
+            with _said(store):
                 batch = reader.read_next_batch()
         except StopIteration:
             return
@@ -88,12 +97,15 @@ def _read(reader: pa.RecordBatchReader, store: Store) -> Iterator[pa.RecordBatch
 
 
 @contextlib.contextmanager
-def _said() -> Iterator[None]:
-    """DuckDB's errors in its words, which show the place."""
-    try:
-        yield
-    except duckdb.Error as error:
-        text = re.sub(r"\n\n+", "\n", _KIND.sub("", str(error))).strip()
-        if dotted := _DOTTED.search(text):
-            text += f'\nA channel\'s name has a dot: write it in double quotes, "{dotted[1]}.…".'
-        raise QueryError(text) from None
+def _said(store: Store) -> Iterator[None]:
+    """DuckDB's errors in its words, which show the place, but for those of reading the store's files."""
+    with translated(f"{store.url} cannot be read"):
+        try:
+            yield
+        except duckdb.Error as error:
+            if _READING in str(error):
+                raise OSError(str(error).partition(_READING)[2]) from None
+            text = re.sub(r"\n\n+", "\n", _KIND.sub("", str(error))).strip()
+            if dotted := _DOTTED.search(text):
+                text += f'\nA channel\'s name has a dot: write it in double quotes, "{dotted[1]}.…".'
+            raise QueryError(text) from None
