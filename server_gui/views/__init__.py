@@ -1,1 +1,1 @@
-"""Qt widgets that show and emit, nothing else."""
+"""The window: widgets that show what a `Desk` knows and emit what people want. None talks to the network."""

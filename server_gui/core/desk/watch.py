@@ -44,7 +44,8 @@ class Watch:
             return
         self._link = state
         why = f": {robot.link.problem}" if robot.link.problem else ""
-        self._tell(NewsKind.LINK, f"{LINK_WORDS[state]}{why}")
+        kind = NewsKind.STATE if state is ConnectionState.CONNECTED else NewsKind.LINK
+        self._tell(kind, f"{LINK_WORDS[state]}{why}")
 
     def _look_at_parts(self, robot: Robot) -> None:
         for part in robot.parts.values():

@@ -1,0 +1,158 @@
+"""The window's wiring: one network thread, a mailbox a robot, one 30 Hz timer that drains them and draws."""
+
+import concurrent.futures
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
+from PySide6.QtWidgets import QApplication
+
+from gateway.client import Address
+from gateway.messages import ResourceSnapshotParams
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.link import Link
+from server_gui.core.desk.station import Station
+from server_gui.core.feed import Feed, Following
+from server_gui.core.mailbox import Mailbox
+from server_gui.core.network import Network
+from server_gui.core.processing.units import Units
+from server_gui.core.settings import ServerSettings
+from server_gui.own_robot import OwnRobot
+from server_gui.views.main_window import MainWindow
+from server_gui.views.stop_keys import StopKeys
+from server_gui.views.theme import Look, Theme
+
+FRAME_MS: Final = 33
+SWITCH_S: Final = 0.0005  # a thread that wakes up gets Python within this, however busy the window is
+FOLLOWING: Final = Following(
+    client="gwrms gui",
+    channels=("*",),
+    rate_hz=100.0,
+    look_s=1.0,
+    resources=ResourceSnapshotParams(processes=False),
+)
+
+
+class Poster(QObject):
+    """Brings calls from any thread into the window's, in order."""
+
+    _posted = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._posted.connect(self._run, Qt.ConnectionType.QueuedConnection)
+
+    def deliver(self, call: Callable[[], None]) -> None:
+        """Run this soon in the window's thread."""
+        self._posted.emit(call)
+
+    def _run(self, call: Callable[[], None]) -> None:
+        call()
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A station, and what brings it its facts."""
+
+    station: Station
+    mailbox: Mailbox
+    tasks: tuple["concurrent.futures.Future[None]", ...]
+
+
+class App:
+    """Everything from the robots of the server's file to the window that shows them."""
+
+    def __init__(
+        self, qt: QApplication, settings: ServerSettings, kept: QSettings, following: Following
+    ) -> None:
+        self.desk = Desk()
+        self.network = Network()
+        self._qt = qt
+        self._following = following
+        self._followed: list[Followed] = []
+        self._poster = Poster()
+        self._own = OwnRobot(self._own_ready, self._own_failed)
+        self._desk_units(kept)
+        self.theme = Theme(
+            qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100
+        )
+        self.window = MainWindow(self.desk, self.theme, kept)
+        self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
+        self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
+        self.window.added.connect(lambda where: self.follow(where, Address.parse(where)))
+        self.window.simulator.connect(self._own.start)
+        self.window.closed.connect(qt.quit)
+        self._keys = StopKeys(qt)
+        self._keys.pressed.connect(lambda: self.stop("STOP key of the window"))
+        self._timer = QTimer(interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self.tick)
+        self._robots = settings.robots
+
+    def __enter__(self) -> "App":
+        self.network.__enter__()
+        for name, robot in self._robots.items():
+            self.follow(name, robot.where)
+        self._timer.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._timer.stop()
+        self._own.close()
+        self.network.__exit__(*exc)
+
+    def follow(self, name: str, address: Address) -> Station:
+        """Another robot, from now on."""
+        mailbox = Mailbox()
+        link = Link(self.network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
+        station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
+        feed = Feed(address, mailbox.put, self._following)
+        tasks = (self.network.run(link.run()), self.network.run(feed.run()))
+        self._followed.append(Followed(station, mailbox, tasks))
+        self.desk.add(station)
+        return station
+
+    def stop(self, reason: str) -> None:
+        """STOP the robot that is looked at."""
+        if self.desk.selected is not None:
+            self.desk.selected.stop(reason)
+
+    def tick(self) -> None:
+        """Take what has come, and draw."""
+        for followed in self._followed:
+            followed.station.take(followed.mailbox.drain())
+            for task in followed.tasks:
+                if task.done() and not task.cancelled():
+                    task.result()  # it ends only by a mistake of ours, which must not stay unseen
+        self.window.refresh()
+
+    def _own_ready(self, address: Address) -> None:
+        self._poster.deliver(lambda: self._follow_own(address))
+
+    def _follow_own(self, address: Address) -> None:
+        station = self.follow("simulated", address)
+        self.desk.select(station)
+
+    def _own_failed(self, why: str) -> None:
+        self._poster.deliver(lambda: self.window.empty.say(why, again=True))
+
+    def _desk_units(self, kept: QSettings) -> None:
+        by_si = kept.value("units")
+        if isinstance(by_si, dict):
+            self.desk.shown.units = Units(by_si=by_si)
+
+
+def run(settings: ServerSettings, look: Look | None = None, scale: float | None = None) -> int:
+    """Open the window until it is closed; the exit status."""
+    sys.setswitchinterval(SWITCH_S)
+    qt = QApplication(sys.argv[:1])
+    qt.setApplicationName("gwrms")
+    qt.setStyle("Fusion")
+    with App(qt, settings, QSettings("gwrms", "gui"), FOLLOWING) as app:
+        app.theme.set(look, scale)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: qt.quit())
+        app.window.show()
+        return qt.exec()

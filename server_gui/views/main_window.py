@@ -1,0 +1,190 @@
+"""The main window: header with STOP, robots left, tabs in the middle, parameters right, events below."""
+
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtCore import QByteArray, QSettings, Qt, Signal
+from PySide6.QtGui import QAction, QActionGroup, QCloseEvent
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QMainWindow,
+    QMenu,
+    QPushButton,
+    QStackedWidget,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from server_gui.core.desk.desk import Desk
+from server_gui.core.processing.units import UNITS, Units
+from server_gui.views.empty import EmptyView
+from server_gui.views.events_panel import EventsPanel
+from server_gui.views.header import Header
+from server_gui.views.overview import Overview
+from server_gui.views.parameters.panel import ParametersPanel
+from server_gui.views.resources import Resources
+from server_gui.views.robots_panel import RobotsPanel
+from server_gui.views.signals import Signals
+from server_gui.views.status_bar import StatusBar
+from server_gui.views.theme import Look, Theme
+
+LAYOUT: Final = 1  # rises when a stored layout no longer fits
+SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
+SLOW: Final = 6  # frames between two looks at what people read
+CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²")  # quantities with more than one unit worth choosing
+
+
+class MainWindow(QMainWindow):
+    """`stopped` and `stop_all` ask for a STOP, `added` for another robot, `simulator` for a simulated one."""
+
+    stopped = Signal()
+    stop_all = Signal()
+    added = Signal(str)
+    simulator = Signal()
+    closed = Signal()
+
+    def __init__(self, desk: Desk, theme: Theme, settings: QSettings) -> None:
+        super().__init__()
+        self._desk = desk
+        self._theme = theme
+        self._settings = settings
+        self._frame = 0
+        self.setWindowTitle("GWRMS")
+        self.resize(1680, 1000)
+        menu = QPushButton("View")
+        self.header = Header(desk, theme, menu)
+        self.header.stopped.connect(self.stopped)
+        self.header.reset.connect(lambda: desk.selected.reset() if desk.selected else None)
+        self.robots = RobotsPanel(desk, theme)
+        self.robots.stop_all.connect(self.stop_all)
+        self.robots.added.connect(self.added)
+        self.parameters = ParametersPanel(desk, theme)
+        self.events = EventsPanel(desk, theme)
+        self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
+        self.resources = Resources(desk, theme)
+        self.empty = EmptyView(theme)
+        self.empty.simulator.connect(self.simulator)
+        self.tabs = QTabWidget()
+        for title, view in (
+            ("&Overview", self.overview),
+            ("&Signals", self.signals),
+            ("&Resources", self.resources),
+        ):
+            self.tabs.addTab(view, title)
+        self._bar = StatusBar(desk)
+        self.setStatusBar(self._bar)
+        self._pages = QStackedWidget()
+        self._pages.addWidget(self.empty)
+        self._pages.addWidget(self.tabs)
+        self._build()
+        menu.setMenu(self._view_menu())
+        self._usual = self.saveState(LAYOUT)
+        self._restore()
+
+    def refresh(self) -> None:
+        """One frame: what moves each time, what is read now and then, and only what is visible."""
+        self._frame += 1
+        self._bar.frame()
+        view = self.tabs.currentWidget()
+        if self._desk.selected is not None and isinstance(view, Overview | Signals | Resources):
+            view.refresh()
+        if self._frame % SLOW:
+            return
+        self._pages.setCurrentIndex(0 if self._desk.selected is None else 1)
+        self.header.refresh()
+        self.robots.refresh()
+        self.parameters.refresh()
+        self.events.refresh()
+        self._bar.refresh()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self._settings.setValue("geometry", self.saveGeometry())
+        self._settings.setValue("state", self.saveState(LAYOUT))
+        self._settings.setValue("look", self._theme.look.value)
+        self._settings.setValue("scale", round(self._theme.scale * 100))
+        self._settings.setValue("units", dict(self._desk.shown.units.by_si))
+        super().closeEvent(event)
+        self.closed.emit()
+
+    def reset_layout(self) -> None:
+        """Everything where it was at first."""
+        self.restoreState(self._usual, LAYOUT)
+        for dock in self._docks:
+            dock.show()
+
+    # --- how it is put together
+
+    def _build(self) -> None:
+        middle = QWidget()
+        column = QVBoxLayout(middle)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self._pages, 1)
+        self.setCentralWidget(middle)
+        self.setMenuWidget(self.header)
+        self.setCorner(Qt.Corner.BottomLeftCorner, Qt.DockWidgetArea.LeftDockWidgetArea)
+        self.setCorner(Qt.Corner.BottomRightCorner, Qt.DockWidgetArea.RightDockWidgetArea)
+        areas = Qt.DockWidgetArea
+        self._docks = [
+            self._dock("Robots", self.robots, areas.LeftDockWidgetArea),
+            self._dock("Parameters", self.parameters, areas.RightDockWidgetArea),
+            self._dock("Events", self.events, areas.BottomDockWidgetArea),
+        ]
+        px = self._theme.px
+        self.resizeDocks([self._docks[0]], [px(225)], Qt.Orientation.Horizontal)
+        self.resizeDocks([self._docks[1]], [px(400)], Qt.Orientation.Horizontal)
+        self.resizeDocks([self._docks[2]], [px(120)], Qt.Orientation.Vertical)
+
+    def _dock(self, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
+        dock = QDockWidget(title)
+        dock.setObjectName(title)
+        dock.setWidget(widget)
+        self.addDockWidget(area, dock)
+        return dock
+
+    def _view_menu(self) -> QMenu:
+        menu = QMenu(self)
+        menu.setToolTipsVisible(True)
+        for dock in self._docks:
+            menu.addAction(dock.toggleViewAction())
+        menu.addAction("Reset layout").triggered.connect(self.reset_layout)
+        menu.addSeparator()
+        looks = {look.value.capitalize(): look for look in Look}
+        now = self._theme.look.value.capitalize()
+        _choices(menu.addMenu("Colours"), list(looks), now, lambda text: self._theme.set(look=looks[text]))
+        sizes = {f"{percent} %": percent / 100 for percent in SCALES}
+        size = f"{round(self._theme.scale * 100)} %"
+        _choices(
+            menu.addMenu("Text size"), list(sizes), size, lambda text: self._theme.set(scale=sizes[text])
+        )
+        units = menu.addMenu("Units")
+        for si in CHOICES:
+            symbols = [unit.symbol for unit in UNITS[si]]
+            chosen = self._desk.shown.units.unit("", si).symbol
+            _choices(units.addMenu(f"{si} as"), symbols, chosen, self._unit_setter(si))
+        return menu
+
+    def _unit_setter(self, si: str) -> Callable[[str], None]:
+        def choose(symbol: str) -> None:
+            by_si = dict(self._desk.shown.units.by_si) | {si: symbol}
+            self._desk.shown.change(Units(by_si=by_si))
+
+        return choose
+
+    def _restore(self) -> None:
+        geometry, state = self._settings.value("geometry"), self._settings.value("state")
+        if isinstance(geometry, QByteArray):
+            self.restoreGeometry(geometry)
+        if isinstance(state, QByteArray):
+            self.restoreState(state, LAYOUT)
+
+
+def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:
+    group = QActionGroup(menu)
+    for text in texts:
+        action: QAction = menu.addAction(text)
+        action.setCheckable(True)
+        action.setChecked(text == chosen)
+        group.addAction(action)
+    group.triggered.connect(lambda action: choose(action.text()))

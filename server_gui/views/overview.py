@@ -1,0 +1,220 @@
+"""The overview: gait phase, posture, pressure of both feet, three plots, and the joint table."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.soles import cells_of, layout_name
+from server_gui.core.desk.station import Station
+from server_gui.core.desk.walk import leg_phase
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.units import Unit
+from server_gui.views.joint_table import JointModel, JointTable
+from server_gui.views.marks import age_text
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.colour_bar import ColourBar
+from server_gui.views.widgets.figure import Pose, StickFigure
+from server_gui.views.widgets.gait_ring import GaitRing
+from server_gui.views.widgets.plot import Curve, Plot
+from server_gui.views.widgets.pressure_map import PressureMap
+
+SECONDS: Final = 10.0
+SLOW: Final = 5  # frames between two looks at what people read
+SIDES: Final = ("left", "right")
+PLAIN: Final = ("good", "#cc79a7")  # of what belongs to no side
+# title, channels, SI unit, smallest range shown (SI)
+PLOTS: Final = (
+    ("Knee angle", ("left_knee.position", "right_knee.position"), "rad", 0.2),
+    ("Knee torque", ("left_knee.torque", "right_knee.torque"), "N·m", 5.0),
+    ("Trunk tilt", ("trunk.tilt_forward", "trunk.tilt_side"), "rad", 0.08),
+)
+
+
+class KeyPlot(Card):
+    """A plot of a few channels with their newest values in its head."""
+
+    def __init__(
+        self, desk: Desk, theme: Theme, title: str, channels: Sequence[str], si: str, least: float
+    ) -> None:
+        super().__init__(title)
+        self._desk = desk
+        self._channels = channels
+        self._si = si
+        self._least = least
+        self.plot = Plot(theme, SECONDS, desk.shown.units.unit("", si).scale * least)
+        self.plot.set_curves([Curve(name, _colour_of(name, place)) for place, name in enumerate(channels)])
+        self.plot.setMinimumHeight(theme.px(80))
+        self.body.addWidget(self.plot)
+
+    def refresh(self, station: Station, *, slow: bool) -> None:
+        """Draw the past of the channels."""
+        unit = self._desk.shown.units.unit("", self._si)
+        times = station.rings.times(SECONDS)
+        columns = [station.rings.values(name, len(times)) * unit.scale for name in self._channels]
+        live = not station.robot.is_stale()
+        self.plot.draw(times, columns, live=live)
+        if slow:
+            texts = [unit.text(station.robot.values.get(name)) for name in self._channels]
+            self.set_note(f"{' / '.join(texts)} {unit.symbol}" if live else _old(station))
+
+
+class Overview(QWidget):
+    """Everything at a glance; drawn only while it is visible."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._theme = theme
+        self._frame = 0
+        self._cells: tuple[int, int] | None = None
+        self._angles: dict[str, list[str]] = {}
+        self.setObjectName("page")
+        self._status, self._ring = Card("Status"), GaitRing(theme)
+        self._status.body.addWidget(self._ring)
+        self._posture, self._figure = Card("Posture: hip, knee, ankle"), StickFigure(theme)
+        self._posture.body.addWidget(self._figure)
+        self._maps = {side: PressureMap(theme, side) for side in SIDES}
+        self._loads = {side: QLabel() for side in SIDES}
+        self._pressure = self._pressure_card()
+        self._plots = [KeyPlot(desk, theme, *plot) for plot in PLOTS]
+        self._joints, self._model = Card("Joints"), JointModel(desk, theme)
+        self._joints.body.addWidget(JointTable(self._model, theme))
+        grid = QGridLayout(self)
+        grid.setContentsMargins(8, 8, 8, 8)
+        grid.setSpacing(8)
+        for column, top in enumerate((self._status, self._posture, self._pressure)):
+            grid.addWidget(top, 0, column)
+            grid.addWidget(self._plots[column], 1, column)
+            grid.setColumnStretch(column, (10, 9, 11)[column])
+        grid.addWidget(self._joints, 2, 0, 1, 3)
+        for row, share in enumerate((5, 3, 3)):
+            grid.setRowStretch(row, share)
+
+    def refresh(self) -> None:
+        """Draw how it is now; what is read rather than seen changes more slowly."""
+        station = self._desk.selected
+        if station is None:
+            return
+        self._frame += 1
+        slow = self._frame % SLOW == 1
+        self._refresh_status(station)
+        self._refresh_posture(station, slow=slow)
+        self._refresh_pressure(station, slow=slow)
+        for plot in self._plots:
+            plot.refresh(station, slow=slow)
+        if slow:
+            self._model.refresh()
+            live = not station.robot.is_stale()
+            self._joints.set_note(f"age {age_text(station.robot.age_s())}" if live else _old(station))
+
+    def _pressure_card(self) -> Card:
+        card = Card("Plantar pressure")
+        row = QHBoxLayout()
+        for side in SIDES:
+            column = QVBoxLayout()
+            column.addWidget(self._maps[side], 1)
+            self._loads[side].setObjectName("title")
+            row_of_words = QHBoxLayout()
+            row_of_words.addStretch(1)
+            row_of_words.addWidget(self._loads[side])
+            row_of_words.addStretch(1)
+            column.addLayout(row_of_words)
+            row.addLayout(column, 1)
+        row.addWidget(ColourBar(self._desk, self._theme))
+        card.body.addLayout(row)
+        return card
+
+    def _refresh_status(self, station: Station) -> None:
+        derived = station.components.shown()
+        live = not station.robot.is_stale()
+        now_ns = derived.stamp_ns
+        phases = {leg: leg_phase(derived, leg, now_ns) for leg in Leg}
+        gait = derived.gait
+        word = "Walking" if gait.walking else "Not walking"
+        below = "" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f} steps/min"
+        self._ring.show_phases(phases, word if live else "Not known", below, live=live)
+        sources = {
+            source.value.replace("_", " ") for source in derived.sources.values() if source is not None
+        }
+        self._status.set_note(f"by {', '.join(sorted(sources))}" if live and sources else _old(station))
+
+    def _refresh_posture(self, station: Station, *, slow: bool) -> None:
+        values = station.robot.values
+        legs = {
+            side: Pose(*(values.get(f"{side}_{joint}.position") for joint in ("hip", "knee", "ankle")))
+            for side in SIDES
+        }
+        wrong = frozenset(part.name for part in station.robot.not_ok())
+        live = not station.robot.is_stale()
+        if slow:
+            angle = self._desk.shown.units.unit("position", "rad")
+            self._angles = {side: _angle_texts(pose, angle) for side, pose in legs.items()}
+        self._figure.show_pose(legs, values.get("trunk.tilt_forward"), wrong, self._angles, live=live)
+        if slow:
+            tilt = self._desk.shown.units.unit("tilt_forward", "rad")
+            text = f"trunk {tilt.text(values.get('trunk.tilt_forward'))}{tilt.symbol} forward"
+            self._posture.set_note(text if live else _old(station))
+
+    def _refresh_pressure(self, station: Station, *, slow: bool) -> None:
+        counts = tuple(len(_cell_channels(station, side)) for side in SIDES)
+        if counts != self._cells:
+            self._cells = (counts[0], counts[1])
+            for side, count in zip(SIDES, counts, strict=True):
+                self._maps[side].set_cells(cells_of(count, right=side == "right"))
+        live, values = not station.robot.is_stale(), station.robot.values
+        for side in SIDES:
+            pressures = [values.get(name) for name in _cell_channels(station, side)]
+            x, y = values.get(f"{side}_insole.cop_x"), values.get(f"{side}_insole.cop_y")
+            cop = None if x is None or y is None else (x, y)
+            self._maps[side].show_pressures(pressures, cop, live=live)
+            if slow:
+                force = self._desk.shown.units.unit("force", "N")
+                text = f"{side.upper()}  {force.text(values.get(f'{side}_insole.force'))} {force.symbol}"
+                set_text(self._loads[side], text)
+        if slow:
+            self._pressure.set_note(_layout_note(counts) if live else _old(station))
+
+
+def _angle_texts(pose: Pose, unit: Unit) -> list[str]:
+    angles = (pose.hip, pose.knee, pose.ankle)
+    return [
+        "–"
+        if angle is None
+        else f"{angle * unit.scale:+.0f}{unit.symbol}"
+        if unit.symbol == "°"
+        else f"{angle:+.2f}"
+        for angle in angles
+    ]
+
+
+def _cell_channels(station: Station, side: str) -> list[str]:
+    names: list[str] = []
+    while (name := f"{side}_insole.cell_{len(names)}") in station.robot.values:
+        names.append(name)
+    return names
+
+
+def _layout_note(counts: tuple[int, ...]) -> str:
+    count = max(counts, default=0)
+    if not count:
+        return "no insole"
+    name = layout_name(count)
+    return (
+        f"{count} cells, placed as {name}" if name else f"{count} cells in their order: no layout has so many"
+    )
+
+
+def _old(station: Station) -> str:
+    return (
+        f"STALE, {age_text(station.robot.age_s())} old"
+        if station.robot.age_s() is not None
+        else "no data yet"
+    )
+
+
+def _colour_of(channel: str, place: int) -> str:
+    side = channel.partition("_")[0]
+    return side if side in SIDES else PLAIN[place % 2]

@@ -1,0 +1,1 @@
+"""The parameters panel: tree of values and edits, the chosen one, the review, the trial, the lease."""

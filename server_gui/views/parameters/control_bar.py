@@ -1,0 +1,55 @@
+"""Who may write: take control or release it, and how long it lasts."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
+
+from server_gui.core.desk.desk import Desk
+from server_gui.views.marks import Mark
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.mark import MarkIcon
+
+
+class ControlBar(QWidget):
+    """`take` and `release` are what people decide."""
+
+    take = Signal()
+    release = Signal()
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._icon = MarkIcon(theme)
+        self.words = QLabel()
+        self.words.setObjectName("dim")
+        self.words.setWordWrap(True)
+        self._take, self._release = QPushButton("Take control"), QPushButton("Release")
+        self._take.setToolTip("One window or script at a time may write. Stopping needs no control")
+        self._release.setToolTip("Let others write; what is on trial goes back")
+        self._take.clicked.connect(self.take)
+        self._release.clicked.connect(self.release)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._icon)
+        row.addWidget(self.words, 1)
+        row.addWidget(self._take)
+        row.addWidget(self._release)
+
+    def refresh(self) -> None:
+        """Show who has it now."""
+        station = self._desk.selected
+        self.setEnabled(station is not None and station.is_linked)
+        if station is None:
+            return
+        left_s = station.control.left_s()
+        self._release.setVisible(left_s is not None)
+        set_text_of = "Renew" if left_s is not None else "Take control"
+        if self._take.text() != set_text_of:
+            self._take.setText(set_text_of)
+        if left_s is not None:
+            self._icon.show_mark(Mark("disc", "good", "in control"))
+            set_text(self.words, f"You have control for {left_s // 60:.0f}:{left_s % 60:02.0f}")
+        else:
+            self._icon.show_mark(Mark("ring", "dim", "not in control"))
+            asking = "asking …" if station.control.asking else "Looking only: writing takes control"
+            set_text(self.words, station.control.problem or asking)

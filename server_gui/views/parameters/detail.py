@@ -1,0 +1,150 @@
+"""The chosen parameter: a slider as far as one write may go, an exact field, and what is known of it."""
+
+import math
+from typing import Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPushButton, QSlider
+
+from gateway.messages import Number, ParameterInfo
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.edits import unit_of
+from server_gui.core.desk.station import Station
+from server_gui.core.processing.units import Unit
+from server_gui.views.widgets.card import Card, set_text
+
+STEPS: Final = 200
+
+
+class CalmSlider(QSlider):
+    """The wheel moves it only when it has the focus."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class Detail(Card):
+    """`typed` brings name and text, `slid` name and SI value, `dropped` the name of an edit to forget."""
+
+    typed = Signal(str, str)
+    slid = Signal(str, float)
+    dropped = Signal(str)
+
+    def __init__(self, desk: Desk) -> None:
+        super().__init__("No parameter chosen")
+        self._desk = desk
+        self._name: str | None = None
+        self._range: tuple[float, float] | None = None
+        self.slider = CalmSlider(Qt.Orientation.Horizontal)
+        self.slider.setRange(0, STEPS)
+        self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.slider.setAccessibleName("New value")
+        self.slider.valueChanged.connect(self._slid)
+        self.field = QLineEdit()
+        self.field.setAccessibleName("New value, exactly")
+        self.field.editingFinished.connect(self._typed)
+        self._unit = QLabel()
+        self._unit.setObjectName("dim")
+        self._drop = QPushButton("Forget edit")
+        self._drop.clicked.connect(self._dropped)
+        row = QHBoxLayout()
+        row.addWidget(self.slider, 3)
+        row.addWidget(self.field, 2)
+        row.addWidget(self._unit)
+        row.addWidget(self._drop)
+        self.body.addLayout(row)
+        self._facts = QLabel("Choose a parameter above; F2 or typing edits it.")
+        self._facts.setObjectName("dim")
+        self._facts.setWordWrap(True)
+        self.body.addWidget(self._facts)
+
+    def choose(self, name: str | None) -> None:
+        """Show this one."""
+        self._name = name
+        self.refresh(anew=True)
+
+    def refresh(self, *, anew: bool = False) -> None:
+        """Show how it is now; what is being typed is left alone."""
+        station = self._desk.selected
+        info = None if station is None or self._name is None else station.known.get(self._name)
+        for widget in (self.slider, self.field, self._drop):
+            widget.setEnabled(info is not None)
+        if station is None or info is None:
+            return
+        unit = unit_of(info.name, info.unit, self._desk.shown.units)
+        held, staged = station.robot.parameters.get(info.name), station.edits.staged.get(info.name)
+        current = None if held is None else held.value
+        value = staged.value if staged is not None else current
+        self.set_title(info.name)
+        set_text(self._unit, unit.symbol)
+        self._drop.setEnabled(staged is not None)
+        if anew or not (self.field.hasFocus() and self.field.isModified()):
+            text = "" if value is None else unit.editable(value)
+            if self.field.text() != text:
+                self.field.setText(text)
+        self._refresh_slider(info, current, value)
+        set_text(self._facts, _facts(station, info, unit, current))
+
+    def _refresh_slider(self, info: ParameterInfo, current: Number | None, value: Number | None) -> None:
+        self._range = reach(info, current)
+        self.slider.setEnabled(self._range is not None and info.live)
+        if self._range is None or value is None or self.slider.isSliderDown():
+            return
+        low, high = self._range
+        place = round((value - low) / (high - low) * STEPS)
+        self.slider.blockSignals(True)
+        self.slider.setValue(min(max(place, 0), STEPS))
+        self.slider.blockSignals(False)
+
+    def _slid(self, place: int) -> None:
+        station = self._desk.selected
+        if station is None or self._name is None or self._range is None:
+            return
+        low, high = self._range
+        info = station.known[self._name]
+        unit = unit_of(info.name, info.unit, self._desk.shown.units)
+        wanted = low + (high - low) * place / STEPS
+        self.slid.emit(self._name, min(max(_round(wanted, high - low, info.scale, unit), low), high))
+
+    def _typed(self) -> None:
+        if self._name is not None and self.field.isModified():
+            self.field.setModified(False)
+            self.typed.emit(self._name, self.field.text())
+
+    def _dropped(self) -> None:
+        if self._name is not None:
+            self.dropped.emit(self._name)
+
+
+def reach(info: ParameterInfo, current: Number | None) -> tuple[float, float] | None:
+    """What one write can reach, in SI; None where there are no limits."""
+    if info.min is None or info.max is None or info.max <= info.min:
+        return None
+    if info.max_step is None or current is None:
+        return float(info.min), float(info.max)
+    low, high = max(info.min, current - info.max_step), min(info.max, current + info.max_step)
+    return (float(low), float(high)) if low < high else None
+
+
+def _round(value: float, span: float, scale: float, unit: Unit) -> float:
+    """A slider gives numbers that people would type, in `unit`, no finer than a count of the device."""
+    digits = max(0, 2 - math.floor(math.log10(span * unit.scale)))
+    if scale > 0:
+        digits = min(digits, max(0, -math.floor(math.log10(scale * unit.scale) + 1e-9)))
+    return unit.si_value(f"{value * unit.scale:.{digits}f}")
+
+
+def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | None) -> str:
+    held = station.robot.parameters.get(info.name)
+    robot = "–" if current is None else f"{unit.editable(current)} {unit.symbol}".rstrip()
+    step = "" if info.max_step is None else f" · one write moves it by at most {unit.text(info.max_step)}"
+    live = "may be changed while it moves" if info.live else "only while its drive is at rest"
+    problem = (
+        station.writing.rows.get(info.name) or info.problem or (held.problem if held is not None else None)
+    )
+    said = f"\n✕ {problem}" if problem else ""
+    return f"robot {robot} · {live}{step} · object {info.object} · stored in flash: not known{said}"

@@ -1,0 +1,138 @@
+"""The review: exactly what would be written, old → new, and nothing else; then write it, or try it first."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QSpinBox,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from server_gui.core.desk.edits import Change
+from server_gui.views.theme import Theme
+
+TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "")
+TRIAL_S: Final = 30
+SETTLE_MS: Final = 400  # a click that was meant for what stood there before does not count
+
+
+class CalmSpin(QSpinBox):
+    """The wheel changes it only when it has the focus."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class Review(QWidget):
+    """`write` brings the changes that are shown, and the seconds of the trial or None; `back` leaves."""
+
+    write = Signal(tuple, object)
+    back = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.changes: tuple[Change, ...] = ()
+        self._allowed = False
+        self._settled = QTimer(self, singleShot=True)
+        self._settled.timeout.connect(lambda: self._enable(self._allowed))
+        title = QLabel("Review: this and nothing else is written")
+        title.setObjectName("title")
+        title.setWordWrap(True)
+        self.table = QTableWidget(0, len(TITLES))
+        self.table.setHorizontalHeaderLabels(TITLES)
+        self.table.setAccessibleName("Changes to be written")
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.table.verticalHeader().hide()
+        self.table.setShowGrid(False)
+        header = self.table.horizontalHeader()
+        header.setMinimumSectionSize(theme.px(16))
+        for column in range(len(TITLES)):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        self._said = QLabel()
+        self._said.setObjectName("banner")
+        self._said.setWordWrap(True)
+        self.seconds = CalmSpin()
+        self.seconds.setRange(5, 300)
+        self.seconds.setValue(TRIAL_S)
+        self.seconds.setSuffix(" s")
+        self.seconds.setAccessibleName("Length of the trial")
+        self.seconds.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.try_it = QPushButton("Try it for")
+        self.try_it.setToolTip("In force at once; the robot takes it back by itself unless you keep it")
+        self.try_it.clicked.connect(lambda: self.write.emit(self.changes, float(self.seconds.value())))
+        self.write_it = QPushButton("Write")
+        self.write_it.setObjectName("primary")
+        self.write_it.setToolTip("One transaction: all or none, read back. It does not store to flash")
+        self.write_it.clicked.connect(lambda: self.write.emit(self.changes, None))
+        back = QPushButton("Back")
+        back.setShortcut("Esc")
+        back.clicked.connect(self.back)
+        row = QHBoxLayout()
+        row.addWidget(back)
+        row.addStretch(1)
+        row.addWidget(self.try_it)
+        row.addWidget(self.seconds)
+        row.addWidget(self.write_it)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(0, 0, 0, 0)
+        everything.addWidget(title)
+        everything.addWidget(self.table, 1)
+        everything.addWidget(self._said)
+        everything.addLayout(row)
+
+    def show_changes(self, changes: tuple[Change, ...]) -> None:
+        """What would be written from now on."""
+        self.changes = changes
+        self.table.setRowCount(len(changes))
+        for row, change in enumerate(changes):
+            self._fill(row, change)
+        problems = [f"{change.name}: {change.problem}" for change in changes if change.problem]
+        elsewhere = [change.name for change in changes if change.elsewhere]
+        said = [*problems]
+        if elsewhere:
+            said.append(
+                f"Changed elsewhere since you began: {', '.join(elsewhere)}. Writing overwrites that."
+            )
+        self._said.setText(
+            "\n".join(said) or "All or none, read back from the device. Nothing is stored to flash."
+        )
+        self._said.setProperty("tone", "bad" if said else "good")
+        self._said.style().polish(self._said)
+        self._enable(False)
+        self._allowed = bool(changes) and not problems
+        self._settled.start(SETTLE_MS)
+        self.write_it.setText(f"Overwrite {len(elsewhere)}" if elsewhere else f"Write {len(changes)}")
+
+    def _enable(self, on: bool) -> None:
+        self.try_it.setEnabled(on)
+        self.write_it.setEnabled(on)
+
+    def _fill(self, row: int, change: Change) -> None:
+        old = "–" if change.old is None else change.unit.editable(change.old)
+        mark = "✕ refused" if change.problem else ("⚠ changed elsewhere" if change.elsewhere else "")
+        texts = (change.name, old, "→", change.unit.editable(change.new), change.unit.symbol, mark)
+        for column, text in enumerate(texts):
+            item = QTableWidgetItem(text)
+            if column in (1, 3):
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            if column == 3:
+                item.setFont(self._theme.text_font(bold=True))
+            if column == 5:
+                item.setForeground(self._theme.colour("bad"))
+            item.setToolTip(change.problem or "")
+            self.table.setItem(row, column, item)

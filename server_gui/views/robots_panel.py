@@ -1,0 +1,161 @@
+"""Every robot: state, age of its data, a stop of its own; add one; STOP ALL."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gateway.client import Address, BadAddress
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.views.marks import age_text, station_mark
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.stop_button import StopButton
+
+
+class RobotCard(QFrame):
+    """One robot; `chosen` when it is clicked, or Return or Space is pressed on it."""
+
+    chosen = Signal()
+
+    def __init__(self, station: Station, theme: Theme) -> None:
+        super().__init__()
+        self.station = station
+        self.setObjectName("card")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName(f"Robot {station.name}")
+        self._icon = MarkIcon(theme, 12)
+        self._name, self._state, self._link = QLabel(), QLabel(), QLabel()
+        self._name.setObjectName("title")
+        self._state.setObjectName("dim")
+        self._link.setObjectName("dim")
+        self._state.setWordWrap(True)
+        self.stop = StopButton("robot_stop")
+        self.stop.setText("Stop")
+        words = QVBoxLayout()
+        words.setSpacing(1)
+        for label in (self._name, self._state, self._link):
+            words.addWidget(label)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(9, 7, 8, 7)
+        row.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(words, 1)
+        row.addWidget(self.stop, 0, Qt.AlignmentFlag.AlignTop)
+
+    def refresh(self, *, selected: bool, twins: bool) -> None:
+        """Show how it is now; `twins`: another robot has the same name."""
+        station, robot = self.station, self.station.robot
+        mark = station_mark(station)
+        self._icon.show_mark(mark)
+        set_text(self._name, f"{station.title} at {station.address}" if twins else station.title)
+        set_text(self._state, mark.word if station.is_linked else f"{mark.word}: {_why(station)}")
+        age = age_text(robot.age_s())
+        live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
+        set_text(self._link, f"{age}{' old' if robot.age_s() is not None else ''}{live}")
+        if self.property("selected") != selected:
+            self.setProperty("selected", selected)
+            self.style().polish(self)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.chosen.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Space) and not event.modifiers():
+            self.chosen.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class RobotsPanel(QWidget):
+    """`added` brings the address of a robot to follow; `stop_all` asks for a STOP of every robot."""
+
+    added = Signal(str)
+    stop_all = Signal()
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._theme = theme
+        self._cards: list[RobotCard] = []
+        self.setObjectName("dock")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        page = QWidget()
+        page.setObjectName("page")
+        self._list = QVBoxLayout(page)
+        self._list.setContentsMargins(0, 0, 0, 0)
+        self._list.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setWidget(page)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.address = QLineEdit()
+        self.address.setPlaceholderText("Add a robot: HOST:PORT")
+        self.address.setAccessibleName("Address of a robot to add")
+        self.address.returnPressed.connect(self._add)
+        self._said = QLabel()
+        self._said.setObjectName("dim")
+        self._said.setWordWrap(True)
+        self._said.hide()
+        all_stop = StopButton()
+        all_stop.setText("STOP ALL")
+        all_stop.setAccessibleName("STOP every robot")
+        all_stop.stopped.connect(self.stop_all)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 8)
+        everything.addWidget(scroll, 1)
+        everything.addWidget(self._said)
+        everything.addWidget(self.address)
+        everything.addWidget(all_stop)
+        self.setMinimumWidth(theme.px(170))
+
+    def refresh(self) -> None:
+        """Show how all of them are now."""
+        for station in self._desk.stations[len(self._cards) :]:
+            self._add_card(station)
+        titles = [station.title for station in self._desk]
+        for card in self._cards:
+            card.refresh(
+                selected=card.station is self._desk.selected, twins=titles.count(card.station.title) > 1
+            )
+
+    def _add_card(self, station: Station) -> None:
+        card = RobotCard(station, self._theme)
+        card.chosen.connect(lambda: self._desk.select(station))
+        card.stop.stopped.connect(lambda: station.stop("stop button in the list of robots"))
+        card.stop.setAccessibleName(f"STOP {station.name}")
+        self._cards.append(card)
+        self._list.insertWidget(self._list.count() - 1, card)
+
+    def _add(self) -> None:
+        text = self.address.text().strip()
+        try:
+            where = str(Address.parse(text)) if text else ""
+        except BadAddress as error:
+            self.say(str(error))
+            return
+        if any(station.address == where for station in self._desk):
+            self.say(f"{where} is in the list already")
+        elif where:
+            self.say("")
+            self.address.clear()
+            self.added.emit(where)
+
+    def say(self, text: str) -> None:
+        """What is wrong with the address that was typed."""
+        self._said.setText(text)
+        self._said.setVisible(bool(text))
+
+
+def _why(station: Station) -> str:
+    link = station.robot.link
+    return link.problem or link.state.value

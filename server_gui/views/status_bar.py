@@ -1,0 +1,53 @@
+"""The status bar: where data come from and how well, what the window costs, and what STOP is not."""
+
+import collections
+import time
+
+from PySide6.QtWidgets import QLabel, QStatusBar
+
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.views.marks import age_text
+from server_gui.views.widgets.card import set_text
+
+FRAMES = 60
+
+
+class StatusBar(QStatusBar):
+    """One line."""
+
+    def __init__(self, desk: Desk) -> None:
+        super().__init__()
+        self._desk = desk
+        self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
+        self._link, self._window = QLabel(), QLabel()
+        stop = QLabel("STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop")
+        self.addWidget(self._link, 1)
+        self.addPermanentWidget(stop)
+        self.addPermanentWidget(self._window)
+        self.setSizeGripEnabled(False)
+
+    def frame(self) -> None:
+        """A frame was drawn."""
+        self._frames.append(time.monotonic())
+
+    def refresh(self) -> None:
+        """Show how it is now."""
+        station = self._desk.selected
+        set_text(self._link, "no robot" if station is None else _line(station))
+        set_text(self._window, f"{self._rate():.0f} frames/s")
+
+    def _rate(self) -> float:
+        if len(self._frames) < 2:
+            return 0.0
+        return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
+
+
+def _line(station: Station) -> str:
+    robot, link = station.robot, station.robot.link
+    trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
+    return (
+        f"{station.title}  {station.address}  {link.state.value} · round trip {trip} · "
+        f"{robot.rate_hz():.0f} rows/s · data {age_text(robot.age_s())} old · "
+        f"{link.missed + link.dropped} lost"
+    )

@@ -1,0 +1,234 @@
+"""Colours, dark and light, and the style that everything is drawn in. Left is blue, right is orange."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
+from PySide6.QtWidgets import QApplication
+
+SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
+BASE_POINTS: Final = 9.0
+
+
+class Look(Enum):
+    """Which palette."""
+
+    DARK = "dark"
+    LIGHT = "light"
+
+
+@dataclass(frozen=True, slots=True)
+class Colours:
+    """A palette: Okabe–Ito hues, darkened for white paper so that they keep 4.5 : 1 of contrast."""
+
+    window: str
+    panel: str
+    card: str
+    field: str
+    border: str
+    text: str
+    dim: str
+    accent: str
+    on_accent: str
+    left: str
+    right: str
+    good: str
+    warn: str
+    bad: str
+    old: str
+    staged: str
+    stop: str = "#c8102e"
+    stop_border: str = "#ffd400"
+
+
+PALETTES: Final = {
+    Look.DARK: Colours(
+        window="#10141a",
+        panel="#161b22",
+        card="#1a2028",
+        field="#12171e",
+        border="#2c3440",
+        text="#e8ecf1",
+        dim="#98a3b3",
+        accent="#3d9bea",
+        on_accent="#06121f",
+        left="#56b4e9",
+        right="#e69f00",
+        good="#2dbb8c",
+        warn="#e8d93a",
+        bad="#ff7a45",
+        old="#6d7786",
+        staged="#3a3310",
+    ),
+    Look.LIGHT: Colours(
+        window="#eef1f4",
+        panel="#f5f7f9",
+        card="#ffffff",
+        field="#ffffff",
+        border="#ced6df",
+        text="#18212c",
+        dim="#566273",
+        accent="#0a63b0",
+        on_accent="#ffffff",
+        left="#0072b2",
+        right="#b06000",
+        good="#007a58",
+        warn="#7d6c00",
+        bad="#c23b00",
+        old="#8a94a1",
+        staged="#fff3c4",
+    ),
+}
+
+STYLE: Final = """
+* {{ color: {text}; }}
+QMainWindow, QWidget#page, QStackedWidget {{ background: {window}; }}
+QMainWindow::separator {{ background: {window}; width: 4px; height: 4px; }}
+QMainWindow::separator:hover {{ background: {accent}; }}
+QToolTip {{ background: {card}; color: {text}; border: 1px solid {border}; padding: 3px; }}
+QWidget#header, QStatusBar, QWidget#dock {{ background: {panel}; }}
+QWidget#header {{ border-bottom: 1px solid {border}; }}
+QStatusBar {{ border-top: 1px solid {border}; }}
+QStatusBar QLabel {{ color: {dim}; padding: 0 6px; }}
+QStatusBar::item {{ border: none; }}
+QDockWidget {{ font-weight: bold; }}
+QDockWidget::title {{ background: {card}; padding: 6px 8px; border-bottom: 1px solid {border}; }}
+QFrame#card {{ background: {card}; border: 1px solid {border}; border-radius: 6px; }}
+QFrame#card[selected="true"] {{ border: 1px solid {accent}; border-left: 3px solid {accent}; }}
+QLabel, QCheckBox {{ background: transparent; }}
+QLabel#dim, QLabel#note {{ color: {dim}; }}
+QLabel#title {{ font-weight: bold; }}
+QLabel#brand {{ color: {accent}; padding-right: 8px; }}
+QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}
+QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
+QLabel#banner[tone="good"] {{ background: {card}; border-color: {good}; }}
+QTabWidget::pane {{ border: none; border-top: 1px solid {border}; }}
+QTabBar {{ background: {panel}; }}
+QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px 14px; border: none;
+    border-bottom: 2px solid transparent; }}
+QTabBar::tab:selected {{ color: {text}; border-bottom: 2px solid {accent}; }}
+QTabBar::tab:focus, QTabBar::tab:hover {{ color: {text}; }}
+QPushButton, QToolButton {{ background: {card}; border: 1px solid {border}; border-radius: 4px;
+    padding: 5px 10px; }}
+QPushButton:hover, QToolButton:hover {{ border-color: {accent}; }}
+QPushButton:focus, QToolButton:focus, QComboBox:focus {{ border: 1px solid {accent}; }}
+QPushButton:disabled, QToolButton:disabled {{ color: {old}; border-color: {border}; }}
+QPushButton:checked, QPushButton#primary {{ background: {accent}; color: {on_accent};
+    border-color: {accent}; }}
+QPushButton#primary {{ font-weight: bold; }}
+QPushButton#primary:disabled {{ background: {card}; color: {old}; border-color: {border}; }}
+QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_border}; border-radius: 6px;
+    font-weight: bold; padding: 6px 14px; }}
+QPushButton#stop:pressed {{ background: #7d0a1d; }}
+QPushButton#stop:focus {{ border-color: white; }}
+QPushButton#robot_stop {{ color: {bad}; border-color: {bad}; padding: 2px 8px; font-weight: bold; }}
+QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; border: 1px solid {border};
+    border-radius: 4px; padding: 4px 6px; selection-background-color: {accent};
+    selection-color: {on_accent}; }}
+QLineEdit:focus, QAbstractSpinBox:focus {{ border-color: {accent}; }}
+QComboBox QAbstractItemView, QMenu {{ background: {card}; border: 1px solid {border};
+    selection-background-color: {accent}; selection-color: {on_accent}; }}
+QMenu::item {{ padding: 5px 22px 5px 12px; }}
+QMenu::item:selected {{ background: {accent}; color: {on_accent}; }}
+QMenu::item:disabled {{ color: {old}; }}
+QAbstractItemView {{ background: {card}; alternate-background-color: {panel}; border: none;
+    selection-background-color: {selection}; selection-color: {text}; outline: 0; }}
+QAbstractItemView#framed {{ border: 1px solid {border}; }}
+QTreeView::item {{ padding: 3px 0; }}
+QHeaderView {{ background: {panel}; }}
+QHeaderView::section {{ background: {panel}; color: {dim}; border: none; border-right: 1px solid {border};
+    border-bottom: 1px solid {border}; padding: 4px 6px; }}
+QScrollArea, QScrollArea > QWidget > QWidget#page {{ background: transparent; border: none; }}
+QScrollBar:vertical {{ background: transparent; width: 9px; }}
+QScrollBar:horizontal {{ background: transparent; height: 9px; }}
+QScrollBar::handle {{ background: {border}; border-radius: 4px; min-height: 24px; min-width: 24px; }}
+QScrollBar::handle:hover {{ background: {old}; }}
+QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
+QSlider::groove:horizontal {{ background: {border}; height: 4px; border-radius: 2px; }}
+QSlider::sub-page:horizontal {{ background: {accent}; border-radius: 2px; }}
+QSlider::handle:horizontal {{ background: {text}; width: 12px; margin: -5px 0; border-radius: 6px; }}
+QSlider::handle:horizontal:focus {{ background: {accent}; }}
+QProgressBar {{ background: {field}; border: 1px solid {border}; border-radius: 4px; max-height: 8px; }}
+QProgressBar::chunk {{ background: {accent}; border-radius: 3px; }}
+"""
+
+
+class Theme(QObject):
+    """The look in force; `changed` is emitted when another one is."""
+
+    changed = Signal()
+
+    def __init__(self, application: QApplication, look: Look = Look.DARK, scale: float = 1.0) -> None:
+        super().__init__(application)
+        self._application = application
+        self._family = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont).family()
+        self.look, self.scale = look, scale
+        self.colours = PALETTES[look]
+        self.set(look, scale)
+
+    def set(self, look: Look | None = None, scale: float | None = None) -> None:
+        """Another palette, or another size of all text between 80 and 200 %."""
+        self.look = self.look if look is None else look
+        self.scale = self.scale if scale is None else min(max(scale, SMALLEST_SCALE), LARGEST_SCALE)
+        self.colours = PALETTES[self.look]
+        font = QFont(self._family)
+        font.setPointSizeF(BASE_POINTS * self.scale)
+        self._application.setFont(font)
+        self._application.setPalette(self._palette())
+        self._application.setStyleSheet(self._style())
+        self.changed.emit()
+
+    def colour(self, name: str) -> QColor:
+        """A colour of the palette by its name."""
+        return QColor(getattr(self.colours, name))
+
+    def px(self, pixels: float) -> int:
+        """A length that grows with the text."""
+        return round(pixels * self.scale)
+
+    def side(self, component: str) -> QColor:
+        """Left is blue, right is orange, what has no side is plain."""
+        side = component.partition("_")[0]
+        return self.colour(side) if side in ("left", "right") else self.colour("text")
+
+    def number_font(self, factor: float = 1.0, *, bold: bool = False) -> QFont:
+        """For numbers that change: every digit as wide as the others."""
+        font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+        font.setPointSizeF(BASE_POINTS * self.scale * factor)
+        font.setBold(bold)
+        return font
+
+    def text_font(self, factor: float = 1.0, *, bold: bool = False) -> QFont:
+        """For everything else."""
+        font = QFont(self._family)
+        font.setPointSizeF(BASE_POINTS * self.scale * factor)
+        font.setBold(bold)
+        return font
+
+    def _style(self) -> str:
+        colours = {name: getattr(self.colours, name) for name in Colours.__slots__}
+        selection = self.colour("accent")
+        selection.setAlpha(70)
+        return STYLE.format(**colours, selection=selection.name(QColor.NameFormat.HexArgb))
+
+    def _palette(self) -> QPalette:
+        roles = {
+            QPalette.ColorRole.Window: "window",
+            QPalette.ColorRole.WindowText: "text",
+            QPalette.ColorRole.Base: "field",
+            QPalette.ColorRole.AlternateBase: "panel",
+            QPalette.ColorRole.Text: "text",
+            QPalette.ColorRole.Button: "card",
+            QPalette.ColorRole.ButtonText: "text",
+            QPalette.ColorRole.Highlight: "accent",
+            QPalette.ColorRole.HighlightedText: "on_accent",
+            QPalette.ColorRole.PlaceholderText: "old",
+            QPalette.ColorRole.ToolTipBase: "card",
+            QPalette.ColorRole.ToolTipText: "text",
+        }
+        palette = QPalette()
+        for role, name in roles.items():
+            palette.setColor(role, self.colour(name))
+        return palette

@@ -1,0 +1,99 @@
+"""The gait-phase ring: where each leg is in its stride; left is the outer ring, right the inner."""
+
+import math
+from typing import Final
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from server_gui.core.desk.walk import PHASES, LegPhase
+from server_gui.core.processing.gait_events import Leg
+from server_gui.views.theme import Theme
+
+GAP_DEG: Final = 2.4  # between two phases
+DIM: Final = 70  # opacity of the phases that are not now, of 255
+
+
+class GaitRing(QWidget):
+    """Shows a word in the middle, what is known of it below, and each leg's phase around."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self._phases: dict[Leg, LegPhase | None] = dict.fromkeys(Leg)
+        self._word, self._below, self._live = "", "", False
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(150, 150)
+        self.setAccessibleName("Gait phase")
+
+    def sizeHint(self) -> QSize:
+        return QSize(230, 230)
+
+    def show_phases(self, phases: dict[Leg, LegPhase | None], word: str, below: str, *, live: bool) -> None:
+        """Draw these; what is not `live` is grey."""
+        self._phases, self._word, self._below, self._live = phases, word, below, live
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        side = min(self.width(), self.height()) - 6.0
+        box = QRectF((self.width() - side) / 2, (self.height() - side) / 2, side, side)
+        band = side * 0.075
+        outer = box.adjusted(band / 2, band / 2, -band / 2, -band / 2)
+        inset = band * 1.35
+        inner = outer.adjusted(inset, inset, -inset, -inset)
+        for leg, ring in ((Leg.LEFT, outer), (Leg.RIGHT, inner)):
+            self._draw_ring(painter, leg, ring, band)
+        self._draw_words(painter, inner.adjusted(band, band, -band, -band))
+        painter.end()
+
+    def _colour(self, leg: Leg) -> QColor:
+        return self._theme.colour(leg.value if self._live else "old")
+
+    def _draw_ring(self, painter: QPainter, leg: Leg, ring: QRectF, band: float) -> None:
+        now = self._phases[leg]
+        pen = QPen(self._colour(leg), band)
+        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+        begin = 0.0
+        for name, end in PHASES:
+            colour = self._colour(leg)
+            colour.setAlpha(255 if now is not None and now.phase == name else DIM)
+            pen.setColor(colour)
+            painter.setPen(pen)
+            first, last = 3.6 * begin + GAP_DEG / 2, 3.6 * end - GAP_DEG / 2
+            painter.drawArc(ring, round((90 - first) * 16), round((first - last) * 16))
+            begin = end
+        if now is not None:
+            self._draw_needle(painter, ring, band, now.percent)
+
+    def _draw_needle(self, painter: QPainter, ring: QRectF, band: float, percent: float) -> None:
+        angle = math.radians(3.6 * percent)
+        direction = QPointF(math.sin(angle), -math.cos(angle))
+        radius = ring.width() / 2
+        painter.setPen(QPen(self._theme.colour("text"), 3.0))
+        middle = ring.center()
+        painter.drawLine(
+            middle + direction * (radius - band * 0.6), middle + direction * (radius + band * 0.6)
+        )
+
+    def _draw_words(self, painter: QPainter, box: QRectF) -> None:
+        theme = self._theme
+        line = box.height() / 5.2
+        size = max(0.8, min(1.6, box.width() / theme.px(140)))
+        rows = [(self._word, "text" if self._live else "old", 1.25 * size, True)]
+        rows += [(self._below, "dim", 0.85 * size, False)]
+        for leg in Leg:
+            now = self._phases[leg]
+            said = f"{leg.value[0].upper()}  {now.phase} {now.percent:.0f} %" if now else ""
+            rows.append((said, leg.value if self._live else "old", 0.85 * size, False))
+        top = box.center().y() - line * 2
+        for text, colour, factor, bold in rows:
+            font = theme.text_font(factor, bold=bold)
+            painter.setFont(font)
+            painter.setPen(theme.colour(colour))
+            painter.drawText(
+                QRectF(box.left() - 12, top, box.width() + 24, line), Qt.AlignmentFlag.AlignCenter, text
+            )
+            top += line
