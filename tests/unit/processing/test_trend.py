@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import scipy.stats  # type: ignore[import-untyped]
+import scipy.stats
 
 from server_gui.core.processing.trend import rank_sum_p, theil_sen
 
