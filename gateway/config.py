@@ -61,6 +61,26 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     stuck_s: Annotated[float, Meta(gt=0, le=3600)] = 30.0
 
 
+class ControlLoopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[control_loop]`: the robot's own control program, on this computer.
+
+    `processes` are names, or globs of them, as `ps` shows them, or of the programs that they run. Where `bus`
+    is given, it puts a frame with `can_id` there each `period_ms`; one that comes more than `late_ms` after
+    its time (half a period) is an overrun.
+    """
+
+    processes: Annotated[tuple[str, ...], Meta(min_length=1)]
+    bus: str | None = None
+    can_id: Annotated[int, Meta(ge=0, le=0x1FFF_FFFF)] = 0x080
+    period_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None
+    late_ms: Annotated[float, Meta(gt=0)] | None = None
+
+    @property
+    def tolerance_ms(self) -> float:
+        """After a frame's time."""
+        return (self.period_ms or 0.0) / 2 if self.late_ms is None else self.late_ms
+
+
 class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`[joint.NAME]`: a joint, and what its EDS offers as parameters."""
 
@@ -112,6 +132,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     parameter: dict[str, ParameterSettings] = {}
     stop: StopSettings = StopSettings()
     guard: GuardSettings | None = None
+    control_loop: ControlLoopSettings | None = None
 
     def sharing(self, component: str) -> tuple[str, ...]:
         """The joints and devices on one's node, itself among them: the axes of one drive."""
@@ -134,6 +155,7 @@ _SINGLE: Mapping[str, type[Struct]] = {
     "robot": RobotSettings,
     "gateway": GatewaySettings,
     "stop": StopSettings,
+    "control_loop": ControlLoopSettings,
 }
 _NAMED: Mapping[str, type[Struct]] = {
     "can": CanSettings,
@@ -251,6 +273,8 @@ def _complaints(config: RobotConfig) -> Iterator[str]:
     for name, parameter in config.parameter.items():
         yield from _about_parameter(config, name, parameter)
     yield from about_stop(config, config.stop)
+    if config.control_loop is not None:
+        yield from _about_control_loop(config, config.control_loop)
     if config.guard is not None:
         yield from about_guard(config, config.guard)
 
@@ -313,6 +337,14 @@ def _about_ports(config: RobotConfig) -> Iterator[str]:
         if imu.port in taken:
             yield f"{where} port: {imu.port!r} is in use by {taken[imu.port]}; each sensor has its own port"
         taken[imu.port] = where
+
+
+def _about_control_loop(config: RobotConfig, loop: ControlLoopSettings) -> Iterator[str]:
+    if loop.bus is not None and loop.bus not in config.can:
+        known = ", ".join(config.can) or "none"
+        yield f"[control_loop] bus: there is no bus {loop.bus!r}; [can.NAME] tables here: {known}"
+    if (loop.bus is None) != (loop.period_ms is None):
+        yield "[control_loop] bus and period_ms belong together: on which bus its frames come, and how often"
 
 
 def _about_release(where: str, name: str, device: JointTable | DeviceTable) -> Iterator[str]:

@@ -3,36 +3,16 @@
 import resource
 import threading
 import time
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from gateway.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
 from gateway.outlets import Outlet
+from gateway.rates import Rates
 from gateway.session import Session
 from gateway.streams import Streams
 
 FRAME_BITS = 47  # of an 11-bit data frame, with the gap behind it and without its data
-
-
-class Rates:
-    """Counters' rates since the last look."""
-
-    def __init__(self) -> None:
-        self._before: dict[Hashable, float] = {}
-        self._now: dict[Hashable, float] = {}
-        self._looked_ns = 0
-        self._elapsed_s = 0.0
-
-    def look(self, now_ns: int) -> None:
-        """Begin another look; what was not asked for in the last is forgotten."""
-        self._before, self._now = self._now, {}
-        self._elapsed_s, self._looked_ns = (now_ns - self._looked_ns) / 1e9, now_ns
-
-    def __call__(self, counter: Hashable, value: float) -> float | None:
-        """Its rate a second; `None` where it is new."""
-        self._now[counter] = value
-        before = self._before.get(counter)
-        return None if before is None or self._elapsed_s <= 0 else (value - before) / self._elapsed_s
 
 
 class Costs:
@@ -55,10 +35,10 @@ class Costs:
         self._rate.look(now_ns)
         return GatewayCost(
             stamp_ns=now_ns,
-            cpu_percent=self._percent("cpu", time.process_time_ns()),
+            cpu_percent=self._rate.percent("cpu", time.process_time_ns()),
             rss_bytes=rss_bytes,
             threads=threading.active_count(),
-            wake_ups_per_s=self._rounded("wake-ups", usage.ru_nvcsw + usage.ru_nivcsw),
+            wake_ups_per_s=self._rate.rounded("wake-ups", usage.ru_nvcsw + usage.ru_nivcsw),
             modules=dict(modules),
             buses={name: self._bus(name, bus) for name, bus in buses.items()},
             clients=[self._client(session, streams.of(session)) for session in sessions],
@@ -68,10 +48,10 @@ class Costs:
     def _client(self, session: Session, outlets: list[Outlet]) -> ClientCost:
         return ClientCost(
             who=session.who,
-            cpu_percent=self._percent((session, "cpu"), session.cpu_ns),
-            requests_per_s=self._rounded((session, "requests"), session.requests),
-            sent_bytes_per_s=self._rounded((session, "sent"), session.sent_bytes),
-            received_bytes_per_s=self._rounded((session, "received"), session.received_bytes),
+            cpu_percent=self._rate.percent((session, "cpu"), session.cpu_ns),
+            requests_per_s=self._rate.rounded((session, "requests"), session.requests),
+            sent_bytes_per_s=self._rate.rounded((session, "sent"), session.sent_bytes),
+            received_bytes_per_s=self._rate.rounded((session, "received"), session.received_bytes),
             waiting_bytes=session.waiting_bytes + sum(outlet.waiting_bytes for outlet in outlets),
             streams=[self._stream(outlet) for outlet in outlets],
         )
@@ -81,7 +61,7 @@ class Costs:
             stream=outlet.number,
             rate_hz=outlet.feed.rate_hz,
             channels=outlet.feed.channels,
-            rows_per_s=self._rounded((outlet, "rows"), outlet.rows),
+            rows_per_s=self._rate.rounded((outlet, "rows"), outlet.rows),
             dropped=outlet.dropped,
             shed=outlet.feed.shed,
         )
@@ -90,16 +70,8 @@ class Costs:
         bitrate = bus.settings.bitrate
         bits = self._rate((name, "bits"), FRAME_BITS * bus.sent + 8 * bus.sent_bytes)
         return BusCost(
-            sent_frames_per_s=self._rounded((name, "sent"), bus.sent),
-            sent_bytes_per_s=self._rounded((name, "bytes"), bus.sent_bytes),
-            received_frames_per_s=self._rounded((name, "received"), bus.frames),
+            sent_frames_per_s=self._rate.rounded((name, "sent"), bus.sent),
+            sent_bytes_per_s=self._rate.rounded((name, "bytes"), bus.sent_bytes),
+            received_frames_per_s=self._rate.rounded((name, "received"), bus.frames),
             load_percent=None if bits is None or not bitrate else round(2 * 100 * bits / bitrate, 3),
         )
-
-    def _percent(self, counter: Hashable, spent_ns: int) -> float | None:
-        rate = self._rate(counter, spent_ns)
-        return None if rate is None else round(rate / 1e7, 3)
-
-    def _rounded(self, counter: Hashable, value: float) -> float | None:
-        rate = self._rate(counter, value)
-        return None if rate is None else round(rate, 1)

@@ -13,7 +13,7 @@ Globs = list[str]
 Number = int | float
 Seconds = Annotated[float, Meta(gt=0, le=300)]
 ModuleName = Literal["component", "status", "resource"]
-Include = Literal["disk", "network", "thermal", "kernel", "cmdline"]
+Include = Literal["disk", "network", "thermal", "kernel", "cmdline", "control"]
 
 
 class Params(Struct, frozen=True, forbid_unknown_fields=True):
@@ -395,6 +395,73 @@ class KernelFacts(Struct, frozen=True):
     utc_synchronised: bool | None = None
 
 
+class ThreadUse(Struct, frozen=True):
+    """One thread of a control process; percentages are of one core.
+
+    `wait_percent` is the time it was ready to run while others ran. `priority` is 1 to 99 of a real-time
+    policy, else its nice value.
+    """
+
+    tid: int
+    name: str
+    cpu_percent: float | None
+    wait_percent: float | None
+    policy: str  # other, batch, idle, fifo, rr, deadline
+    priority: int
+    core: int  # that it last ran on
+    switches_per_s: float | None  # because it waited for something
+    forced_switches_per_s: float | None  # because another was to run
+
+
+class ControlProcess(Struct, frozen=True):
+    """One process of `[control_loop]`; what its owner hides from us is `None`."""
+
+    pid: int
+    name: str
+    minor_faults_per_s: float | None
+    major_faults_per_s: float | None  # that had to wait for a disk
+    read_bytes_per_s: float | None  # from disks
+    write_bytes_per_s: float | None
+    threads: list[ThreadUse]
+
+
+class RanInstead(Struct, frozen=True):
+    """A process that ran on a core of the control loop while that was late, and its busiest thread."""
+
+    pid: int
+    name: str
+    thread: str
+    ran_ms: float  # all its threads
+    core: int
+    policy: str
+    priority: int
+
+
+class Overrun(Struct, frozen=True):
+    """A frame of the control loop that came too late, and what the computer did since the one before.
+
+    `reason` is others_ran (it was ready, and others ran), own_work (it ran longer than it usually does) or
+    asleep (it waited for a device, a lock or its timer).
+    """
+
+    stamp_ns: int
+    late_ms: float
+    reason: str
+    ran_ms: float  # the control loop itself
+    waited_ms: float  # it was ready to run
+    instead: list[RanInstead]  # the longest first
+
+
+class Overruns(Struct, frozen=True):
+    """Result of `resource.overruns`: since this connection asked last; watched as long as it lasts."""
+
+    watching_since_ns: int
+    control: dict[str, str]  # the control loop's processes that are there: process id → name
+    cycles: int  # since it is watched
+    missed: int
+    overruns: list[Overrun]
+
+
 class ResourceSnapshot(Struct, frozen=True):
     """Result of `resource.snapshot`; what was not asked for is not there."""
 
@@ -408,6 +475,7 @@ class ResourceSnapshot(Struct, frozen=True):
     thermal: dict[str, float | None] | UnsetType = UNSET  # sensor → °C
     throttling: Throttling | UnsetType = UNSET  # comes with `thermal`
     kernel: KernelFacts | UnsetType = UNSET
+    control: list[ControlProcess] | UnsetType = UNSET
 
 
 QualityInfo = dict[str, str | int | float | None]  # state, age_ms, problem, and the component's own counters
@@ -551,6 +619,7 @@ METHODS: Final[dict[str, Method]] = {
     "robot.stop": Method(StopParams, Stopped, urgent=True),
     "gateway.cost": Method(Params, GatewayCost),
     "resource.snapshot": Method(ResourceSnapshotParams, ResourceSnapshot),
+    "resource.overruns": Method(Params, Overruns),
     "component.snapshot": Method(SnapshotParams, Snapshot),
     "status.snapshot": Method(Params, Snapshot),
     "stream.start": Method(StreamStartParams, StreamStarted),

@@ -59,6 +59,7 @@ class Spec:
 MODULES: Mapping[str, Spec] = {
     "resource": Spec("gateway.modules.resource:ResourceModule"),
     "component": Spec("gateway.modules.component:ComponentModule"),
+    "blame": Spec("gateway.modules.blame:BlameModule", needs=("component",)),
     "status": Spec("gateway.modules.status:StatusModule", needs=("component", "resource")),
     "control": Spec("gateway.modules.control:ControlModule", needs=("component",)),
     "guard": Spec("gateway.guard.module:GuardModule", needs=("component", "control")),

@@ -30,6 +30,7 @@ CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are 
 # Which module answers what; the rest is the service's own.
 MODULE_OF: Mapping[str, str] = {
     "resource.snapshot": "resource",
+    "resource.overruns": "blame",
     "component.snapshot": "component",
     "status.snapshot": "status",
     "robot.stop": "control",

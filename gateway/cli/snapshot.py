@@ -7,12 +7,19 @@ from collections.abc import Iterator
 import msgspec
 
 from gateway.cli.reach import channel_names, check_names, parser, reach
-from gateway.cli.text import NONE, age, measured, percent, say, say_json, size, table
+from gateway.cli.text import NONE, age, exact, measured, percent, say, say_json, size, table
 from gateway.client import Robot
-from gateway.messages import Description, QualityInfo, ResourceSnapshot, ResourceSnapshotParams, Snapshot
+from gateway.messages import (
+    ControlProcess,
+    Description,
+    QualityInfo,
+    ResourceSnapshot,
+    ResourceSnapshotParams,
+    Snapshot,
+)
 
 BETWEEN_LOOKS_S = 0.5  # what CPU percentages are taken over
-INCLUDE = ("disk", "network", "thermal", "kernel", "cmdline")
+INCLUDE = ("disk", "network", "thermal", "kernel", "cmdline", "control")
 
 EPILOG = """examples:
   gwrms snapshot resource --sort memory --limit 10
@@ -74,6 +81,8 @@ def _resource(robot: Robot, arguments: argparse.Namespace) -> int:
 
 def _resource_text(snapshot: ResourceSnapshot) -> str:
     facts = "".join(f"{name:<8} {text}\n" for name, text in _facts(snapshot))
+    if isinstance(snapshot.control, list):
+        facts += "\n" + _control_text(snapshot.control)
     if not isinstance(snapshot.processes, list):
         return facts
     rows = [
@@ -81,6 +90,35 @@ def _resource_text(snapshot: ResourceSnapshot) -> str:
         for found in snapshot.processes
     ]
     return facts + "\n" + table(("PID", "CPU", "MEMORY", "NAME"), rows, right=(0, 1, 2))
+
+
+def _control_text(processes: list[ControlProcess]) -> str:
+    header = ("THREAD", "OF", "CPU", "WAITED", "POLICY", "CORE", "SWITCHES/S", "FORCED/S")
+    rows = [
+        (
+            f"{one.name} ({one.tid})",
+            f"{process.name} ({process.pid})",
+            percent(one.cpu_percent),
+            percent(one.wait_percent),
+            f"{one.policy} {one.priority}",
+            str(one.core),
+            exact(one.switches_per_s),
+            exact(one.forced_switches_per_s),
+        )
+        for process in processes
+        for one in process.threads
+    ]
+    lines = [
+        f"{process.name} ({process.pid}): page faults {exact(process.minor_faults_per_s)}/s, "
+        f"from disk {exact(process.major_faults_per_s)}/s, "
+        f"read {_per_s(process.read_bytes_per_s)}, written {_per_s(process.write_bytes_per_s)}\n"
+        for process in processes
+    ]
+    return table(header, rows, right=(2, 3, 5, 6, 7)) + "".join(lines)
+
+
+def _per_s(count: float | None) -> str:
+    return NONE if count is None else f"{size(count)}/s"
 
 
 def _facts(snapshot: ResourceSnapshot) -> Iterator[tuple[str, str]]:

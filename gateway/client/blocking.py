@@ -17,6 +17,7 @@ from gateway.messages import (
     GatewayCost,
     JournalEntries,
     ModuleName,
+    Overruns,
     ParameterValues,
     Reset,
     ResourceSnapshot,
@@ -91,6 +92,10 @@ class Robot:
     def cost(self) -> GatewayCost:
         """What monitoring costs the robot; rates are since the last call, None the first time."""
         return self._wait(self._client.cost())
+
+    def overruns(self) -> Overruns:
+        """Late cycles of the robot's control loop since the last call; watched while the link lasts."""
+        return self._wait(self._client.overruns())
 
     def status(self) -> Snapshot:
         """The merged set that status prediction needs."""

@@ -20,6 +20,7 @@ from gateway.messages import (
     JournalEntries,
     Lease,
     ModuleName,
+    Overruns,
     ParameterParams,
     ParameterValues,
     ParameterWriteParams,
@@ -100,6 +101,10 @@ class Client:
     async def cost(self) -> GatewayCost:
         """What monitoring costs the robot; rates are since the last call, None the first time."""
         return await self.link.call("gateway.cost", Params(), GatewayCost)
+
+    async def overruns(self) -> Overruns:
+        """Late cycles of the robot's control loop since the last call; watched while the link lasts."""
+        return await self.link.call("resource.overruns", Params(), Overruns)
 
     async def status(self) -> Snapshot:
         """The merged set that status prediction needs."""

@@ -3,14 +3,15 @@
 import os
 import sys
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping, Sequence, Set
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec import UNSET
 from msgspec.structs import replace
 
 from gateway.messages import (
+    ControlProcess,
     CpuUse,
     DiskUse,
     GatewayUse,
@@ -21,15 +22,19 @@ from gateway.messages import (
 )
 from gateway.modules.counters import CoreTimes, Counters, ProcessTimes
 
+if TYPE_CHECKING:
+    from gateway.modules.scheduling import Scheduling
+
 
 class Host:
-    """The computer; whoever asks has a meter of their own."""
+    """The computer; whoever asks has a meter of their own. `control` are the names of `[control_loop]`."""
 
-    def __init__(self) -> None:
+    def __init__(self, control: Sequence[str] = ()) -> None:
         self._counters = _counters()
+        self._control = control
 
     def meter(self) -> "Meter":
-        return Meter(self._counters)
+        return Meter(self._counters, self._control)
 
     def own_rss_bytes(self) -> int:
         return self._counters.own_rss_bytes()
@@ -53,8 +58,10 @@ def _counters() -> Counters:
 class Meter:
     """One asker's view: remembers its last look, so that percentages are since then."""
 
-    def __init__(self, counters: Counters) -> None:
+    def __init__(self, counters: Counters, control: Sequence[str] = ()) -> None:
         self._counters = counters
+        self._control = control
+        self._scheduling: Scheduling | None = None
         self._looked_ns: int | None = None
         self._scanned_ns = 0
         self._cores: list[CoreTimes] = []
@@ -123,10 +130,14 @@ class Meter:
         words = self._counters.command_line(row.pid)
         return ProcessUse(row.pid, row.name, row.cpu_percent, row.memory_bytes, redact(words))
 
-    def _extras(self, named: Collection[str], now_ns: int) -> dict[str, Any]:
+    def _extras(self, named: Set[str], now_ns: int) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        if "control" in named:
+            found["control"] = self._control_processes(now_ns)
+        if named <= {"control"}:
+            return found
         from gateway.modules import extras  # on Linux, psutil is needed only there
 
-        found: dict[str, Any] = {}
         if "disk" in named:
             found["disk"] = DiskUse(*self._rates_of(("read", "write"), extras.disk(), now_ns))
         if "network" in named:
@@ -136,6 +147,13 @@ class Meter:
         if "kernel" in named:
             found["kernel"] = extras.kernel()
         return found
+
+    def _control_processes(self, now_ns: int) -> list[ControlProcess]:
+        if self._scheduling is None:
+            from gateway.modules.scheduling import Scheduling
+
+            self._scheduling = Scheduling(self._control)
+        return self._scheduling.look(now_ns)
 
     def _rates_of(
         self, names: tuple[str, str], values: tuple[int, int] | None, now_ns: int

@@ -10,6 +10,7 @@ from drivers.latest import Latest, Listener
 from drivers.samples import Channel
 from gateway.messages import ResourceSnapshot, ResourceSnapshotParams
 from gateway.sources import Selection, whole
+from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
     from gateway.loop import Timer
@@ -97,13 +98,15 @@ class ResourceModule:
 
     def __init__(self, context: "Context") -> None:
         self._context = context
+        loop = context.config.control_loop
+        self._control = () if loop is None else loop.processes
         self._meters: dict[tuple[Session, str], Meter] = {}
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.snapshot": self._snapshot}
 
     def start(self) -> None:
         from gateway.modules.host import Host  # how it measures is loaded with the first question
 
-        self._host = Host()
+        self._host = Host(self._control)
         self._source = HostSource(self._context, self._host)
 
     def stop(self) -> None:
@@ -133,4 +136,6 @@ class ResourceModule:
         self._meters.pop((session, method), None)
 
     def _snapshot(self, session: "Session", params: ResourceSnapshotParams) -> ResourceSnapshot:
+        if "control" in params.include and not self._control:
+            raise refuse(Kind.BAD_PARAMS, "control: the robot's file names no processes in [control_loop]")
         return self.measure(session, "resource.snapshot", params)

@@ -9,10 +9,11 @@ import pytest
 
 from gateway.budget import Budget
 from gateway.cli.cost import text
-from gateway.cost import Costs, Rates
+from gateway.cost import Costs
 from gateway.loop import Loop
 from gateway.main import main
 from gateway.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
+from gateway.rates import Rates
 from gateway.streams import Streams
 from tests.unit.gateway.harness import Bench, Client, config, serving, until
 
