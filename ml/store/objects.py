@@ -87,8 +87,11 @@ class Objects:
     def write(self, path: str, pieces: Iterable[bytes]) -> str:
         """Write an object, whole or not at all, over what is there; the service's entity tag."""
         with translated(f"{self.url}/{path} cannot be written"):
-            done = obstore.put(self._objects, path, iter(pieces), chunk_size=PIECE_BYTES)
-            return (done["e_tag"] or "").strip('"')
+            writer = obstore.open_writer(self._objects, path, buffer_size=PIECE_BYTES)
+            for piece in pieces:
+                writer.write(piece)
+            writer.close()  # without that, after an error, nothing is there
+            return (obstore.head(self._objects, path)["e_tag"] or "").strip('"')
 
     def remove(self, path: str) -> None:
         """Delete an object, if it is there."""

@@ -32,7 +32,7 @@ from ml.store.tables import Table
 ATTEMPTS: Final = 20  # races that an append may lose before it gives up
 CHECKPOINT_EVERY: Final = 50  # commits; a reader never replays more log than this
 ROW_GROUP: Final = 100_000  # rows that are read or left out together
-_ABOUT: Final = "store.json"
+ABOUT: Final = "store.json"
 FORMAT: Final = 1  # of the store as a whole
 # We make checkpoints ourselves, so that those in a folder are synchronised like everything else.
 NO_HOOKS: Final = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
@@ -87,7 +87,7 @@ class Store:
         """
         url = checked_url(url or default_url())
         folder = Path(urlsplit(url).path) if url.startswith("file://") else None
-        there = (folder / _ABOUT).exists() if folder else Objects(url).read(_ABOUT) is not None
+        there = (folder / ABOUT).exists() if folder else Objects(url).read(ABOUT) is not None
         if not there:
             raise NoSuchTable(f"there is no store at {url} yet: nothing has been uploaded to it")
         return cls(url, several_writers=False)
@@ -175,17 +175,17 @@ class Store:
 
     def _about(self, wanted: About) -> About:
         """What the store is; a new one is probed first."""
-        data = self.objects.read(_ABOUT)
+        data = self.objects.read(ABOUT)
         if data is None:
             if self.folder is None and wanted.several_writers:
                 probe(self.objects)
-            if self.objects.create(_ABOUT, msgspec.json.encode(wanted)) and self.folder is not None:
-                durable.synchronise([self.folder / _ABOUT])
-            data = self.objects.read(_ABOUT) or b""
+            if self.objects.create(ABOUT, msgspec.json.encode(wanted)) and self.folder is not None:
+                durable.synchronise([self.folder / ABOUT])
+            data = self.objects.read(ABOUT) or b""
         try:
             about = msgspec.json.decode(data, type=About)
         except msgspec.DecodeError as error:
-            raise StoreError(f"{self.url}/{_ABOUT} is damaged: {error}") from error
+            raise StoreError(f"{self.url}/{ABOUT} is damaged: {error}") from error
         if about.format != FORMAT:
             raise StoreError(f"the store {self.url} has format {about.format}; this GWRMS reads {FORMAT}")
         return about

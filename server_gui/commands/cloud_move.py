@@ -8,7 +8,6 @@ from pathlib import Path
 from gateway.cli.text import say, say_json, size
 from ml.store import sessions
 from ml.store.errors import StoreError
-from ml.store.objects import Objects
 from ml.store.sessions import Session
 from ml.store.store import Store, checked_url
 from server_gui.commands.cloud_reach import add_url, parser, progress, reach, url
@@ -103,7 +102,8 @@ def download(argv: list[str]) -> int:
 
 def _copy(source: str, target: str, arguments: argparse.Namespace) -> int:
     """A whole store."""
-    from_, to = Store.existing(source).objects, Objects(target)
+    store = Store.existing(source)
+    from_, to = store.objects, transfer.open_target(store, target)
     wanted = transfer.missing(from_, to)
     with progress("bytes", sum(found.size_bytes for found in wanted), bytes_=True) as advance:
         done = transfer.copy(from_, to, wanted, advance)

@@ -15,6 +15,8 @@ from urllib.parse import urlsplit
 from ml.store import durable
 from ml.store.errors import StoreError, translated
 from ml.store.objects import PIECE_BYTES, Object, Objects
+from ml.store.probe import probe
+from ml.store.store import ABOUT, Store
 from server_gui.core.cloud.checksums import Digest, proven
 
 Advance = Callable[[int], object]
@@ -40,6 +42,14 @@ class Copied:
             self.by_size + other.by_size,
             self.size_bytes + other.size_bytes,
         )
+
+
+def open_target(source: Store, url: str) -> Objects:
+    """Where a copy of this store may be; raises `UnsafeStore` where several writers could not write to it."""
+    target = Objects(url)
+    if source.about.several_writers and not url.startswith("file://") and target.read(ABOUT) is None:
+        probe(target)
+    return target
 
 
 def missing(source: Objects, target: Objects) -> list[Object]:
@@ -77,13 +87,13 @@ def _copy(source: Objects, target: Objects, found: Object, advance: Advance) -> 
         file = Path(urlsplit(target.url).path) / found.path
         with translated(f"{file} cannot be written"):
             _into(file, source, found, digest, advance)
-        return proven(source, found, digest)
+        return proven(source, found, digest, ours=False)
     pieces = _told(digest.of(source.pieces(found)), advance)
     if _ENTRY.fullmatch(found.path):
         if not target.create(found.path, b"".join(pieces)):
             raise StoreError(f"{target.url} is written to by others: copy to a place of its own")
         return True
-    return proven(target, replace(found, tag=target.write(found.path, pieces)), digest)
+    return proven(target, replace(found, tag=target.write(found.path, pieces)), digest, ours=True)
 
 
 def _into(file: Path, source: Objects, found: Object, digest: Digest, advance: Advance) -> None:

@@ -143,7 +143,8 @@ def test_what_is_missing_is_no_message_or_nan_and_never_zero(tmp_path: Path) -> 
     "kind",
     [
         "sensor_msgs/JointState", "sensor_msgs/Imu", "sensor_msgs/FluidPressure", "sensor_msgs/Temperature",
-        "std_msgs/Float64", "std_msgs/Float64MultiArray", "std_msgs/String", "diagnostic_msgs/DiagnosticArray",
+        "std_msgs/Float64", "std_msgs/Float64MultiArray", "std_msgs/String",
+        "diagnostic_msgs/DiagnosticArray",
     ],
 )  # fmt: skip
 def test_messages_are_defined_as_ros_2_defines_them(kind: str) -> None:

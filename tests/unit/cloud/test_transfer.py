@@ -1,0 +1,179 @@
+"""A store copied to another place, from and to a folder and an S3 server; broken off, and gone on with."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from ml.store import NoSuchTable, Store, StoreError
+from ml.store.objects import Object, Objects
+from ml.store.sessions import find, sessions, telemetry
+from ml.store.tables import EVENTS
+from ml.store.upkeep import Pin, compact, pin, pins
+from server_gui.core.cloud import parts, transfer
+from server_gui.core.cloud.transfer import Copied
+from tests.stores import SeaweedFS
+from tests.unit.cloud.recordings import BATCHES, ROWS, record
+
+KNEE = "left_knee.position"
+ROW = EVENTS.rows([{"robot": "exo-01", "kind": "marker"}])
+
+
+def copy(source: str, target: str, advance: Callable[[int], object] = lambda _: None) -> Copied:
+    from_, to = Objects(source), Objects(target)
+    return transfer.copy(from_, to, transfer.missing(from_, to), advance)
+
+
+def values(store: Store, session: str) -> list[tuple[int, float]]:
+    found = telemetry(store, find(store, session), [KNEE])
+    return [(row["stamp_ns"], row[KNEE]) for table in found for row in table.to_pylist()]
+
+
+@pytest.fixture
+def way(new_store_url: str, tmp_path: Path) -> list[str]:
+    """From a folder to the store under test, and from there to another folder."""
+    return [(tmp_path / "from").as_uri(), new_store_url, (tmp_path / "to").as_uri()]
+
+
+def test_a_copy_is_the_same_store_with_its_pins_and_what_was_appended(way: list[str], tmp_path: Path) -> None:
+    recorded = record(way[0], tmp_path / "spool")
+    version = recorded.store.table("events").version()
+    pin(recorded.store, "events", version, "gait-3")
+    recorded.store.append(EVENTS, "events", ROW.schema, ROW.to_reader, "spool-x", 1)
+    compact(recorded.store)
+    for source, target in itertools.pairwise(way):
+        copy(source, target)
+        copied = Store.existing(target)
+        assert values(copied, recorded.session) == values(recorded.store, recorded.session)
+        assert pins(copied) == [Pin("events", version, "gait-3")]
+        assert copied.dataset("events", version).count_rows() == 2
+        assert not Store(target).append(EVENTS, "events", ROW.schema, ROW.to_reader, "spool-x", 1)
+
+
+def test_a_second_copy_brings_only_what_is_new(way: list[str], tmp_path: Path) -> None:
+    sessions = [record(way[0], tmp_path / "one").session]
+    for source, target in itertools.pairwise(way):
+        copy(source, target)
+        assert copy(source, target) == Copied()
+    sessions.append(record(way[0], tmp_path / "two").session)
+    for source, target in itertools.pairwise(way):
+        done = copy(source, target)
+        assert done.by_checksum + done.by_size == 2 * 4  # a file and a log entry of each table
+        assert [len(values(Store.existing(target), session)) for session in sessions] == [BATCHES * ROWS] * 2
+
+
+def test_a_copy_that_was_broken_off_is_no_store_until_it_is_gone_on_with(
+    way: list[str], tmp_path: Path
+) -> None:
+    recorded = record(way[0], tmp_path / "spool")
+    for source, target in itertools.pairwise(way):
+        wanted = len(transfer.missing(Objects(source), Objects(target)))
+        pieces = itertools.count(1)
+
+        def cut(_: int, last: int = wanted - 2, pieces: Iterator[int] = pieces) -> None:
+            if next(pieces) == last:  # in the middle of the logs
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            copy(source, target, cut)
+        with pytest.raises(NoSuchTable):
+            Store.existing(target)
+        assert len(transfer.missing(Objects(source), Objects(target))) <= 4
+        copy(source, target)
+        assert values(Store.existing(target), recorded.session) == values(recorded.store, recorded.session)
+
+
+def test_a_large_file_goes_on_in_its_middle(
+    store_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ml.store.objects.PIECE_BYTES", 1_000)
+    monkeypatch.setattr("server_gui.core.cloud.transfer.PIECE_BYTES", 1_000)
+    source, target = Objects(store_url), Objects((tmp_path / "copy").as_uri())
+    content = bytes(range(256)) * 16
+    source.create("table/large", content)
+    [large] = [found for found in source.listing() if found.path == "table/large"]
+    arrived = 0
+
+    def cut(count: int) -> None:
+        nonlocal arrived
+        arrived += count
+        if arrived == 3_000:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        transfer.copy(source, target, [large], cut)
+    assert target.read("table/large") is None
+    read: list[int] = []
+
+    def counted(self: Objects, found: Object, offset: int = 0) -> Iterator[bytes]:
+        read.append(offset)
+        return pieces(self, found, offset)
+
+    pieces = Objects.pieces
+    monkeypatch.setattr(Objects, "pieces", counted)
+    transfer.copy(source, target, [large], lambda _: None)
+    assert target.read("table/large") == content
+    assert read[0] >= 2_000
+    assert target.names("table") == ["table/large"]
+
+
+@pytest.mark.parametrize("backend", ["s3"], indirect=True)
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_what_is_altered_on_its_way_is_noticed(
+    backend: SeaweedFS, store_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, direction: str
+) -> None:
+    content = b"values" * 1000
+    ends = Objects(store_url), Objects((tmp_path / "folder").as_uri())
+    source, target = ends if direction == "down" else ends[::-1]
+    source.create("table/file", content)
+    [found] = [each for each in source.listing() if each.path == "table/file"]
+    if direction == "down":
+        original = Objects.pieces
+        reads = iter([True])
+
+        def altered(self: Objects, found: Object, offset: int = 0) -> Iterator[bytes]:
+            once = next(reads, False)
+            return (
+                piece.replace(b"v", b"w", 1) if once else piece for piece in original(self, found, offset)
+            )
+
+        monkeypatch.setattr(Objects, "pieces", altered)
+    else:
+        write = Objects.write
+        monkeypatch.setattr(
+            Objects,
+            "write",
+            lambda self, path, pieces: write(self, path, [each.replace(b"v", b"w", 1) for each in pieces]),
+        )
+    with pytest.raises(StoreError, match="altered on its way"):
+        transfer.copy(source, target, [found], lambda _: None)
+
+
+def test_a_place_where_something_else_was_written_is_refused(store_url: str, tmp_path: Path) -> None:
+    target = (tmp_path / "folder").as_uri()
+    record(store_url, tmp_path / "one")
+    record(target, tmp_path / "two")
+    before = Objects(target).names("")
+    with pytest.raises(StoreError, match="something else was written there"):
+        copy(store_url, target)
+    assert Objects(target).names("") == before
+
+
+def test_sessions_are_copied_alone_with_everything_that_belongs_to_them(
+    store_url: str, tmp_path: Path
+) -> None:
+    first = record(store_url, tmp_path / "one")
+    second = record(store_url, tmp_path / "two", "exo-02")
+    target = Store((tmp_path / "part").as_uri())
+    wanted = [find(first.store, first.session)]
+    for again in (BATCHES * ROWS, 0):  # the second time it is there
+        assert parts.copy(first.store, target, wanted, (), lambda _: None) == again
+        assert [session.session for session in sessions(target)] == [first.session]
+        assert values(target, first.session) == values(first.store, first.session)
+        assert target.dataset("events").count_rows() == 2
+        assert target.dataset("labels").count_rows() == 1
+        assert target.units("telemetry/000")[KNEE] == "rad"
+    parts.copy(first.store, target, [find(first.store, second.session)], {"exo-02"}, lambda _: None)
+    assert sorted(session.robot for session in sessions(target)) == ["exo-01", "exo-02"]
+    assert target.dataset("events").count_rows() == 4

@@ -1,0 +1,83 @@
+"""What is lost, damaged or was never sent is found and named, on a folder and on an S3 server."""
+
+from pathlib import Path
+
+from ml.store import Store
+from ml.store.reading import DataFile
+from server_gui.core.cloud import verify
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.spool import Spool
+from tests.unit.cloud.recordings import record
+from tests.unit.recording.robots import batch
+
+
+def problems(store: Store, *, deep: bool = False) -> list[str]:
+    return list(verify.damages(store, verify.files(store), lambda _: None, deep=deep))
+
+
+def telemetry(store: Store) -> tuple[str, bytes]:
+    """The file with the telemetry."""
+    [file] = [file for file in verify.files(store) if file.location == "telemetry/000"]
+    path = f"{file.location}/{file.path}"
+    return path, store.objects.read(path) or b""
+
+
+def test_a_whole_store_is_whole(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    assert len(verify.files(recorded.store)) == 4
+    assert problems(recorded.store) == problems(recorded.store, deep=True) == []
+    assert list(verify.batches_missing(recorded.store, recorded.spool)) == []
+
+
+def test_a_file_that_has_gone_is_named(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    path, _ = telemetry(recorded.store)
+    recorded.store.objects.remove(path)
+    assert problems(recorded.store) == [f"{recorded.store.url}/{path} is not there: 100 rows are lost"]
+
+
+def test_a_file_that_was_cut_off_is_named(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    path, content = telemetry(recorded.store)
+    recorded.store.objects.write(path, [content[:-10]])
+    [problem] = problems(recorded.store)
+    assert problem == f"{recorded.store.url}/{path} has {len(content) - 10} bytes instead of {len(content)}"
+
+
+def test_a_footer_that_is_damaged_is_found(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    path, content = telemetry(recorded.store)
+    recorded.store.objects.write(path, [content[:-500] + bytes(492) + content[-8:]])
+    [problem] = problems(recorded.store)
+    assert f"{path} cannot be read" in problem
+
+
+def test_damage_among_the_values_is_found_by_reading_them(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    path, content = telemetry(recorded.store)
+    recorded.store.objects.write(path, [content[:4] + bytes(1000) + content[1004:]])
+    assert problems(recorded.store) == []
+    [problem] = problems(recorded.store, deep=True)
+    assert f"{path} cannot be read" in problem
+
+
+def test_rows_that_are_not_in_a_file_are_found(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    [file] = [file for file in verify.files(recorded.store) if file.location == "events"]
+    more = DataFile(file.location, file.path, 9, file.size_bytes, None, None, None, None)
+    [problem] = verify.damages(recorded.store, [more], lambda _: None, deep=False)
+    assert problem.endswith("has 2 rows instead of 9")
+
+
+def test_a_batch_that_never_arrived_is_named(store_url: str, tmp_path: Path) -> None:
+    recorded = record(store_url, tmp_path / "spool")
+    with Spool(recorded.spool, reserve_bytes=0) as spool:
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(1, 5))
+        [number] = spool.waiting()
+        spool.uploaded(number)  # as if it were in the store
+    missing = list(verify.batches_missing(recorded.store, recorded.spool))
+    assert [text.partition(" is not in ")[2] for text in missing] == [
+        f"{recorded.store.url}/{table}" for table in ("sessions", "telemetry/000")
+    ]
+    assert all(f"batch {number} of the spool {recorded.spool}" in text for text in missing)
