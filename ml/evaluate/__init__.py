@@ -1,0 +1,14 @@
+"""Evaluation: benchmarks on recordings of real people, who are never on both sides.
+
+benchmarks.py               their names, questions and goals
+status.py, phase.py, adapt.py, fall.py, terrain.py    one each
+ipol.py, sisfall.py, arrays.py    how recordings are read and checked
+folds.py, search.py, metrics.py   splits, tuning on training subjects alone, figures
+outcome.py, report.py       what was found, and a page about it
+"""
+
+from ml.evaluate.benchmarks import BENCHMARKS, Benchmark
+from ml.evaluate.errors import UnusableData
+from ml.evaluate.outcome import Goal, Outcome
+
+__all__ = ["BENCHMARKS", "Benchmark", "Goal", "Outcome", "UnusableData"]

@@ -1,0 +1,76 @@
+"""The benchmarks by name: what each asks, of which channels, and what it should reach."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from ml.evaluate import adapt, fall, phase, status, terrain
+from ml.evaluate.outcome import Goal, Outcome
+from ml.features import Recipe
+from ml.features.falling import FALLING
+from ml.features.gait_phase import LEFT_PHASE
+from ml.features.gait_status import GAIT_STATUS
+from ml.features.terrain import TERRAIN
+
+
+@dataclass(frozen=True, slots=True)
+class Benchmark:
+    """One question to recordings of real people."""
+
+    name: str
+    asks: str
+    recipe: Recipe
+    run: Callable[[Path, bool], Outcome]
+    goals: Mapping[str, Goal]
+
+
+BENCHMARKS: Final = {
+    one.name: one
+    for one in (
+        Benchmark(
+            "ipol-status",
+            "standing, walking or turning, 200 ms ago; leave one subject out",
+            GAIT_STATUS,
+            status.evaluate,
+            {
+                "macro_f1": Goal(0.93),
+                "worst_subject_macro_f1": Goal(0.87),
+                "steady_macro_f1": Goal(0.97),
+            },
+        ),
+        Benchmark(
+            "ipol-phase",
+            "where in the stride each foot is; leave one subject out",
+            LEFT_PHASE,
+            phase.evaluate,
+            {"rmse_percent": Goal(5.0, at_most=True)},
+        ),
+        Benchmark(
+            "ipol-adapt",
+            "the same, after a minute of the wearer's own walking",
+            LEFT_PHASE,
+            adapt.evaluate,
+            {"adaptation_cut": Goal(0.25)},
+        ),
+        Benchmark(
+            "sisfall-prefall",
+            "an alarm before a fall's impact; five folds of subjects",
+            FALLING,
+            fall.evaluate,
+            {
+                "sensitivity": Goal(0.97),
+                "median_lead_ms": Goal(300.0),
+                "false_alarm_fraction": Goal(0.04, at_most=True),
+                "early_alarm_fraction": Goal(0.02, at_most=True),
+            },
+        ),
+        Benchmark(
+            "aust-mode",
+            "level ground, stairs up, stairs down or incline; folds that share no row, and no heading",
+            TERRAIN,
+            terrain.evaluate,
+            {"macro_f1": Goal(0.92), "sector_macro_f1": Goal(0.82)},
+        ),
+    )
+}

@@ -1,0 +1,166 @@
+"""`sisfall-prefall`: an alarm before a fall's impact, and none in daily life, of people never seen before."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.evaluate import folds, sisfall
+from ml.evaluate.outcome import Outcome
+from ml.evaluate.search import Search, chosen, told
+from ml.features import features
+from ml.features.falling import FALLING, RATE_HZ
+from ml.models.falling import FAR, FallDetector, FallSettings
+
+STEP: Final = 2  # samples between decisions: 40 ms
+FIRST: Final = 25  # samples of a recording before its first decision
+IN_TIME: Final = 75  # samples: an alarm up to 1.5 s before the impact is of this fall
+FOLDS: Final = 5
+NEVER: Final = -1
+MS: Final = 1000 // RATE_HZ
+SETTINGS: Final = FallSettings()
+GRID: Final = (SETTINGS, FallSettings(falling=25), FallSettings(falling=16), FallSettings(leaves=31))
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """What came of one recording."""
+
+    fall: bool
+    stumble: bool
+    came: bool  # before the impact, where there is one
+    lead: int  # samples from the first alarm to the impact
+
+    @classmethod
+    def of(cls, recording: sisfall.Recording, first: int) -> "Alarm":
+        """`first`: the sample of the first alarm, or NEVER."""
+        lead = NEVER if recording.impact is None else recording.impact - first
+        return cls(recording.impact is not None, recording.activity == sisfall.STUMBLE, first != NEVER, lead)
+
+    @property
+    def detected(self) -> bool:
+        return self.fall and self.came and 0 <= self.lead <= IN_TIME
+
+    @property
+    def early(self) -> bool:
+        return self.fall and self.came and self.lead > IN_TIME
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decisions:
+    """Every decision of every recording, up to the impact of a fall; arrays have a row each."""
+
+    features: npt.NDArray[np.float32]
+    recording: npt.NDArray[np.int_]
+    at: npt.NDArray[np.int_]  # sample in its recording
+    to_impact: npt.NDArray[np.int_]  # samples; FAR where there is none
+    subject: npt.NDArray[Any]
+    stumble: npt.NDArray[np.bool_]
+
+
+def decisions(recordings: list[sisfall.Recording]) -> Decisions:
+    parts = [_of_recording(number, recording) for number, recording in enumerate(recordings)]
+    columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return Decisions(*columns)
+
+
+def _of_recording(number: int, recording: sisfall.Recording) -> tuple[npt.NDArray[Any], ...]:
+    # What an alarm after the impact says changes no figure.
+    last = len(recording.samples) if recording.impact is None else recording.impact + 1
+    at = np.arange(min(FIRST, last - 1), last, STEP)
+    return (
+        features(FALLING, recording.samples, at),
+        np.full(len(at), number),
+        at,
+        np.full(len(at), FAR) if recording.impact is None else recording.impact - at,
+        np.full(len(at), recording.subject),
+        np.full(len(at), recording.activity == sisfall.STUMBLE),
+    )
+
+
+def evaluate(path: Path, search: Search) -> Outcome:
+    """Five folds of subjects; the threshold of each by inner folds of its training subjects."""
+    recordings = sisfall.read(path)
+    data = decisions(recordings)
+    splits = list(_grouped(recordings, data))
+    work = folds.over(lambda split: _fold(data, split, search), splits)
+    first = np.full(len(recordings), NEVER)
+    for (_, held_out), (alarms, _) in zip(splits, work, strict=True):
+        rows = held_out[alarms][::-1]  # the earliest of each recording is written last
+        first[data.recording[rows]] = data.at[rows]
+    return _outcome(recordings, first, told([settings for _, settings in work], search))
+
+
+def _grouped(recordings: list[sisfall.Recording], data: Decisions) -> Iterator[folds.Split]:
+    """Folds of the decisions, by folds of the recordings."""
+    for train, held_out in folds.grouped(np.array([recording.subject for recording in recordings]), FOLDS):
+        yield (
+            np.flatnonzero(np.isin(data.recording, train)),
+            np.flatnonzero(np.isin(data.recording, held_out)),
+        )
+
+
+def _fold(data: Decisions, split: folds.Split, search: Search) -> tuple[npt.NDArray[np.bool_], FallSettings]:
+    """Which of the held-out decisions are alarms."""
+    train, held_out = split
+    train = train[~data.stumble[train]]
+    settings = chosen(
+        SETTINGS,
+        GRID,
+        data.subject[train],
+        search,
+        lambda one, rows, judge: _score(data, train[rows], train[judge], one),
+    )
+    return _alarms(data, train, held_out, settings), settings
+
+
+def _alarms(
+    data: Decisions, train: folds.Rows, judge: folds.Rows, settings: FallSettings
+) -> npt.NDArray[np.bool_]:
+    model = FallDetector(settings).fit(
+        data.features[train], data.to_impact[train], data.recording[train], data.subject[train]
+    )
+    return model.alarms(data.features[judge], data.recording[judge])
+
+
+def _score(data: Decisions, train: folds.Rows, judge: folds.Rows, settings: FallSettings) -> float:
+    """For a search: falls alarmed in time, at about the same false alarms."""
+    alarmed = judge[_alarms(data, train, judge, settings)]
+    in_time = alarmed[data.to_impact[alarmed] <= IN_TIME]
+    falls = judge[data.to_impact[judge] < FAR]
+    return len(np.unique(data.recording[in_time])) / max(len(np.unique(data.recording[falls])), 1)
+
+
+def _outcome(recordings: list[sisfall.Recording], first: npt.NDArray[np.int_], settings: str) -> Outcome:
+    rows = [Alarm.of(recording, int(at)) for recording, at in zip(recordings, first, strict=True)]
+    subjects = sorted({recording.subject for recording in recordings})
+    by_subject = {
+        one: _figures(
+            [row for row, recording in zip(rows, recordings, strict=True) if recording.subject == one]
+        )
+        for one in subjects
+    }
+    return Outcome(_figures(rows), len(subjects), by_subject, settings=settings)
+
+
+def _figures(alarms: list["Alarm"]) -> dict[str, float]:
+    falls = [alarm for alarm in alarms if alarm.fall]
+    daily = [alarm for alarm in alarms if not alarm.fall and not alarm.stumble]
+    stumbles = [alarm for alarm in alarms if alarm.stumble]
+    leads = [alarm.lead for alarm in falls if alarm.detected]
+    right = sum(alarm.detected for alarm in falls) + sum(not alarm.came for alarm in daily)
+    return {
+        "sensitivity": _share([alarm.detected for alarm in falls]),
+        "median_lead_ms": float(np.median(leads)) * MS if leads else float("nan"),
+        "false_alarm_fraction": _share([alarm.came for alarm in daily]),
+        "early_alarm_fraction": _share([alarm.early for alarm in falls]),
+        "stumble_alarm_fraction": _share([alarm.came for alarm in stumbles]),
+        "accuracy": right / max(len(falls) + len(daily), 1),
+    }
+
+
+def _share(flags: list[bool]) -> float:
+    return sum(flags) / len(flags) if flags else float("nan")

@@ -1,0 +1,84 @@
+"""The format of IPOL 2023/497: IMUs at the low back and on both feet, walked there and back, labelled."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.evaluate.arrays import Arrays
+from ml.features.gait_status import RATE_HZ
+
+STATUSES: Final = ("stand", "walk", "turn")
+WALK: Final = STATUSES.index("walk")
+CHANNELS: Final = tuple(
+    f"{part}_{quantity}_{axis}"
+    for part in ("lowback", "lfoot", "rfoot")
+    for quantity in ("acc", "gyr")
+    for axis in "xyz"
+)
+STRIDE_S: Final = (0.7, 2.0)  # shorter and longer ones are no strides of a walk
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """One walk of one subject."""
+
+    subject: int
+    number: int
+    samples: npt.NDArray[np.float64]  # (rows, 18), m/s² and rad/s
+    status: npt.NDArray[np.int_]  # index into STATUSES
+    in_air: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]  # left and right foot
+
+
+def read(path: Path) -> list[Trial]:
+    """The file's trials, subject by subject, in their order.
+
+    Raises:
+        UnusableData: it is not such a file, or has samples that cannot be.
+
+    """
+    file = Arrays(path)
+    file.rate(RATE_HZ)
+    samples = file.samples(CHANNELS)
+    file.gravity(samples[:, :3], "the low back's")
+    rows = len(samples)
+    names = [str(name) for name in file.of("status_names", 1)]
+    if names != list(STATUSES):
+        raise file.problem(f"names the states {', '.join(names)}; expected are {', '.join(STATUSES)}")
+    status, subject, trial = (
+        file.of(name, 1, rows).astype(np.int_) for name in ("status", "subject", "trial")
+    )
+    if not np.isin(status, range(len(STATUSES))).all():
+        raise file.problem(f"has states other than 0 to {len(STATUSES) - 1}")
+    left, right = (file.of(f"{side}_event", 1, rows) == 1 for side in ("left", "right"))
+    trials = []
+    for person in np.unique(subject):
+        for number in np.unique(trial[subject == person]):
+            own = (subject == person) & (trial == number)
+            trials.append(Trial(int(person), int(number), samples[own], status[own], (left[own], right[own])))
+    if len({one.subject for one in trials}) < 2:
+        raise file.problem("has one subject alone: nobody is left to learn from")
+    return trials
+
+
+def subjects(trials: Sequence[Trial]) -> npt.NDArray[np.int_]:
+    return np.unique([trial.subject for trial in trials])
+
+
+def strikes(in_air: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+    """The rows at which the foot is first on the ground again."""
+    return np.flatnonzero(in_air[:-1] & ~in_air[1:]) + 1
+
+
+def phase(strikes: npt.NDArray[np.intp], rows: int) -> npt.NDArray[np.float64]:
+    """Each row's gait phase: 0 at a heel strike, linear to the next one; NaN outside strides."""
+    result = np.full(rows, np.nan)
+    shortest, longest = (seconds * RATE_HZ for seconds in STRIDE_S)
+    for begin, end in itertools.pairwise(strikes):
+        if shortest <= end - begin <= longest:
+            result[begin:end] = np.arange(end - begin) / (end - begin)
+    return result

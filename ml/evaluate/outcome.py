@@ -1,0 +1,35 @@
+"""What an evaluation found, as plain data for a report, a table or JSON."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A benchmark's figures, and what they are made of."""
+
+    figures: Mapping[str, float]  # by the keys of --json
+    subjects: int | None  # None where the recordings do not say whose they are
+    by_group: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # subject or place → figures
+    grouped_by: str = "subject"
+    classes: tuple[str, ...] = ()
+    confusion: npt.NDArray[np.int_] | None = None  # rows are the truth
+    settings: str = ""  # what was chosen by --search, fold by fold
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a figure should reach."""
+
+    limit: float
+    at_most: bool = False
+
+    def reached(self, value: float) -> bool:
+        return value <= self.limit if self.at_most else value >= self.limit
+
+    def __str__(self) -> str:
+        return f"{'≤' if self.at_most else '≥'} {self.limit:g}"

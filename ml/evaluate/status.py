@@ -1,0 +1,121 @@
+"""`ipol-status`: standing, walking or turning, 200 ms late, of people never seen before."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.evaluate import folds, ipol, metrics
+from ml.evaluate.outcome import Outcome
+from ml.evaluate.search import Search, chosen, told
+from ml.features import features
+from ml.features.gait_status import GAIT_STATUS
+from ml.models.gait_status import StatusSettings, status_model
+
+FIRST: Final = 50  # the first sample of a trial that is judged, and then each STEP later
+STEP: Final = 20
+DELAY: Final = 20  # samples: the truth is what was 200 ms before the newest sample
+NEAR: Final = 50  # samples around a change that are not steady
+SETTINGS: Final = StatusSettings()
+GRID: Final = (
+    SETTINGS,
+    StatusSettings(rounds=120),
+    StatusSettings(leaves=31),
+    StatusSettings(learning_rate=0.05, rounds=160),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decisions:
+    """Every decision of every trial; arrays have a row each."""
+
+    features: npt.NDArray[np.float32]
+    truth: npt.NDArray[np.int_]
+    subject: npt.NDArray[np.int_]
+    steady: npt.NDArray[np.bool_]
+
+
+def decisions(trials: Sequence[ipol.Trial]) -> Decisions:
+    parts = [_of_trial(trial) for trial in trials]
+    columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return Decisions(*columns)
+
+
+def _of_trial(trial: ipol.Trial) -> tuple[Any, ...]:
+    ends = np.arange(FIRST, len(trial.samples), STEP)
+    judged = ends - DELAY
+    changes = np.flatnonzero(np.diff(trial.status)) + 1
+    near = (np.abs(judged[:, None] - changes) <= NEAR).any(axis=1)
+    return (
+        features(GAIT_STATUS, trial.samples, ends),
+        trial.status[judged],
+        np.full(len(ends), trial.subject),
+        ~near,
+    )
+
+
+def evaluate(path: Path, search: Search) -> Outcome:
+    """Leave one subject out, and judge by subjects."""
+    data = decisions(ipol.read(path))
+    splits = list(folds.one_left_out(data.subject))
+    work = folds.over(lambda split: _fold(data, split, search), splits)
+    predicted = np.empty_like(data.truth)
+    for (_, held_out), (labels, _) in zip(splits, work, strict=True):
+        predicted[held_out] = labels
+    return _outcome(data, predicted, told([settings for _, settings in work], search))
+
+
+def _fold(data: Decisions, split: folds.Split, search: Search) -> tuple[npt.NDArray[Any], StatusSettings]:
+    train, held_out = split
+    settings = chosen(
+        SETTINGS,
+        GRID,
+        data.subject[train],
+        search,
+        lambda one, rows, judge: _score(data, one, train[rows], train[judge]),
+    )
+    return _predict(data, settings, train, held_out), settings
+
+
+def _predict(
+    data: Decisions, settings: StatusSettings, train: folds.Rows, judge: folds.Rows
+) -> npt.NDArray[np.int_]:
+    model = status_model(settings).fit(data.features[train], data.truth[train])
+    return np.asarray(model.predict(data.features[judge]), dtype=np.int_)
+
+
+def _score(data: Decisions, settings: StatusSettings, train: folds.Rows, judge: folds.Rows) -> float:
+    predicted = _predict(data, settings, train, judge)
+    return _mean_f1(data.truth[judge], predicted, data.subject[judge])
+
+
+def _mean_f1(
+    truth: npt.NDArray[np.int_], predicted: npt.NDArray[np.int_], subject: npt.NDArray[np.int_]
+) -> float:
+    return float(np.mean([_f1(truth, predicted, subject == one) for one in np.unique(subject)]))
+
+
+def _f1(truth: npt.NDArray[np.int_], predicted: npt.NDArray[np.int_], rows: npt.NDArray[np.bool_]) -> float:
+    return metrics.macro_f1(truth[rows], predicted[rows], len(ipol.STATUSES))
+
+
+def _outcome(data: Decisions, predicted: npt.NDArray[np.int_], settings: str) -> Outcome:
+    by_subject = {}
+    for subject in np.unique(data.subject):
+        own = data.subject == subject
+        by_subject[str(subject)] = {
+            "macro_f1": _f1(data.truth, predicted, own),
+            "steady_macro_f1": _f1(data.truth, predicted, own & data.steady),
+            "accuracy": metrics.accuracy(data.truth[own], predicted[own]),
+        }
+    figures = {
+        "macro_f1": float(np.mean([one["macro_f1"] for one in by_subject.values()])),
+        "worst_subject_macro_f1": min(one["macro_f1"] for one in by_subject.values()),
+        "steady_macro_f1": float(np.mean([one["steady_macro_f1"] for one in by_subject.values()])),
+        "accuracy": metrics.accuracy(data.truth, predicted),
+    }
+    counts = metrics.confusion(data.truth, predicted, len(ipol.STATUSES))
+    return Outcome(figures, len(by_subject), by_subject, "subject", ipol.STATUSES, counts, settings)

@@ -1,0 +1,44 @@
+"""Blocks: signals of windows → feature columns, the newest sample last."""
+
+import numpy as np
+import numpy.typing as npt
+
+Samples = npt.NDArray[np.float64]
+
+
+def flat(values: Samples) -> Samples:
+    """(n, …) → (n, columns)."""
+    return values.reshape(len(values), -1)
+
+
+def bins(signals: Samples, width: int, count: int) -> Samples:
+    """(n, signals, samples) → means over the newest `count` stretches of `width` samples: their shape."""
+    newest = signals[..., -width * count :]
+    return flat(newest.reshape(*newest.shape[:-1], count, width).mean(axis=-1))
+
+
+def moments(signals: Samples, length: int) -> Samples:
+    """(n, signals, samples) → mean, standard deviation, largest, smallest over the newest `length`."""
+    newest = signals[..., -length:]
+    return np.concatenate(
+        [newest.mean(axis=-1), newest.std(axis=-1), newest.max(axis=-1), newest.min(axis=-1)], axis=1
+    )
+
+
+def since(condition: npt.NDArray[np.bool_]) -> Samples:
+    """(n, samples) → how many samples ago it last held; the window's length where it never did."""
+    ago = condition[:, ::-1].argmax(axis=1)
+    samples: Samples = np.where(condition.any(axis=1), ago, condition.shape[1]).astype(np.float64)
+    return samples
+
+
+def falls(condition: npt.NDArray[np.bool_], count: int) -> Samples:
+    """(n, samples) → how many samples ago it last ceased to hold, and before that; the length if never."""
+    edge = (condition[:, :-1] & ~condition[:, 1:])[:, ::-1]
+    ago = np.arange(edge.shape[1])
+    columns = []
+    for _ in range(count):
+        newest = edge.argmax(axis=1)
+        columns.append(np.where(edge.any(axis=1), newest, condition.shape[1]))
+        edge = edge & (ago > newest[:, None])
+    return np.stack(columns, axis=1).astype(np.float64)

@@ -1,0 +1,38 @@
+"""Signals that do not depend on how a sensor is worn: lengths of vectors, and parts along the vertical.
+
+Arrays are (n, axes, samples) or (n, samples); a row never depends on another.
+"""
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Samples = npt.NDArray[np.float64]
+GRAVITY: Final = 9.81  # m/s²
+TINY: Final = 1e-9
+
+
+def length(vectors: Samples) -> Samples:
+    """(n, axes, samples) → (n, samples)."""
+    lengths: Samples = np.sqrt((vectors * vectors).sum(axis=1))
+    return lengths
+
+
+def up(acceleration: Samples) -> Samples:
+    """The vertical (n, 3, 1) in the sensor's frame: the mean specific force over the window points up."""
+    mean = acceleration.mean(axis=-1, keepdims=True)
+    vertical: Samples = mean / np.maximum(np.sqrt((mean * mean).sum(axis=1, keepdims=True)), TINY)
+    return vertical
+
+
+def along(vectors: Samples, axis: Samples) -> Samples:
+    """The part of (n, 3, samples) along unit vectors (n, 3, 1): (n, samples)."""
+    part: Samples = (vectors * axis).sum(axis=1)
+    return part
+
+
+def across(vectors: Samples, part: Samples) -> Samples:
+    """How long (n, 3, samples) are across an axis along which they have this part: (n, samples)."""
+    rest: Samples = np.sqrt(np.maximum((vectors * vectors).sum(axis=1) - part * part, 0.0))
+    return rest

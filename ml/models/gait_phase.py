@@ -1,0 +1,112 @@
+"""The gait phase of a foot: small neural networks that point round the cycle and learn a wearer's walk."""
+
+import copy
+import warnings
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import FunctionTransformer, StandardScaler
+
+Features = npt.NDArray[np.float32]
+Phases = npt.NDArray[np.float64]
+FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseSettings:
+    """What was tuned."""
+
+    hidden: tuple[int, int] = (96, 48)
+    penalty: float = 1e-3
+    networks: int = 2
+    first_epochs: int = 8  # on every stride
+    epochs: int = 12  # on those that are not doubtful
+    doubtful: float = 0.15  # cycles: a stride with a larger mean error is not believed
+    personal_epochs: int = 20
+    general_share: float = 0.5  # of samples of other people beside each personal one
+
+
+class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn ships no types
+    """Features of `LEFT_PHASE` or `RIGHT_PHASE` → phase of that foot, 0 (heel strike) to 1.
+
+    Labels can be wrong for whole strides; those that a first look cannot follow are left out of the second.
+    """
+
+    def __init__(self, settings: PhaseSettings | None = None) -> None:
+        self.settings = settings or PhaseSettings()
+
+    def fit(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> Self:
+        """Learn from rows of which those of one stride have one number."""
+        tuned = self.settings
+        self.scale_: Pipeline = make_pipeline(StandardScaler(), FunctionTransformer(_within))
+        inputs, targets = self.scale_.fit_transform(x), _on_circle(phase)
+        self.networks_ = [_network(tuned, seed) for seed in range(tuned.networks)]
+        self._train(inputs, targets, tuned.first_epochs)
+        self.kept_ = self._believed(x, phase, stride)
+        self._train(inputs[self.kept_], targets[self.kept_], tuned.epochs)
+        self.sample_ = (inputs[self.kept_], targets[self.kept_])
+        return self
+
+    def predict(self, x: Features) -> Phases:
+        """Phases from 0 up to 1."""
+        inputs = self.scale_.transform(x)
+        cosine, sine = np.sum([network.predict(inputs) for network in self.networks_], axis=0).T
+        phase: Phases = np.arctan2(sine, cosine) / (2 * np.pi) % 1.0
+        return phase
+
+    def personal(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> "PhaseModel":
+        """A copy that has also learned from these rows of one wearer."""
+        own = copy.deepcopy(self)
+        believed = self._believed(x, phase, stride)
+        inputs, targets = self.scale_.transform(x[believed]), _on_circle(phase[believed])
+        others = int(len(inputs) * self.settings.general_share)
+        random = np.random.default_rng(0)
+        for _ in range(self.settings.personal_epochs if len(inputs) else 0):
+            rows = random.choice(len(self.sample_[0]), min(others, len(self.sample_[0])), replace=False)
+            order = random.permutation(len(inputs) + len(rows))
+            mixed = [
+                np.concatenate([mine, general[rows]])[order]
+                for mine, general in zip((inputs, targets), self.sample_, strict=True)
+            ]
+            for network in own.networks_:
+                network.partial_fit(*mixed)
+        return own
+
+    def _train(self, inputs: Features, targets: Features, epochs: int) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)  # the number of epochs is what was tuned
+            for network in self.networks_:
+                network.set_params(max_iter=epochs).fit(inputs, targets)
+
+    def _believed(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> npt.NDArray[np.bool_]:
+        """The rows of strides that this can follow; all of them where it can follow none."""
+        error = np.abs((self.predict(x) - phase + 0.5) % 1.0 - 0.5)
+        _, number = np.unique(stride, return_inverse=True)
+        mean = np.bincount(number, error) / np.bincount(number)
+        believed: npt.NDArray[np.bool_] = mean[number] <= self.settings.doubtful
+        return believed if believed.any() else np.ones_like(believed)
+
+
+def _network(settings: PhaseSettings, seed: int) -> Any:
+    return MLPRegressor(
+        hidden_layer_sizes=settings.hidden,
+        alpha=settings.penalty,
+        batch_size=256,
+        random_state=seed,
+        warm_start=True,
+    )
+
+
+def _within(x: Features) -> Features:
+    return np.clip(x, -FAR, FAR)
+
+
+def _on_circle(phase: Phases) -> Features:
+    angle = 2 * np.pi * phase
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1).astype(np.float32)

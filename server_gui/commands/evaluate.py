@@ -1,0 +1,93 @@
+"""`gwrms evaluate`: how well what we predict holds for people that no model has seen."""
+
+import argparse
+import math
+import time
+from pathlib import Path
+
+from gateway.cli.text import say, say_json, table
+from ml.evaluate import BENCHMARKS, Benchmark, Outcome
+from ml.evaluate.report import number, page
+
+EPILOG = f"""benchmarks
+{chr(10).join(f"  {one.name:<16} {one.asks}" for one in BENCHMARKS.values())}
+
+The recordings are .npz files of their own; docs/prediction.md says where they come from and what is in them.
+Subjects are never on both sides, seeds are fixed and features look back only. Settings are fixed in the code;
+--search chooses them again in every fold, by the training subjects alone, which takes many times as long.
+
+examples
+  gwrms evaluate --benchmark ipol-status --data gait.npz
+  gwrms evaluate --benchmark sisfall-prefall --data falls.npz --json --report falls.html
+
+exit status
+  0 evaluated, whether or not the goals were reached; 1 the file cannot be used; 2 usage"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms evaluate`."""
+    arguments = _parser().parse_args(argv)
+    benchmark = BENCHMARKS[arguments.benchmark]
+    began = time.monotonic()
+    outcome = benchmark.run(arguments.data, arguments.search)
+    seconds = time.monotonic() - began
+    if arguments.report is not None:
+        arguments.report.write_text(page(benchmark, outcome, arguments.data.name), encoding="utf-8")
+    say(_text(benchmark, outcome, seconds))
+    if arguments.json:
+        say_json(_answer(benchmark, outcome, seconds))
+    return 0
+
+
+def _text(benchmark: Benchmark, outcome: Outcome, seconds: float) -> str:
+    people = "" if outcome.subjects is None else f", {outcome.subjects} subjects"
+    rows = []
+    for name, value in outcome.figures.items():
+        goal = benchmark.goals.get(name)
+        verdict = "" if goal is None else ("reached" if goal.reached(value) else "missed")
+        rows.append((name, number(value), str(goal or ""), verdict))
+    columns = list(next(iter(outcome.by_group.values()), ()))
+    groups = [
+        (name, *(number(values[column]) for column in columns)) for name, values in outcome.by_group.items()
+    ]
+    return "\n".join(
+        [
+            f"{benchmark.name}: {benchmark.asks}{people}, {seconds:.0f} s",
+            f"channels: {', '.join(benchmark.recipe.channels)}",
+            *outcome.notes,
+            "",
+            table(("FIGURE", "VALUE", "GOAL", ""), rows, (1,)),
+            table((outcome.grouped_by.upper(), *columns), groups, range(1, len(columns) + 1)),
+            f"settings, {outcome.settings}\n",
+        ]
+    )
+
+
+def _answer(benchmark: Benchmark, outcome: Outcome, seconds: float) -> dict[str, str | float | None]:
+    figures = {name: None if math.isnan(value) else value for name, value in outcome.figures.items()}
+    about = {"subjects": outcome.subjects, "seconds": round(seconds, 1)}
+    return {"benchmark": benchmark.name, **figures, **about}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms evaluate",
+        description="How well what we predict holds for people that no model has seen: on real recordings.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "--benchmark", required=True, choices=BENCHMARKS, metavar="NAME", help="one of those below"
+    )
+    parser.add_argument("--data", required=True, type=Path, metavar="FILE.npz", help="the recordings")
+    parser.add_argument(
+        "--json", action="store_true", help="the figures as one JSON object, in the last line"
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE.html", help="also write a page with tables and pictures"
+    )
+    parser.add_argument(
+        "--search", action="store_true", help="choose the settings again, by training subjects alone"
+    )
+    return parser
