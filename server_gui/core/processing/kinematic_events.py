@@ -6,7 +6,7 @@ import statistics
 
 from server_gui.core.processing.gait_events import Continuity, EventKind, Follows, GaitEvent, Leg
 
-STRIKE_AFTER_NS, OFF_BEFORE_NS = 45_000_000, 30_000_000  # contact and lift-off against the extremes
+STRIKE_AFTER_NS, OFF_BEFORE_NS = 60_000_000, 40_000_000  # contact and lift-off against the extremes
 TURN_SHARE, TURN_LEAST = 0.08, 0.03  # of the usual excursion, in leg lengths: then an extreme is behind us
 FIRST_EXCURSION = 0.3  # leg lengths, until steps have shown another
 APART = 0.12  # leg lengths between the feet: closer together, nobody steps
