@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import gc
 import logging
 import os
 from datetime import datetime
@@ -73,6 +74,7 @@ def main(argv: list[str]) -> int:
 
 def _collect(settings: ServerSettings, operator: str, notes: str) -> int:
     _log_to_stderr()
+    gc.freeze()  # what was loaded so far lives as long as the process, and there is much of it
     with Ending() as ending, contextlib.suppress(Ended), Collector(settings, operator, notes) as collector:
         names = ", ".join(settings.robots)
         log.info("recording %s into %s, for the store %s", names, settings.recorder.spool, settings.store.url)

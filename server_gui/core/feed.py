@@ -84,16 +84,26 @@ class Feed:
         try:
             while True:
                 await self._client.link.connected()
+                # In a task of its own: a group that fails as it is cancelled forgets that it is cancelled.
+                following = asyncio.create_task(self._follow())
                 try:
-                    await self._follow()
-                except* (NotConnected, LinkLost):
-                    pass  # the link has told so itself
-                except* ClientError as errors:
-                    for error in errors.exceptions:
-                        self._tell(Failed("following the robot", str(error)))
+                    await asyncio.wait([following])
+                finally:
+                    following.cancel()
+                    await asyncio.wait([following])
+                self._ended(following)
                 await asyncio.sleep(self._backoff.next_s())
         finally:
             await self._client.close()
+
+    def _ended(self, following: "asyncio.Task[None]") -> None:
+        try:
+            following.result()
+        except* (NotConnected, LinkLost):
+            pass  # the link has told so itself
+        except* ClientError as errors:
+            for error in errors.exceptions:
+                self._tell(Failed("following the robot", str(error)))
 
     async def write(self, changes: Mapping[str, float]) -> None:
         """Change parameters; the lease is taken and given back around it."""

@@ -2,7 +2,7 @@
 
 import itertools
 import uuid
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from gateway.client import Batch
-from server_gui.core.recording.rows import Layout, Record, Run
+from server_gui.core.recording.rows import Floats, Layout, Record, Run
 
 
 class EventKind(Enum):
@@ -27,7 +27,7 @@ class EventKind(Enum):
     MARKER = "marker"  # somebody marked this instant
 
 
-Name = tuple[str, str, int, Layout]  # session, connection, stream, columns
+Name = tuple[str, str, int, int]  # session, connection, stream, and which layout object
 
 NUMBERS: Final = range(-(2**62), 2**62)  # what is kept in 8 bytes, and may be added up in them
 
@@ -55,9 +55,8 @@ class Gathering:
         self.connection = uuid.uuid4().hex[:16]
         self.units: dict[str, str] = {}
         self._link: int | None = None
-        self._dropped: dict[int, int] = {}  # by stream, what the robot dropped until now
-        self._seqs: dict[int, int] = {}  # by stream, the newest notification
-        self._gathered: dict[Name, list[Notification]] = {}
+        self._newest: dict[int, tuple[int, int]] = {}  # by stream: newest `seq`, rows dropped until then
+        self._gathered: dict[Name, tuple[Layout, list[Notification]]] = {}
         self._layouts: dict[tuple[str, ...], Layout] = {}
 
     def describe(self, units: dict[str, str]) -> None:
@@ -72,18 +71,22 @@ class Gathering:
             ValueError: it cannot be kept, and is as if it had never come.
 
         """
+        batch = new.batch
+        channels = tuple(batch.columns)
+        layout = self._layouts.get(channels) or self._layout(channels)
         _check(new)
-        layout = self._layout(tuple(new.batch.columns))
-        events = self._missing(new)
-        if new.batch.stamps_ns:
-            name = (self.session, self.connection, new.stream, layout)
-            self._gathered.setdefault(name, []).append(new)
+        follows = batch.link == self._link and self._newest.get(new.stream) == (batch.seq - 1, batch.dropped)
+        events = [] if follows else self._missing(new)
+        self._newest[new.stream] = (batch.seq, batch.dropped)
+        if batch.stamps_ns:
+            name = (self.session, self.connection, new.stream, id(layout))
+            self._gathered.setdefault(name, (layout, []))[1].append(new)
         return events
 
     def runs(self) -> list[Run]:
         """Everything gathered, and begin anew."""
         gathered, self._gathered = self._gathered, {}
-        return [self._run(*name, found) for name, found in gathered.items()]
+        return [self._run(*name[:3], *found) for name, found in gathered.items()]
 
     def event(
         self, kind: EventKind, text: str, utc_ns: int, stamp_ns: int | None = None, **data: Any
@@ -111,18 +114,15 @@ class Gathering:
 
         if batch.link != self._link:
             self._new_connection(batch.link, "the link was made again", happened)
-        elif batch.seq <= self._seqs.get(new.stream, -1):
+        elif batch.seq <= self._newest.get(new.stream, (-1, 0))[0]:
             self._new_connection(batch.link, "the stream's numbers began anew", happened)
         # Counted here: what waited too long for us behind the link is missing as well.
-        newest = self._seqs.get(new.stream, batch.seq - batch.missed - 1)
-        missed = batch.seq - newest - 1
+        newest, dropped = self._newest.get(new.stream, (batch.seq - batch.missed - 1, 0))
+        missed, rows = batch.seq - newest - 1, batch.dropped - dropped
         if missed:
             happened(EventKind.GAP, f"{missed} notifications never came", missed=missed)
-        self._seqs[new.stream] = batch.seq
-        rows = batch.dropped - self._dropped.get(new.stream, 0)
         if rows > 0:
             happened(EventKind.DROPPED, f"the robot dropped {rows} rows: we read too slowly", rows=rows)
-        self._dropped[new.stream] = batch.dropped
         return events
 
     def _new_connection(self, link: int, why: str, happened: Callable[[EventKind, str], None]) -> None:
@@ -130,49 +130,52 @@ class Gathering:
             self.connection = uuid.uuid4().hex[:16]
             happened(EventKind.GAP, f"{why}; what was in between has not been seen")
         self._link = link
-        self._dropped.clear()
-        self._seqs.clear()
+        self._newest.clear()
 
     def _layout(self, channels: tuple[str, ...]) -> Layout:
-        layout = self._layouts.get(channels)
-        if layout is None:
-            for channel in channels:
-                if not (channel and channel.isprintable()):
-                    raise ValueError(f"{channel!r} is no name of a channel")
-            layout = Layout(channels, tuple(self.units.get(channel) for channel in channels))
-            self._layouts[channels] = layout
-        return layout
+        for channel in channels:
+            if not (channel and channel.isprintable()):
+                raise ValueError(f"{channel!r} is no name of a channel")
+        layout = Layout(channels, tuple(self.units.get(channel) for channel in channels))
+        return self._layouts.setdefault(channels, layout)
 
     def _run(
-        self, session: str, connection: str, stream: int, layout: Layout, found: list[Notification]
+        self,
+        session: str,
+        connection: str,
+        stream: int,
+        layout: Layout,
+        found: list[Notification],
     ) -> Run:
         batches = [new.batch for new in found]
         counts = [len(batch.stamps_ns) for batch in batches]
-        columns = [_joined(batch.columns[name] for batch in batches) for name in layout.channels]
+        stamps_ns = itertools.chain.from_iterable(batch.stamps_ns for batch in batches)
         return Run(
             self.robot,
             session,
             connection,
             stream,
             layout,
-            stamps_ns=np.array(_joined(batch.stamps_ns for batch in batches), np.int64),
+            stamps_ns=np.fromiter(stamps_ns, np.int64, sum(counts)),
             seqs=np.repeat(np.array([batch.seq for batch in batches], np.int64), counts),
             rows=np.concatenate([np.arange(count, dtype=np.int64) for count in counts]),
             utc_offset_ns=np.repeat(np.array([new.utc_offset_ns for new in found], np.int64), counts),
-            values=np.array(columns, np.float64).reshape(len(columns), sum(counts)),  # None becomes NaN
+            values=np.concatenate([_values(batch) for batch in batches], axis=1),
         )
 
 
 def _check(new: Notification) -> None:
     """Refuse what would keep every robot's rows from being written."""
     batch = new.batch
-    for name, column in batch.columns.items():
-        if len(column) != len(batch.stamps_ns):
-            raise ValueError(f"{len(batch.stamps_ns)} stamps, but {len(column)} values of {name}")
+    rows = len(batch.stamps_ns)
+    for length in set(map(len, batch.columns.values())) - {rows}:
+        raise ValueError(f"{rows} stamps, but {length} values of a channel")
     numbers = (new.stream, batch.seq, new.utc_offset_ns, *batch.stamps_ns)
     if not all(number in NUMBERS for number in numbers):
         raise ValueError("a stamp, or another number, is larger than 8 bytes hold")
 
 
-def _joined(parts: Iterable[list[Any]]) -> list[Any]:
-    return list(itertools.chain.from_iterable(parts))
+def _values(batch: Batch) -> Floats:
+    """A row a channel; None becomes NaN."""
+    values = list(itertools.chain.from_iterable(batch.columns.values()))  # faster than array by array
+    return np.array(values, np.float64).reshape(len(batch.columns), len(batch.stamps_ns))

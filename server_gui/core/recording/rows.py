@@ -61,8 +61,12 @@ class JournalHead(msgspec.Struct, frozen=True):
 
 def pack(run: Run) -> bytes:
     """Row after row of little-endian 8-byte numbers, so that packed runs can simply be put together."""
-    keys = np.stack((run.stamps_ns, run.seqs, run.rows, run.utc_offset_ns)).astype(STAMP, copy=False)
-    return np.vstack((keys.view(VALUE), run.values.astype(VALUE, copy=False))).T.tobytes()
+    rows = np.empty((len(run), KEYS + len(run.values)), VALUE)
+    keys = rows.view(STAMP)
+    for place, key in enumerate((run.stamps_ns, run.seqs, run.rows, run.utc_offset_ns)):
+        keys[:, place] = key
+    rows[:, KEYS:] = run.values.T
+    return rows.tobytes()
 
 
 def unpack(robot: str, session: str, connection: str, stream: int, layout: Layout, data: bytes) -> Run:

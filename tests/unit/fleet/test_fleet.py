@@ -176,7 +176,7 @@ def ragged(robot: FakeRobot) -> None:
         (nonsense, "answered robot.describe with something else"),
         (without_numbers, "entries without a number or a hash"),
         (same_numbers, None),
-        (ragged, "2 stamps, but 1 values of trunk.tilt_side"),
+        (ragged, "2 stamps, but 1 values of a channel"),
     ],
 )
 def test_a_bad_robot_is_told_and_disturbs_no_other(

@@ -271,7 +271,7 @@ def test_what_a_robot_sends_wrongly_is_refused_and_told_once_and_disturbs_no_oth
         assert recorder.state.lost == 2 + 1 + 1 + 2 + 1
     assert [row[0] for row in rows(kept(spool)[0])] == ["good"]
     (event,) = events(spool, "refused")
-    assert event["text"] == "bad sent what cannot be kept: 2 stamps, but 1 values of a.b"
+    assert event["text"] == "bad sent what cannot be kept: 2 stamps, but 1 values of a channel"
 
 
 def test_numbers_that_begin_anew_without_a_new_link_keep_their_rows_apart(spool: Spool) -> None:
@@ -302,3 +302,12 @@ def test_a_session_of_which_more_becomes_known_is_told_again_under_its_name(spoo
         {},
         *2 * [{"gait.step_length": 0.4}],
     ]
+
+
+def test_a_description_that_comes_between_rows_changes_the_units_of_those_after_it(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+        recorder.describe("exo-01", description("exo-01"))
+        recorder.record("exo-01", 1, batch(1))
+    found = {int(seq): run.layout.units for run in kept(spool)[0] for seq in run.seqs}
+    assert found == {0: (None, None, None), 1: ("rad", "rad/s", "rad")}
