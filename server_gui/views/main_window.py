@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QMenu,
     QPushButton,
+    QScrollArea,
     QStackedWidget,
     QTabWidget,
     QVBoxLayout,
@@ -66,12 +67,9 @@ class MainWindow(QMainWindow):
         self.empty = EmptyView(theme)
         self.empty.simulator.connect(self.simulator)
         self.tabs = QTabWidget()
-        for title, view in (
-            ("&Overview", self.overview),
-            ("&Signals", self.signals),
-            ("&Resources", self.resources),
-        ):
-            self.tabs.addTab(view, title)
+        self._views = (self.overview, self.signals, self.resources)
+        for title, view in zip(("&Overview", "&Signals", "&Resources"), self._views, strict=True):
+            self.tabs.addTab(_scrolled(view), title)
         self._bar = StatusBar(desk)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
@@ -86,9 +84,8 @@ class MainWindow(QMainWindow):
         """One frame: what moves each time, what is read now and then, and only what is visible."""
         self._frame += 1
         self._bar.frame()
-        view = self.tabs.currentWidget()
-        if self._desk.selected is not None and isinstance(view, Overview | Signals | Resources):
-            view.refresh()
+        if self._desk.selected is not None:
+            self._views[self.tabs.currentIndex()].refresh()
         if self._frame % SLOW:
             return
         self._pages.setCurrentIndex(0 if self._desk.selected is None else 1)
@@ -131,6 +128,10 @@ class MainWindow(QMainWindow):
             self._dock("Parameters", self.parameters, areas.RightDockWidgetArea),
             self._dock("Events", self.events, areas.BottomDockWidgetArea),
         ]
+        self._size_docks()
+        self._theme.scaled.connect(self._size_docks)
+
+    def _size_docks(self) -> None:
         px = self._theme.px
         self.resizeDocks([self._docks[0]], [px(225)], Qt.Orientation.Horizontal)
         self.resizeDocks([self._docks[1]], [px(400)], Qt.Orientation.Horizontal)
@@ -178,6 +179,15 @@ class MainWindow(QMainWindow):
             self.restoreGeometry(geometry)
         if isinstance(state, QByteArray):
             self.restoreState(state, LAYOUT)
+
+
+def _scrolled(view: QWidget) -> QScrollArea:
+    """On a small screen, or with large text, a view is scrolled rather than the window made larger."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setWidget(view)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    return area
 
 
 def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:

@@ -18,6 +18,7 @@ from server_gui.core.desk.station import Station
 from server_gui.views.marks import age_text, station_mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.stop_button import StopButton
 
@@ -34,10 +35,8 @@ class RobotCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = QLabel(), QLabel(), QLabel()
-        self._name.setObjectName("title")
+        self._name, self._state, self._link = ElidedLabel("title"), QLabel(), ElidedLabel("dim")
         self._state.setObjectName("dim")
-        self._link.setObjectName("dim")
         self._state.setWordWrap(True)
         self.stop = StopButton("robot_stop")
         self.stop.setText("Stop")
@@ -116,7 +115,8 @@ class RobotsPanel(QWidget):
         everything.addWidget(self._said)
         everything.addWidget(self.address)
         everything.addWidget(all_stop)
-        self.setMinimumWidth(theme.px(170))
+        theme.changed.connect(self._restyle)
+        self._restyle()
 
     def refresh(self) -> None:
         """Show how all of them are now."""
@@ -127,6 +127,9 @@ class RobotsPanel(QWidget):
             card.refresh(
                 selected=card.station is self._desk.selected, twins=titles.count(card.station.title) > 1
             )
+
+    def _restyle(self) -> None:
+        self.setMinimumWidth(self._theme.px(170))
 
     def _add_card(self, station: Station) -> None:
         card = RobotCard(station, self._theme)

@@ -35,6 +35,7 @@ from server_gui.views.widgets.plot import Curve, Plot
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
+SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
 # Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
@@ -58,14 +59,26 @@ class UnitPlot(Card):
         self.unit = unit
         self.channels = tuple(channels)
         self.plot = Plot(theme, seconds, least=1e-3)
-        curves = [Curve(name, colour) for name, colour in zip(channels, _colours(channels), strict=True)]
-        self.plot.set_curves(curves)
-        names = (
-            f'<span style="color:{_css(theme, curve.colour)}">━ {curve.channel}</span>' for curve in curves
-        )
-        self.set_note("&nbsp;&nbsp; ".join(names))
+        self._curves = [
+            Curve(name, colour) for name, colour in zip(channels, _colours(channels), strict=True)
+        ]
+        self.plot.set_curves(self._curves)
+        self._theme = theme
+        self._legend = QLabel()
+        self._legend.setTextFormat(Qt.TextFormat.RichText)
+        self._legend.setWordWrap(True)
+        self.body.addWidget(self._legend)
         self.body.addWidget(self.plot)
-        self.setMinimumHeight(theme.px(110))
+        self.setMinimumHeight(theme.px(120))
+
+    def show_values(self, values: Sequence[float | None]) -> None:
+        """The newest value of each curve, behind its name."""
+        names = (
+            f'<span style="color:{_css(self._theme, curve.colour)}">━ {curve.channel} '
+            f"<b>{self.unit.text(value)}</b></span>"
+            for curve, value in zip(self._curves, values, strict=True)
+        )
+        set_text(self._legend, "&nbsp;&nbsp; ".join(names))
 
 
 class Signals(QWidget):
@@ -77,6 +90,7 @@ class Signals(QWidget):
         self._theme = theme
         self._plots: list[UnitPlot] = []
         self._frozen: Frozen | None = None
+        self._frame = 0
         self._described: tuple[object, ...] = ()
         self.setObjectName("page")
         self.channels = QTreeWidget()
@@ -129,7 +143,11 @@ class Signals(QWidget):
             ]
             columns = [values * plot.unit.scale for values in found] if plot.unit.scale != 1.0 else found
             plot.plot.draw(times, columns, live=frozen is not None or not station.robot.is_stale())
-        set_text(self._said, self._state(station))
+        self._frame += 1
+        if self._frame % SLOW == 1:
+            set_text(self._said, self._state(station))
+            for plot in self._plots:
+                plot.show_values([self._newest(station, name) for name in plot.channels])
 
     @property
     def chosen(self) -> list[str]:
@@ -291,6 +309,12 @@ class Signals(QWidget):
         times = station.rings.times(seconds)
         names = [name for plot in self._plots for name in plot.channels]
         return times, {name: station.rings.values(name, len(times)).copy() for name in names}
+
+    def _newest(self, station: Station, name: str) -> float | None:
+        column = None if self._frozen is None else self._frozen.columns[name]
+        if column is None:
+            return station.robot.values.get(name)
+        return None if not len(column) or np.isnan(column[-1]) else float(column[-1])
 
     def _state(self, station: Station) -> str:
         more = len(self.chosen) - MOST_CURVES

@@ -9,6 +9,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import age_text
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.elided import ElidedLabel
 
 FRAMES = 60
 
@@ -20,10 +21,11 @@ class StatusBar(QStatusBar):
         super().__init__()
         self._desk = desk
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
-        self._link, self._window = QLabel(), QLabel()
-        stop = QLabel("STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop")
-        self.addWidget(self._link, 1)
-        self.addPermanentWidget(stop)
+        self._link, self._window = ElidedLabel(), QLabel()
+        stop = ElidedLabel()
+        stop.setText("STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop")
+        self.addWidget(self._link, 3)
+        self.addWidget(stop, 2)
         self.addPermanentWidget(self._window)
         self.setSizeGripEnabled(False)
 

@@ -84,7 +84,7 @@ PALETTES: Final = {
 
 STYLE: Final = """
 * {{ color: {text}; }}
-QMainWindow, QWidget#page, QStackedWidget {{ background: {window}; }}
+QMainWindow, QWidget#page {{ background: {window}; }}
 QMainWindow::separator {{ background: {window}; width: 4px; height: 4px; }}
 QMainWindow::separator:hover {{ background: {accent}; }}
 QToolTip {{ background: {card}; color: {text}; border: 1px solid {border}; padding: 3px; }}
@@ -128,6 +128,7 @@ QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; b
     border-radius: 4px; padding: 4px 6px; selection-background-color: {accent};
     selection-color: {on_accent}; }}
 QLineEdit:focus, QAbstractSpinBox:focus {{ border-color: {accent}; }}
+QAbstractSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
 QComboBox QAbstractItemView, QMenu {{ background: {card}; border: 1px solid {border};
     selection-background-color: {accent}; selection-color: {on_accent}; }}
 QMenu::item {{ padding: 5px 22px 5px 12px; }}
@@ -137,6 +138,9 @@ QAbstractItemView {{ background: {card}; alternate-background-color: {panel}; bo
     selection-background-color: {selection}; selection-color: {text}; outline: 0; }}
 QAbstractItemView#framed {{ border: 1px solid {border}; }}
 QTreeView::item {{ padding: 3px 0; }}
+QTreeView::indicator {{ width: 10px; height: 10px; background: {field}; border: 1px solid {old};
+    border-radius: 2px; }}
+QTreeView::indicator:checked {{ background: {accent}; border-color: {accent}; }}
 QHeaderView {{ background: {panel}; }}
 QHeaderView::section {{ background: {panel}; color: {dim}; border: none; border-right: 1px solid {border};
     border-bottom: 1px solid {border}; padding: 4px 6px; }}
@@ -159,6 +163,7 @@ class Theme(QObject):
     """The look in force; `changed` is emitted when another one is."""
 
     changed = Signal()
+    scaled = Signal()  # after `changed`, where text has another size
 
     def __init__(self, application: QApplication, look: Look = Look.DARK, scale: float = 1.0) -> None:
         super().__init__(application)
@@ -170,6 +175,7 @@ class Theme(QObject):
 
     def set(self, look: Look | None = None, scale: float | None = None) -> None:
         """Another palette, or another size of all text between 80 and 200 %."""
+        before = self.scale
         self.look = self.look if look is None else look
         self.scale = self.scale if scale is None else min(max(scale, SMALLEST_SCALE), LARGEST_SCALE)
         self.colours = PALETTES[self.look]
@@ -179,6 +185,8 @@ class Theme(QObject):
         self._application.setPalette(self._palette())
         self._application.setStyleSheet(self._style())
         self.changed.emit()
+        if self.scale != before:
+            self.scaled.emit()
 
     def colour(self, name: str) -> QColor:
         """A colour of the palette by its name."""

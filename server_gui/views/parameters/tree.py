@@ -192,7 +192,7 @@ class ParameterTree(QTreeView):
             for word, so in (
                 ("⚠ changed", elsewhere),
                 ("●", staged),
-                ("⏱ trial", on_trial),
+                ("◔ trial", on_trial),
                 ("✕", problem),
                 ("", True),
             )

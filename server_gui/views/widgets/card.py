@@ -3,6 +3,8 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
+from server_gui.views.widgets.elided import ElidedLabel
+
 
 class Card(QFrame):
     """Put widgets into `body`."""
@@ -13,8 +15,7 @@ class Card(QFrame):
         self.setAccessibleName(title)
         self._title = QLabel(title)
         self._title.setObjectName("title")
-        self._note = QLabel()
-        self._note.setObjectName("note")
+        self._note = ElidedLabel("note")
         self._note.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         head = QHBoxLayout()
         head.addWidget(self._title)

@@ -81,7 +81,7 @@ class GaitRing(QWidget):
     def _draw_words(self, painter: QPainter, box: QRectF) -> None:
         theme = self._theme
         line = box.height() / 5.2
-        size = max(0.8, min(1.6, box.width() / theme.px(140)))
+        size = max(0.45, min(1.6, box.width() / theme.px(140)))
         rows = [(self._word, "text" if self._live else "old", 1.25 * size, True)]
         rows += [(self._below, "dim", 0.85 * size, False)]
         for leg in Leg:
