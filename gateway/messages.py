@@ -449,7 +449,7 @@ class Overrun(Struct, frozen=True):
     reason: str
     ran_ms: float  # the control loop itself
     waited_ms: float  # it was ready to run
-    instead: list[RanInstead]  # the longest first
+    instead: list[RanInstead]  # the longest first, but last those that the control loop may run ahead of
 
 
 class Overruns(Struct, frozen=True):

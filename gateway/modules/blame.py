@@ -4,10 +4,9 @@ It watches only while somebody asks. Frames are seen in the bus's thread; looks 
 taken in the loop, one a frame and at most one each `LOOK_S`.
 """
 
-import itertools
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 from gateway.messages import Overrun, Overruns, Params, RanInstead
@@ -118,20 +117,26 @@ class BlameModule:
                 reason=blame.reason.value,
                 ran_ms=_ms(blame.own.ran_ns),
                 waited_ms=_ms(blame.own.waited_ns),
-                instead=list(itertools.islice(self._named(blame), NAMED)),
+                instead=self._named(blame),
             )
         )
 
-    def _named(self, blame: Blame) -> Iterator[RanInstead]:
-        """Who ran on a core that the control loop may use."""
+    def _named(self, blame: Blame) -> list[RanInstead]:
+        """Who ran on a core that the control loop may use; first those that it cannot run ahead of."""
         cores = {core for pid in self._control for core in self._tasks.cores(pid)}
+        own = [self._tasks.schedule((pid, tid)) for pid in self._control for tid in self._tasks.threads(pid)]
+        urgency = max((one.urgency for one in own if one is not None), default=0)
+        ahead: list[RanInstead] = []
+        behind: list[RanInstead] = []
         for pid, tid, ran_ns in blame.others[:LOOKED_AT]:
             schedule = self._tasks.schedule((pid, tid))
             if schedule is not None and (not cores or schedule.core in cores):
                 name, thread = self._tasks.name(pid), self._tasks.name(pid, tid)
-                yield RanInstead(
+                ran = RanInstead(
                     pid, name, thread, _ms(ran_ns), schedule.core, schedule.policy, schedule.priority
                 )
+                (ahead if schedule.urgency >= urgency else behind).append(ran)
+        return [*ahead, *behind][:NAMED]
 
     def _answer(self, session: "Session", _params: Params) -> Overruns:
         told = self._told.get(session)

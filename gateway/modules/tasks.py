@@ -17,6 +17,7 @@ from gateway.modules.procfs import SELECTABLE
 
 MOST = 4096  # descriptors, and no more than a quarter of those that the process may have
 WORDS = 4  # of a command line, that may name its program: `nice -n 5 ./exo_control`
+URGENT = 100  # above every real-time priority
 _LINE_BYTES = 64
 TICK_NS = 1_000_000_000 // os.sysconf("SC_CLK_TCK")
 _STARTTIME, _CORE, _RT_PRIORITY, _POLICY, _NICE = 19, 36, 37, 38, 16  # counted from the state
@@ -42,6 +43,13 @@ class Schedule(NamedTuple):
     priority: int
     core: int  # that it last ran on
     started_ns: int  # since boot
+
+    @property
+    def urgency(self) -> int:
+        """Who has less waits for who has more: a deadline, a real-time priority, or 0 for all the rest."""
+        if self.policy == "deadline":
+            return URGENT
+        return self.priority if self.policy in ("fifo", "rr") else 0
 
 
 class Tasks:

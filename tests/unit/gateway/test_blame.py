@@ -165,6 +165,20 @@ def test_the_hog_is_named_with_what_it_ran(turn: Turn) -> None:
     assert len(turn.ask(FakeSession()).overruns) == 1  # to each
 
 
+def test_what_a_real_time_loop_runs_ahead_of_is_named_after_what_it_waits_for(turn: Turn) -> None:
+    own, urgent = turn.control.threads[0], turn.hog.threads[0]
+    own.policy, own.rt_priority, urgent.policy, urgent.rt_priority = 1, 50, 2, 80
+    less = single(52, "less urgent", policy=1, rt_priority=49)
+    turn.recorded.processes += [less, single(53, "usual"), single(54, "deadline", policy=6)]
+    turn.module._met_ns = 0  # it looks for new ones with the next frame
+    turn.frame(10)
+    for process, ran_ms in zip(turn.recorded.processes, (3, 15, 0, 30, 40, 5), strict=True):
+        had(process, ran_ms, 20 if process is turn.control else 0)
+    turn.frame(30)
+    (overrun,) = turn.ask(FakeSession()).overruns
+    assert [one.name for one in overrun.instead] == ["hog", "deadline", "usual", "less urgent"]
+
+
 def test_a_hog_that_has_only_just_begun_is_named_too_and_an_older_one_is_not(turn: Turn) -> None:
     turn.frame(10)
     since_boot_s = float(Path("/proc/uptime").read_text().split()[0])
