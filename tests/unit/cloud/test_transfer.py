@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ml.store import NoSuchTable, Store, StoreError
+from ml.store import NoSuchTable, Store, StoreError, UnsafeStore
 from ml.store.objects import Object, Objects
 from ml.store.sessions import find, sessions, telemetry
 from ml.store.tables import EVENTS
@@ -15,6 +15,7 @@ from server_gui.core.cloud import parts, transfer
 from server_gui.core.cloud.transfer import Copied
 from tests.stores import SeaweedFS
 from tests.unit.cloud.recordings import BATCHES, ROWS, record
+from tests.unit.store.test_access import fake_s3  # noqa: F401  # a fixture
 
 KNEE = "left_knee.position"
 ROW = EVENTS.rows([{"robot": "exo-01", "kind": "marker"}])
@@ -177,3 +178,14 @@ def test_sessions_are_copied_alone_with_everything_that_belongs_to_them(
     parts.copy(first.store, target, [find(first.store, second.session)], {"exo-02"}, lambda _: None)
     assert sorted(session.robot for session in sessions(target)) == ["exo-01", "exo-02"]
     assert target.dataset("events").count_rows() == 4
+
+
+@pytest.mark.usefixtures("fake_s3")
+def test_a_copy_goes_nowhere_where_several_servers_would_overwrite_each_other(
+    folder_url: str, tmp_path: Path
+) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    with pytest.raises(UnsafeStore):
+        transfer.open_target(recorded.store, "s3://bucket/x")
+    alone = Store((tmp_path / "alone").as_uri(), several_writers=False)
+    assert transfer.open_target(alone, "s3://bucket/x").url == "s3://bucket/x"

@@ -8,9 +8,10 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from ml.store import Store, StoreError
+from ml.store import Store, StoreError, StoreRefused
 from ml.store.query import QueryError, query
 from ml.store.tables import EVENTS, TABLES, TELEMETRY, field
+from tests.stores import KEY, SeaweedFS
 
 HOUR_US = 3_600_000_000
 SCHEMA = pa.schema([*TELEMETRY.schema, field("left_knee.position", pa.float64(), "rad")])
@@ -165,3 +166,18 @@ def test_python_reads_no_file_for_arrow(store_url: str) -> None:
     fill(store, "exo-01")
     kinds = {fragment.filesystem.type_name for fragment in store.dataset("telemetry/000").get_fragments()}
     assert all(not kind.startswith("py") for kind in kinds)
+
+
+@pytest.mark.parametrize("backend", ["s3"], indirect=True)
+def test_keys_that_may_not_read_the_files_are_refused_in_words(
+    backend: SeaweedFS, store_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(store_url)
+    fill(store, "exo-01")
+    with monkeypatch.context() as wrong:
+        wrong.setenv("AWS_SECRET_ACCESS_KEY", "wJalrXUtnFEMI-example-secret")
+        assert store.files.type_name  # connected with these
+    with pytest.raises(StoreRefused, match="check AWS_PROFILE") as said:
+        ask(store, "SELECT * FROM telemetry")
+    assert KEY not in str(said.value)
+    assert "wJalrXUtnFEMI" not in str(said.value)

@@ -1,0 +1,201 @@
+"""`gwrms sessions`, `query` and `cloud` as somebody types them."""
+
+import json
+import socketserver
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.main import main
+from ml.store import Store
+from ml.store.upkeep import pin
+from server_gui.core.fleet.door import NAME
+from server_gui.core.recording.spool import Spool
+from tests.unit.cloud.recordings import Recorded, record
+
+ROWS = 100
+
+
+class Desk:
+    """A server's file, its store in a folder and its spool; `run` is the command line."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.url = (folder / "store").as_uri()
+        self.spool = folder / "spool"
+        self.config = folder / "server.toml"
+        self.config.write_text(f'[store]\nurl = "{self.url}"\n[recorder]\nspool = "{self.spool}"\n')
+        self._capsys = capsys
+
+    def run(self, *words: str, status: int = 0) -> str:
+        """What it prints, or where `status` is another one, what it complains of."""
+        assert main([*words, "--config", str(self.config)]) == status
+        said = self._capsys.readouterr()
+        return said.err if status else said.out
+
+    def ask(self, *words: str, status: int = 0) -> Any:
+        assert main([*words, "--config", str(self.config), "--json"]) == status
+        return json.loads(self._capsys.readouterr().out)
+
+    def record(self, robot: str = "exo-01", *, sent: bool = True) -> Recorded:
+        return record(self.url, self.spool, robot, sent=sent)
+
+
+@pytest.fixture
+def desk(store_libraries: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Desk:
+    return Desk(tmp_path, capsys)
+
+
+def test_sessions_are_listed_also_those_that_wait_for_upload(desk: Desk) -> None:
+    first, second = desk.record(), desk.record("exo-02", sent=False)
+    listed = desk.ask("sessions", "ls")
+    assert [(each["session"], each["rows"], each["uploaded"]) for each in listed] == [
+        (first.session, ROWS, True),
+        (second.session, 0, False),
+    ]
+    assert "not uploaded" in desk.run("sessions", "ls", "--robot", "*2")
+    assert first.session not in desk.run("sessions", "ls", "--robot", "*2")
+    assert desk.ask("sessions", "ls", "--to", "2020-01-01") == []
+    assert len(desk.ask("sessions", "ls", "--from", "2020-01-01T00:00")) == 2
+
+
+def test_sessions_are_listed_before_anything_was_uploaded(desk: Desk) -> None:
+    assert "no store at" in desk.run("sessions", "ls", status=1)
+    recorded = desk.record(sent=False)
+    Path(desk.url.removeprefix("file://"), "store.json").unlink()
+    assert [each["session"] for each in desk.ask("sessions", "ls")] == [recorded.session]
+
+
+def test_a_session_is_shown(desk: Desk) -> None:
+    recorded = desk.record()
+    text = desk.run("sessions", "show", recorded.session)
+    for word in ("anna", "gain=2.0", "left_knee.velocity  rad/s", "marker", "here", "walk"):
+        assert word in text
+    shown = desk.ask("sessions", "show", recorded.session[:-1])
+    assert {each["name"]: each["unit"] for each in shown["channels"]}["left_knee.velocity"] == "rad/s"
+    assert [each["kind"] for each in shown["events"]] == ["gap", "marker"]
+    assert [each["label"] for each in shown["labels"]] == ["walk"]
+    assert "no session 'x'" in desk.run("sessions", "show", "x", status=1)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
+def test_a_session_is_exported_as_what_the_files_name_says(desk: Desk, tmp_path: Path, kind: str) -> None:
+    recorded = desk.record()
+    file = tmp_path / f"walk.{kind}"
+    found = desk.ask(
+        "sessions", "export", recorded.session, "--out", str(file), "--from", "0", "--to", "3600"
+    )
+    assert found["format"] == kind
+    assert found["count"] >= ROWS
+    assert file.stat().st_size > 1000
+
+
+def test_an_export_needs_a_format(desk: Desk, tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as left:
+        desk.run("sessions", "export", "x", "--out", str(tmp_path / "walk.bag"))
+    assert left.value.code == 2
+
+
+def test_a_query_is_a_table_an_array_or_csv(desk: Desk) -> None:
+    desk.record()
+    sql = (
+        "SELECT robot, count(*) AS n, NULL AS nothing, sum(seq) AS total, max(utc) > min(utc) AS more "
+        "FROM telemetry GROUP BY 1"
+    )
+    total = sum(seq for seq in range(21) if seq != 10) * 5
+    assert desk.ask("query", sql) == [
+        {"robot": "exo-01", "n": ROWS, "nothing": None, "total": total, "more": True}
+    ]
+    assert desk.run("query", sql, "--csv").splitlines() == [
+        "robot,n,nothing,total,more",
+        f"exo-01,{ROWS},,{total},True",
+    ]
+    assert desk.run("query", sql).splitlines()[1].split() == ["exo-01", str(ROWS), "–", str(total), "True"]
+    assert desk.ask("query", "SELECT * FROM labels WHERE label = 'x'") == []
+    assert "LINE 1" in desk.run("query", "SELECT nothing FROM telemetry", status=1)
+
+
+def test_the_store_is_browsed(desk: Desk) -> None:
+    recorded = desk.record()
+    assert {each["table"]: each["rows"] for each in desk.ask("cloud", "ls")} == {
+        "telemetry": ROWS, "sessions": 2, "events": 2, "labels": 1
+    }  # fmt: skip
+    assert recorded.session in desk.run("cloud", "ls", "--path", "telemetry/000")
+    first = desk.ask("cloud", "du")["tables"][0]
+    assert (first["table"], first["robot"], first["rows"]) == ("telemetry", "exo-01", ROWS)
+    assert desk.run("cloud", "verify").endswith(" KiB\n")
+    [file] = Path(desk.url.removeprefix("file://"), "telemetry/000").rglob("*.parquet")
+    file.unlink()
+    assert "100 rows are lost" in desk.ask("cloud", "verify", status=1)["problems"][0]
+
+
+def test_what_waits_is_uploaded_once(desk: Desk) -> None:
+    recorded = desk.record(sent=False)
+    assert desk.ask("cloud", "upload") == {"uploaded": 1, "waiting": 0}
+    assert desk.ask("cloud", "upload") == {"uploaded": 0, "waiting": 0}
+    assert recorded.store.dataset("telemetry/000").count_rows() == ROWS
+
+
+def test_a_spool_that_another_server_owns_is_left_alone(desk: Desk) -> None:
+    desk.record(sent=False)
+    with Spool(desk.spool):
+        assert "another server records into" in desk.run("cloud", "upload", status=1)
+
+
+@pytest.fixture
+def collector(desk: Desk) -> Iterator[list[bytes]]:
+    """Answers as one that runs on the spool would; what it was asked."""
+    asked: list[bytes] = []
+
+    class Handler(socketserver.StreamRequestHandler):
+        def handle(self) -> None:
+            asked.append(self.rfile.readline())
+            self.wfile.write(b"3\n")
+
+    desk.spool.mkdir(exist_ok=True)
+    with socketserver.UnixStreamServer(str(desk.spool / NAME), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield asked
+        server.shutdown()
+        thread.join()
+
+
+def test_a_collector_that_runs_is_asked_to_upload(desk: Desk, collector: list[bytes]) -> None:
+    assert desk.ask("cloud", "upload") == {"uploaded": 0, "waiting": 3}
+    assert collector == [b'{"ask":"upload"}\n']
+    assert "owns the spool" in desk.run("cloud", "upload", desk.url, status=1)
+
+
+def test_a_store_moves_to_another_url_and_back_in_parts(desk: Desk, tmp_path: Path) -> None:
+    recorded = desk.record()
+    desk.record("exo-02")
+    moved = (tmp_path / "moved").as_uri()
+    assert desk.ask("cloud", "upload", moved, "--from", desk.url)["files"] > 8
+    assert desk.ask("cloud", "upload", moved, "--from", desk.url)["files"] == 0
+    done = desk.ask("cloud", "download", moved, "--out", str(tmp_path / "part"), "--robot", "*1")
+    assert done == {"sessions": 1, "rows": ROWS}
+    found = desk.ask("sessions", "ls", "--url", (tmp_path / "part").as_uri())
+    assert [each["session"] for each in found] == [recorded.session]
+    assert desk.run("cloud", "verify", moved).startswith(f"{moved} is whole")
+
+
+def test_upkeep_tells_what_it_would_do_and_leaves_what_a_model_names(desk: Desk) -> None:
+    recorded = desk.record()
+    desk.record()
+    version = recorded.store.table("events").version()
+    pin(recorded.store, "events", version, "gait-3")
+    plan, done = desk.ask("cloud", "compact", "--dry-run"), desk.ask("cloud", "compact")
+    assert plan == done
+    assert {each["location"]: each["files_after"] for each in done}["events"] == 1
+    plan = desk.ask("cloud", "vacuum", "--grace", "0", "--dry-run")
+    assert plan == desk.ask("cloud", "vacuum", "--grace", "0")
+    assert not any("events/" in name for name in plan["files"])
+    assert any("labels/" in name for name in plan["files"])
+    assert recorded.store.dataset("events", version).count_rows() == 4
+    assert "there is no terminal to ask on" in desk.run("cloud", "retain", "--days", "0", status=1)
+    assert desk.ask("cloud", "retain", "--days", "0", "--dry-run") == {"telemetry/000": 2 * ROWS}
+    assert desk.ask("cloud", "retain", "--days", "0", "--yes") == {"telemetry/000": 2 * ROWS}
+    assert Store(desk.url).dataset("telemetry/000").count_rows() == 0
