@@ -1,8 +1,8 @@
 """Whether the right process is blamed: a control loop, three programs that now and then take its core.
 
 The programs say when they did. An overrun counts as theirs where one of them had the core for at least half
-of the time that the frame was late. Loop, programs and gateway have real-time priorities, so that nothing else
-on the computer counts; needs the right to that. `--quick` watches for 15 s instead of 60.
+of the time that the frame was late. Loop, programs and gateway have real-time priorities, so that nothing
+else on the computer counts; needs the right to that. `--quick` watches for 15 s instead of 60.
 """
 
 import json
