@@ -1,6 +1,7 @@
 """The window's wiring: one network thread, a mailbox a robot, one 30 Hz timer that drains them and draws."""
 
 import concurrent.futures
+import contextlib
 import signal
 import sys
 from collections.abc import Callable
@@ -24,6 +25,7 @@ from server_gui.own_robot import OwnRobot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look, Theme
+from server_gui.views.x11_keys import NoX, X11Keys
 
 FRAME_MS: Final = 33
 SWITCH_S: Final = 0.0005  # a thread that wakes up gets Python within this, however busy the window is
@@ -115,9 +117,11 @@ class App:
         return station
 
     def stop(self, reason: str) -> None:
-        """STOP the robot that is looked at."""
-        if self.desk.selected is not None:
-            self.desk.selected.stop(reason)
+        """STOP the robot that is looked at; from any thread."""
+        station = self.desk.selected
+        if station is not None:
+            sent = station.send_stop(reason)
+            self._poster.deliver(lambda: station.note_stop(sent))
 
     def tick(self) -> None:
         """Take what has come, and draw."""
@@ -155,4 +159,15 @@ def run(settings: ServerSettings, look: Look | None = None, scale: float | None 
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())
         app.window.show()
-        return qt.exec()
+        with _x11_keys(qt, app):
+            return qt.exec()
+
+
+def _x11_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[object]:
+    """The keys that stop even while the window is busy, where there is an X server."""
+    if qt.platformName() != "xcb":
+        return contextlib.nullcontext()
+    try:
+        return X11Keys(int(app.window.winId()), lambda: app.stop("STOP key of the window"))
+    except NoX:
+        return contextlib.nullcontext()

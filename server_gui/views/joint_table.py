@@ -20,7 +20,7 @@ COLUMNS: Final = (
     ("Velocity", "velocity"),
     ("Torque", "torque"),
     ("Current", "current"),
-    ("Temperature", "temperature"),
+    ("Temp.", "temperature"),
     ("Error", "error_code"),
 )
 SI: Final = {

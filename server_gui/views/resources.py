@@ -17,7 +17,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plot import Curve, Plot
 
-SECONDS: Final = 300.0
+SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest that holds what there is
 GIB: Final = 1 << 30
 MIB: Final = 1 << 20
 OLD_S: Final = 5.0
@@ -34,7 +34,7 @@ class Resources(QWidget):
         self._taken: ResourceSnapshot | None = None
         self._frame = 0
         self.setObjectName("page")
-        self._cpu, self._memory = Plot(theme, SECONDS, 20.0), Plot(theme, SECONDS, 256.0)
+        self._cpu, self._memory = Plot(theme, SPANS_S[0], 20.0), Plot(theme, SPANS_S[0], 256.0)
         self._cpu.set_curves([Curve("cpu_percent", "accent"), Curve("gateway_cpu_percent", "good")])
         self._memory.set_curves([Curve("memory_used", "accent")])
         self._cards = {name: Card(name) for name in ("CPU", "Memory", "Computer")}
@@ -107,6 +107,10 @@ class Resources(QWidget):
             return
         times = rows[:, 0] - rows[-1, 0]
         series = {name: rows[:, 1 + place] for place, name in enumerate(SERIES)}
+        span = next((seconds for seconds in SPANS_S if times[0] > -seconds), SPANS_S[-1])
+        for plot in (self._cpu, self._memory):
+            if plot.seconds != span:
+                plot.set_seconds(span)
         live = not _is_old(station)
         self._cpu.draw(times, [series["cpu_percent"], series["gateway_cpu_percent"]], live=live)
         self._memory.draw(times, [series["memory_used"] / MIB], live=live)

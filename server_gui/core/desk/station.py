@@ -113,8 +113,15 @@ class Station:
     # --- STOP and reset
 
     def stop(self, reason: str) -> None:
-        """Quick stop on every drive: first of all it is sent."""
-        future = self._commands.stop(reason)
+        """Quick stop on every drive."""
+        self.note_stop(self.send_stop(reason))
+
+    def send_stop(self, reason: str) -> "Future[Stopped]":
+        """The same from any thread, at once; its answer is for `note_stop`."""
+        return self._commands.stop(reason)
+
+    def note_stop(self, future: "Future[Stopped]") -> None:
+        """A STOP was sent: follow what becomes of it."""
         number = self.stopping.sent()
         when_done(
             future,

@@ -110,6 +110,7 @@ class ParameterTree(QTreeView):
         self.setItemDelegateForColumn(NEW, delegate)
         self.selectionModel().currentChanged.connect(self._chosen)
         self._size_columns()
+        theme.changed.connect(self.refresh)
 
     def refresh(self) -> None:
         """Show how it is now; rows are made anew only when the robot has others."""
