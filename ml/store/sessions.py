@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
 import msgspec
@@ -21,6 +21,7 @@ ROWS_AT_ONCE: Final = 100_000  # of telemetry, about
 SHORTEST: Final = timedelta(seconds=1)  # that is read at once
 KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
 _ORDER: Final = [(name, "ascending") for name in ("utc", "connection", "stream", "seq", "row")]
+_UNKNOWN: Final = datetime(1970, 1, 1, tzinfo=UTC)  # when it began
 _AT_ONCE: Final = 8  # footers that are read at a time
 
 
@@ -97,7 +98,12 @@ def sessions(store: Store, robot: str | None = None) -> list[Session]:
         made(fields, Extent(extents.get((fields["robot"], fields["session"]), ())))
         for fields in newest(_rows(store, SESSIONS, robot))
     ]
-    return sorted(found, key=lambda session: (session.session, session.robot))
+    return in_order(found)
+
+
+def in_order(found: Iterable[Session]) -> list[Session]:
+    """Oldest first."""
+    return sorted(found, key=lambda each: (each.began or each.first or _UNKNOWN, each.session))
 
 
 def find(store: Store, name: str, robot: str | None = None) -> Session:

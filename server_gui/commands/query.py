@@ -1,20 +1,30 @@
 """`gwrms query`: SQL over everything recorded."""
 
-import csv
 import itertools
 import sys
-from collections.abc import Iterable, Iterator
 from datetime import datetime
 from decimal import Decimal
-from typing import Any, Final
+from typing import Final
 
 import msgspec
+import pyarrow as pa
+import pyarrow.csv
 
 from gateway.cli.text import NONE, say, table, warn
 from ml.store.query import Result, query
 from server_gui.commands.cloud_reach import add_url, parser, reach
 
 SHOWN: Final = 100  # rows, for people
+_PLAIN: Final = (
+    pa.types.is_integer,
+    pa.types.is_floating,
+    pa.types.is_boolean,
+    pa.types.is_string,
+    pa.types.is_timestamp,
+    pa.types.is_decimal,
+    pa.types.is_null,
+)
+_encoder = msgspec.json.Encoder(decimal_format="number")
 EPILOG = """The tables are telemetry, sessions, resources, events, journal, labels and predictions; their
 columns are in docs/store.md, and `gwrms query "DESCRIBE telemetry"` shows them. A channel is a column; its
 name has a dot, so write it in double quotes. Name a robot and a time where you can: the rest is not read.
@@ -48,48 +58,61 @@ def main(argv: list[str]) -> int:
 
 def _json(result: Result) -> None:
     """One array, a row a line, written while it is read."""
-    encoder = msgspec.json.Encoder(decimal_format="number")
-    before = "["
+    between = "["
     for batch in result.batches:
-        for row in batch.to_pylist():
-            sys.stdout.write(f"{before}{encoder.encode(row).decode()}")
-            before = ",\n"
-    sys.stdout.write("]\n" if before != "[" else "[]\n")
+        rows = ",\n".join(_encoder.encode(row).decode() for row in batch.to_pylist())
+        if rows:
+            sys.stdout.write(between + rows)
+            between = ",\n"
+    sys.stdout.write("]\n" if between != "[" else "[]\n")
 
 
 def _csv(result: Result) -> None:
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow(result.schema.names)
-    for batch in result.batches:
-        writer.writerows(_rows([batch], _plain))
+    """Nothing for null, times as ISO 8601 has them, lists and structs as JSON."""
+    schema = pa.schema(
+        [(each.name, each.type if _is_plain(each.type) else pa.string()) for each in result.schema]
+    )
+    sys.stdout.flush()
+    with pyarrow.csv.CSVWriter(sys.stdout.buffer, schema) as writer:
+        for batch in result.batches:
+            columns = [_flat(column) for column in batch.columns]
+            writer.write_batch(pa.record_batch(columns, schema=schema))
+
+
+def _is_plain(kind: pa.DataType) -> bool:
+    """Whether a CSV says it as it is."""
+    return any(is_kind(kind) for is_kind in _PLAIN)
+
+
+def _flat(column: pa.Array) -> pa.Array:
+    if _is_plain(column.type):
+        return column
+    return pa.array([None if value is None else _text(value) for value in column.to_pylist()], pa.string())
 
 
 def _table(result: Result) -> None:
-    rows = list(itertools.islice(_rows(result.batches, _short), SHOWN + 1))
+    found = (
+        (map(_text, row) for row in zip(*map(_list, batch.columns), strict=True)) for batch in result.batches
+    )
+    rows = [tuple(row) for row in itertools.islice(itertools.chain.from_iterable(found), SHOWN + 1)]
     say(table(result.schema.names, rows[:SHOWN]))
     if len(rows) > SHOWN:
         warn("query", f"the first {SHOWN} rows; --csv and --json bring all")
 
 
-def _rows(batches: Iterable[Any], text: Any) -> Iterator[tuple[str, ...]]:
-    for batch in batches:
-        columns = (column.to_pylist() for column in batch.columns)
-        for row in zip(*columns, strict=True):
-            yield tuple(map(text, row))
+def _list(column: pa.Array) -> list[object]:
+    values: list[object] = column.to_pylist()
+    return values
 
 
-def _short(value: object) -> str:
+def _text(value: object) -> str:
+    """For people."""
     if value is None:
         return NONE
-    return f"{value:.6g}" if isinstance(value, float) else _plain(value)
-
-
-def _plain(value: object) -> str:
-    """As CSV has it: nothing for null, ISO 8601 for times, JSON for lists and structs."""
-    if value is None:
-        return ""
+    if isinstance(value, float):
+        return f"{value:.6g}"
     if isinstance(value, datetime):
         return value.isoformat(sep=" ").replace("+00:00", "Z")
-    return (
-        str(value) if isinstance(value, str | int | float | Decimal) else msgspec.json.encode(value).decode()
-    )
+    if isinstance(value, str | int | Decimal):
+        return str(value)
+    return _encoder.encode(value).decode().strip('"')

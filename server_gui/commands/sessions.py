@@ -63,7 +63,7 @@ def _all(arguments: argparse.Namespace) -> list[Session]:
         stored = []
     for each in stored:
         waiting.pop((each.robot, each.session), None)
-    return sorted([*stored, *waiting.values()], key=lambda session: session.session)
+    return sessions.in_order([*stored, *waiting.values()])
 
 
 def _wanted(session: Session, arguments: argparse.Namespace) -> bool:
