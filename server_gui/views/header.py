@@ -42,6 +42,10 @@ class Chip(QFrame):
         row.addWidget(self._icon)
         row.addLayout(words)
 
+    @property
+    def main_text(self) -> str:
+        return self._main.text()
+
     def show_words(self, mark: Mark, main: str, detail: str) -> None:
         self._icon.show_mark(mark)
         set_text(self._main, main)
@@ -74,16 +78,22 @@ class Header(QWidget):
             row.addWidget(self._chips[name], share)
         self._outcome = Chip(theme, "what became of the STOP")
         row.addWidget(self._outcome, 4)
-        self._reset = QPushButton("Reset stop…")
-        self._reset.setToolTip("Ends a held stop. Every drive stays switched off: nothing is enabled.")
-        self._reset.clicked.connect(self.reset)
-        row.addWidget(self._reset)
+        self.reset_button = QPushButton("Reset stop…")
+        self.reset_button.setToolTip("Ends a held stop. Every drive stays switched off: nothing is enabled.")
+        self.reset_button.clicked.connect(self.reset)
+        row.addWidget(self.reset_button)
+        self.menu = menu
         row.addWidget(menu)
         self.stop = StopButton()
         self.stop.stopped.connect(self.stopped)
         row.addWidget(self.stop)
         theme.changed.connect(self._restyle)
         self._restyle()
+
+    @property
+    def outcome_text(self) -> str:
+        """What became of the STOP, as it is shown; empty while nothing is."""
+        return self._outcome.main_text if self._outcome.isVisible() else ""
 
     def refresh(self) -> None:
         """Show how it is now."""
@@ -100,7 +110,7 @@ class Header(QWidget):
         stopping = None if station is None else station.stopping
         shown = stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
         self._outcome.setVisible(shown)
-        self._reset.setVisible(stopping is not None and stopping.held)
+        self.reset_button.setVisible(stopping is not None and stopping.held)
         self._chips["warnings"].setVisible(station is not None and not shown)
         if shown and stopping is not None:
             mark = STOP_MARKS.get(stopping.state, Mark("triangle", "warn", "held"))

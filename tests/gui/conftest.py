@@ -1,0 +1,72 @@
+"""Qt without a screen for every test here; a mistake in a slot fails the test that made it."""
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+
+from PySide6.QtCore import QEvent, QEventLoop, QSettings, QtMsgType, qInstallMessageHandler
+from PySide6.QtWidgets import QApplication
+
+from server_gui.core.desk.desk import Desk
+from server_gui.views.main_window import MainWindow
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, described
+
+
+def _quiet(kind: QtMsgType, _context: object, text: str) -> None:
+    if "propagateSizeHints" not in text:
+        sys.stderr.write(f"{kind.name}: {text}\n")
+
+
+@pytest.fixture(scope="session")
+def qt() -> QApplication:
+    """The one application of this process."""
+    qInstallMessageHandler(_quiet)
+    application = QApplication.instance()
+    if not isinstance(application, QApplication):
+        application = QApplication([])
+        application.setStyle("Fusion")
+    return application
+
+
+@pytest.fixture(autouse=True)
+def slots_raise_nothing(qt: QApplication, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What a slot raises reaches nobody: here it fails the test."""
+    raised: list[str] = []
+    monkeypatch.setattr(
+        sys, "excepthook", lambda kind, error, _trace: raised.append(f"{kind.__name__}: {error}")
+    )
+    yield
+    qt.processEvents(QEventLoop.ProcessEventsFlag.AllEvents)
+    assert raised == []
+
+
+@pytest.fixture
+def theme(qt: QApplication) -> Theme:
+    return Theme(qt)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    """A desk with one robot that has described itself."""
+    made = Bench(Desk())
+    made.add("exo-01").take([described()])
+    return made
+
+
+@pytest.fixture
+def window(qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path) -> Iterator[MainWindow]:
+    """The main window on that desk, shown."""
+    kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
+    made = MainWindow(bench.desk, theme, kept)
+    made.show()
+    bench.draw(made)
+    yield made
+    made.close()
+    made.deleteLater()
+    qt.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -1,0 +1,156 @@
+"""STOP: always there, at once, and never taken for done before the drives say so."""
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from gateway.client import LinkLost, NotConnected
+from gateway.messages import Reset, Stopped
+from server_gui.core.desk.stopping import StopState
+from server_gui.views.main_window import MainWindow
+from server_gui.views.stop_keys import StopKeys
+from tests.gui.fakes import JOINTS, Bench, described
+
+ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
+
+
+def press(window: MainWindow, bench: Bench) -> None:
+    window.stopped.connect(lambda: bench.station.stop("test"))
+    QTest.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
+
+
+def shown(window: MainWindow, bench: Bench) -> str:
+    bench.draw(window)
+    return window.header.outcome_text
+
+
+def test_stop_goes_out_when_the_button_goes_down_not_when_it_comes_up(
+    window: MainWindow, bench: Bench
+) -> None:
+    press(window, bench)
+    assert len(bench.first.named("stop")) == 1
+    QTest.mouseRelease(window.header.stop, Qt.MouseButton.LeftButton)
+    assert len(bench.first.named("stop")) == 1
+
+
+def test_stop_is_sent_then_confirmed(window: MainWindow, bench: Bench) -> None:
+    press(window, bench)
+    assert shown(window, bench) == "STOP sent"
+    bench.first.answer(ALL)
+    assert shown(window, bench) == "STOP confirmed"
+
+
+@pytest.mark.parametrize(
+    ("drives", "said"),
+    [
+        ({**ALL.drives, "left_knee": "unconfirmed"}, "left_knee unconfirmed"),
+        ({**ALL.drives, "left_knee": "unreachable"}, "left_knee unreachable"),
+        ({}, "no drive answered"),
+    ],
+)
+def test_one_drive_that_does_not_confirm_makes_the_stop_not_confirmed(
+    window: MainWindow, bench: Bench, drives: dict[str, str], said: str
+) -> None:
+    press(window, bench)
+    bench.first.answer(Stopped(drives, held=True))  # type: ignore[arg-type]
+    assert shown(window, bench) == "STOP NOT CONFIRMED"
+    assert said in bench.station.stopping.text
+
+
+@pytest.mark.parametrize("error", [NotConnected("there is no link"), LinkLost("the link dropped")])
+def test_a_stop_that_nobody_answers_is_not_confirmed(
+    window: MainWindow, bench: Bench, error: Exception
+) -> None:
+    press(window, bench)
+    bench.first.fail(error)
+    assert shown(window, bench) == "STOP NOT CONFIRMED"
+    assert str(error) in bench.station.stopping.text
+
+
+def test_an_old_answer_does_not_confirm_a_newer_stop(bench: Bench) -> None:
+    bench.station.stop("first")
+    bench.station.stop("second")
+    bench.first.futures[0].set_result(ALL)
+    assert bench.station.stopping.state is StopState.SENT
+
+
+def test_f12_and_ctrl_space_stop_while_somebody_types(
+    qt: QApplication, window: MainWindow, bench: Bench
+) -> None:
+    keys = StopKeys(qt)
+    keys.pressed.connect(lambda: bench.station.stop("key"))
+    window.activateWindow()
+    window.parameters.words.setFocus()
+    QTest.qWaitForWindowActive(window)
+    handle = window.windowHandle()
+    QTest.keyClick(handle, Qt.Key.Key_A)
+    QTest.keyClick(handle, Qt.Key.Key_F12)
+    QTest.keyClick(handle, Qt.Key.Key_Space, Qt.KeyboardModifier.ControlModifier)
+    assert len(bench.first.named("stop")) == 2
+    assert window.parameters.words.text() == "a", "the keys went into the field"
+
+
+def test_stop_works_while_a_menu_is_open(qt: QApplication, window: MainWindow, bench: Bench) -> None:
+    keys = StopKeys(qt)
+    keys.pressed.connect(lambda: bench.station.stop("key"))
+    window.activateWindow()
+    QTest.qWaitForWindowActive(window)
+    menu = window.header.menu.menu()
+    menu.popup(window.pos())
+    QTest.qWaitForWindowExposed(menu)
+    QTest.keyClick(window.windowHandle(), Qt.Key.Key_F12)
+    menu.close()
+    assert len(bench.first.named("stop")) == 1
+
+
+def test_stop_all_reaches_every_robot(window: MainWindow, bench: Bench) -> None:
+    bench.add("exo-02", 7421)
+    bench.draw(window)
+    window.stop_all.connect(lambda: bench.desk.stop_all("all"))
+    QTest.mousePress(window.robots.all_stop, Qt.MouseButton.LeftButton)
+    assert [len(commands.named("stop")) for commands in bench.commands] == [1, 1]
+
+
+def test_stop_is_in_sight_on_every_tab_and_while_changes_are_reviewed(
+    window: MainWindow, bench: Bench
+) -> None:
+    for tab in range(window.tabs.count()):
+        window.tabs.setCurrentIndex(tab)
+        assert window.header.stop.isVisible()
+        assert window.header.stop.isEnabled()
+    window.parameters.stage("gait.step_length", 0.45)
+    window.parameters.begin_review()
+    assert QApplication.activeModalWidget() is None
+    assert window.header.stop.isEnabled()
+
+
+def test_a_held_stop_is_reset_by_its_own_button_which_enables_nothing(
+    window: MainWindow, bench: Bench
+) -> None:
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    bench.draw(window)
+    assert window.header.reset_button.isVisible()
+    window.header.reset_button.click()
+    bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    bench.draw(window)
+    assert bench.first.asked[-1] == ("reset", ())
+    assert not window.header.reset_button.isVisible()
+
+
+def test_a_reset_that_leaves_the_stop_held_says_why(window: MainWindow, bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    bench.station.reset()
+    bench.first.answer(Reset({}, {"left_knee": "does not answer"}, held=True))
+    assert "left_knee: does not answer" in bench.desk.news.items[0].text
+    assert bench.station.stopping.held
+
+
+def test_the_robot_is_named_on_the_button_and_so_is_another(window: MainWindow, bench: Bench) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02")])
+    bench.desk.select(other)
+    bench.draw(window)
+    assert window.header.stop.text() == "STOP  exo-02"
