@@ -1,10 +1,8 @@
 """`./dev bench server`: spool, store and the memory they take, beside plain Parquet in the same run."""
 
 import functools
-import json
 import os
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -17,15 +15,13 @@ import pyarrow as pa
 import pyarrow.dataset
 import pyarrow.parquet as pq
 
-from gateway.client import Batch
 from ml.store import Store
 from ml.store.tables import TELEMETRY
-from server_gui.core.recording.recorder import Recorder, RecorderSettings
 from server_gui.core.recording.rows import Layout, Run
 from server_gui.core.recording.segment import Segment
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import upload
-from server_gui.core.recording.uploader import Uploader
+from tests.bench import _fleet
 
 ROBOTS, CHANNELS, RATE_HZ, SECONDS = 20, 60, 100, 60
 NAMES = tuple(f"joint_{number // 6}.quantity_{number % 6}" for number in range(CHANNELS))
@@ -33,8 +29,8 @@ LAYOUT = Layout(NAMES, ("rad",) * CHANNELS)
 ASKED = [*NAMES[:10], "utc"]
 GROUP_ROWS = 200  # of one commit
 ROUNDS = 5
-COLLECT_S = 15
 LEAST_ROWS_PER_S, MOST_UPLOAD_S = 40_000, 0.5
+FLEET, MOST_CORES, MOST_GROWTH = 50, 1.0, 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,24 +119,20 @@ def stored(folder: Path) -> Iterator[Row]:
         yield Row(f"scan of {len(ASKED)} columns: {name}", rows / best_s, "rows/s")
 
 
-def memory(folder: Path) -> Iterator[Row]:
-    """What a process takes that collects twenty robots, each notification by itself, in real time."""
-    for robots in (0, ROBOTS):
-        command = [
-            sys.executable,
-            "-c",
-            f"from tests.bench import server; server.collect({robots}, {str(folder)!r})",
-        ]
-        found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-        yield Row(
-            f"collecting {robots} robots × {RATE_HZ} Hz for {COLLECT_S} s: peak memory", found["mb"], "MB"
-        )
-        yield Row("  CPU", found["cpu"], "%")
-        if robots:
-            yield Row("  rows lost", found["lost"], "", 0, True)
+def fleet(folder: Path) -> Iterator[Row]:
+    """What it costs to follow robots over TCP and keep everything: nothing is lost, and nothing grows."""
+    cost = _fleet.cpu(FLEET)
+    what = f"{FLEET} robots × {RATE_HZ} Hz × {CHANNELS} channels: followed, recorded, uploaded"
+    yield Row(what, cost["cores"], "cores", MOST_CORES, True)
+    yield Row("  rows lost", cost["lost"], "", 0, True)
+    found = _fleet.memory(ROBOTS)
+    what = f"{_fleet.SIMULATED_S:g} s of {ROBOTS} robots' time: memory in its second half ÷ before"
+    yield Row(what, found["second"] / found["first"], "", MOST_GROWTH, True)
+    yield Row("  peak", found["peak"], "MB")
+    yield Row("  rows lost", found["lost"], "", 0, True)
 
 
-MEASUREMENTS: tuple[Callable[[Path], Iterator[Row]], ...] = (spool, stored, memory)
+MEASUREMENTS: tuple[Callable[[Path], Iterator[Row]], ...] = (spool, stored, fleet)
 
 
 def main() -> int:
@@ -155,29 +147,6 @@ def main() -> int:
                 sys.stdout.write(row.text)
                 sys.stdout.flush()
     return 0 if all(row.kept for row in rows) else 1
-
-
-def collect(robots: int, folder: str) -> None:
-    """Record and upload, and print what that took; for a process of its own."""
-    settings = RecorderSettings(batch_s=COLLECT_S / 3)
-    columns: dict[str, list[float | None]] = {name: [0.5] for name in NAMES}
-    began_s, began_cpu_s, ticks = time.monotonic(), time.process_time(), COLLECT_S * RATE_HZ
-    with (
-        Spool(Path(folder) / f"spool-{robots}") as opened,
-        Uploader(opened, lambda: Store((Path(folder) / f"store-{robots}").as_uri())),
-        Recorder(opened, settings=settings) as recorder,
-    ):
-        for tick in range(ticks):
-            for robot in range(robots):
-                now_ns = time.monotonic_ns()
-                recorder.record(f"exo-{robot}", 1, Batch([now_ns], columns, tick, 0, 0, 1, now_ns))
-            time.sleep(max(0.0, began_s + (tick + 1) / RATE_HZ - time.monotonic()))  # the robots' rate
-        recorder.flush(60)
-        lost = recorder.state.lost
-    cpu = 100 * (time.process_time() - began_cpu_s) / (time.monotonic() - began_s)
-    status = Path("/proc/self/status").read_text()
-    peak_mb = int(status.partition("VmHWM:")[2].split()[0]) / 1024
-    sys.stdout.write(json.dumps({"mb": peak_mb, "cpu": cpu, "lost": lost}))
 
 
 def _plain(segment: Segment, folder: Path) -> None:

@@ -84,6 +84,13 @@ class Collector:
         if self._running is not None and concurrent.futures.wait([self._running], within_s).done:
             self._running.result()
 
+    def report(self) -> CollectorReport:
+        """How everything goes now."""
+        return self._network.run(self._told()).result()
+
+    async def _told(self) -> CollectorReport:
+        return self._report()
+
     async def _run(self) -> None:
         answers = {"status": self._report, "upload": self._upload}
         async with door(self._spool.folder, answers):

@@ -1,0 +1,91 @@
+"""What collecting a fleet costs: a collector in a process of its own, and its robots in another.
+
+`GWRMS_SIMULATED_S` is for how long, in the robots' time, memory is watched: 3600 for an hour.
+"""
+
+import gc
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from server_gui.core.fleet.collector import Collector
+from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
+
+RATE_HZ, CHANNELS = 100, 60
+WARM_S, MEASURE_S, BATCH_S = 3.0, 12.0, 5.0
+SIMULATED_S = float(os.environ.get("GWRMS_SIMULATED_S", "60"))
+LOOK_S = 0.2
+
+
+def cpu(robots: int) -> dict[str, float]:
+    """What following and recording robots at their own rate takes, uploads among it."""
+    return _measured("_cpu", robots, "--rate", str(RATE_HZ))
+
+
+def memory(robots: int) -> dict[str, float]:
+    """How memory goes over a long time that passes fast."""
+    return _measured("_memory", robots, "--fast", "--seconds", str(SIMULATED_S))
+
+
+def _measured(what: str, robots: int, *options: str) -> dict[str, float]:
+    command = [sys.executable, "-m", "tests.wire_robots", str(robots), "--channels", str(CHANNELS), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as served, tempfile.TemporaryDirectory() as folder:
+        try:
+            assert served.stdout is not None
+            ports = served.stdout.readline()
+            script = f"from tests.bench import _fleet; _fleet.run({what!r}, {ports!r}, {folder!r})"
+            found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+        finally:
+            served.kill()
+    result: dict[str, float] = json.loads(found.stdout)
+    return result
+
+
+def run(what: str, ports: bytes, folder: str) -> None:
+    """Collect these robots; for a process of its own, which prints what was measured."""
+    gc.freeze()  # as `gwrms collect` does
+    robots = {f"exo-{i:02}": RobotSettings(f"127.0.0.1:{port}") for i, port in enumerate(json.loads(ports))}
+    store = StoreSettings((Path(folder) / "store").as_uri())
+    recorder = RecordingSettings(spool=Path(folder) / "spool", batch_s=BATCH_S)
+    with Collector(ServerSettings(robots, store, recorder)) as collector:
+        measured = globals()[what](collector, len(robots))
+    sys.stdout.write(json.dumps(measured))
+
+
+def _cpu(collector: Collector, robots: int) -> dict[str, float]:
+    collector.wait(WARM_S)
+    began_s, rows = time.process_time(), _rows(collector)
+    collector.wait(MEASURE_S)
+    took_s, rows = time.process_time() - began_s, _rows(collector) - rows
+    # Of a second in which all of them send: also on a computer too busy to let them.
+    return {"cores": took_s / rows * robots * RATE_HZ, "rows": rows, **_losses(collector)}
+
+
+def _memory(collector: Collector, robots: int) -> dict[str, float]:
+    everything, seen = robots * SIMULATED_S * RATE_HZ, []
+    while (rows := _rows(collector)) < everything:
+        collector.wait(LOOK_S)
+        seen.append((rows, _resident_mb()))
+    first = [mb for rows, mb in seen if everything / 4 < rows <= everything / 2]
+    second = [mb for rows, mb in seen if rows > everything / 2]
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {"first": max(first), "second": max(second), "peak": peak_mb, **_losses(collector)}
+
+
+def _losses(collector: Collector) -> dict[str, float]:
+    report = collector.report()
+    missing = sum(link.missed + link.dropped for link in report.robots.values())
+    return {"lost": report.recorder.lost + missing}
+
+
+def _rows(collector: Collector) -> int:
+    return sum(link.rows for link in collector.report().robots.values())
+
+
+def _resident_mb() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / (1 << 20)
