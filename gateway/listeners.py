@@ -107,12 +107,12 @@ def rest(listeners: Listeners) -> None:
     for place, descriptor in enumerate(spare):
         os.dup2(descriptor, resting.FIRST + place)
     environ = {
+        "MALLOC_ARENA_MAX": "1",  # of glibc: the threads of so small a process need no memory of their own
         **os.environ,
         _NUMBER: str(len(spare)),
         _PROCESS: str(os.getpid()),
         _NAMES: ":".join([PORT, CLASSIC][: len(spare)]),
         _RESTING: "1",
-        "MALLOC_ARENA_MAX": "1",  # of glibc: the threads of so small a process need no memory of their own
     }
     ourselves = [sys.executable, *sys.orig_argv[1:]]
     sys.stdout.flush()

@@ -11,7 +11,6 @@ some seconds. Where a daemon is not installed its rows are left out, and a line 
 import json
 import os
 import platform
-import socket
 import subprocess
 import sys
 import tempfile
@@ -23,6 +22,7 @@ from pathlib import Path
 
 from tests.bench._crowd import SERVER, crowd, inside, namespace, processes_now, wire_bytes
 from tests.bench._daemons import PROGRAMS, Running, absent, running
+from tests.unit.gateway.harness import Client
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 4
@@ -112,7 +112,7 @@ def rounds(daemons: dict[str, Running], network: str, number: int) -> list[Row]:
     }
     with ExitStack() as held:
         if (gwrms := daemons.get("gwrms")) is not None:  # what waking costs: `idle`
-            held.enter_context(socket.create_connection((gwrms.host, gwrms.port)))
+            held.enter_context(Client((gwrms.host, gwrms.port))).call("clock.read")
         for _ in range(ROUNDS):
             for name, row in rows.items():
                 program, way = WAYS[name]

@@ -7,6 +7,9 @@ from typing import Any, cast
 
 import pytest
 
+from drivers.bus.bus import CanBus
+from drivers.bus.settings import CanSettings
+from drivers.errors import Unavailable
 from gateway.budget import Budget
 from gateway.cli.cost import text
 from gateway.cost import Costs
@@ -88,6 +91,21 @@ def test_a_bus_tells_what_we_put_on_it_and_how_much_of_it_that_is() -> None:
     bits_per_s = one.sent_frames_per_s * (47 + 64) * 2
     assert one.load_percent == pytest.approx(bits_per_s / 1e4, rel=1e-3)
     loop.close()
+
+
+def test_a_real_bus_counts_what_it_sends() -> None:
+    bus = CanBus("main", CanSettings(interface="virtual", channel="cost"))
+    bus.start()
+    try:
+        until(lambda: bus.opened, "it is open")
+        for _ in range(3):
+            bus.send(0x602, bytes(8))
+        assert (bus.sent, bus.sent_bytes) == (3, 24)
+    finally:
+        bus.stop()
+    with pytest.raises(Unavailable):
+        bus.send(0x602, bytes(8))
+    assert bus.sent == 3
 
 
 def test_the_command_asks_twice_and_says_who_causes_what(

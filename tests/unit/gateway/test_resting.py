@@ -62,12 +62,12 @@ def test_it_rests_too_where_nobody_has_come_yet(running: Running) -> None:
 def test_nobody_is_lost_who_comes_while_it_goes_to_rest_or_comes_back(running: Running) -> None:
     address = processes.address(running)
     answered = 0
-    for turn in range(12):  # at different moments of its way there and back
+    for turn in range(8):  # at different moments of its way there and back
         with socket.create_connection(address, DEADLINE_S) as one:
             one.sendall(CLOCK)
             answered += one.makefile().readline().startswith('{"id":1,"result"')
-        time.sleep(0.05 + turn / 80)
-    assert answered == 12
+        time.sleep(0.05 + turn / 50)
+    assert answered == 8
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -81,13 +81,13 @@ def test_signals_end_it_at_rest(running: Running, number: signal.Signals) -> Non
 def test_a_signal_is_met_on_the_way_there_and_back(tmp_path: Path) -> None:
     file = tmp_path / "robot.toml"
     file.write_text(processes.RESTS_SOON.replace("0.05", "0"), encoding="utf-8")
-    for turn in range(6):
+    for turn in range(4):
         with processes.process(*processes.GATEWAY, str(file)) as running:
             address = processes.address(running)
             if turn % 2:
                 until(lambda: processes.rests(running.pid), "it rests")
                 socket.create_connection(address, DEADLINE_S).close()
-            time.sleep(turn * 0.03)
+            time.sleep(turn * 0.05)
             running.terminate()
             assert running.wait(DEADLINE_S) == 0
 
