@@ -17,7 +17,7 @@ from server_gui.core.fleet.collector import Collector
 from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
 
 RATE_HZ, CHANNELS = 100, 60
-WARM_S, MEASURE_S, BATCH_S = 3.0, 12.0, 5.0
+WARM_S, MEASURE_S, BATCH_S = 3.0, 20.0, 20.0  # so that a batch is uploaded in it
 SIMULATED_S = float(os.environ.get("GWRMS_SIMULATED_S", "60"))
 LOOK_S = 0.2
 

@@ -22,9 +22,13 @@ def nothing() -> None:
     pass
 
 
-def until(condition: Callable[[], object], found: Callable[[], object] = lambda: None) -> None:
+def until(
+    condition: Callable[[], object],
+    found: Callable[[], object] = lambda: None,
+    within_s: float = DEADLINE_S,
+) -> None:
     """Wait for a condition; `found` tells what there was instead."""
-    deadline = time.monotonic() + DEADLINE_S
+    deadline = time.monotonic() + within_s
     while not condition():
         assert time.monotonic() < deadline, f"not met in time: {found()}"
         time.sleep(0.05)
