@@ -5,6 +5,7 @@ import contextlib
 import gc
 import logging
 import os
+import sys
 from datetime import datetime
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from server_gui.terminal.ending import Ended, Ending
 
 log = logging.getLogger(__name__)
 
+UNIT = Path(__file__).with_name("collect.service")
 LOOK_S = 0.5  # between looks whether it is to end
 HEADER = (
     "robot", "address", "link", "since", "links", "rows/s", "rows", "size", "missed", "dropped", "newest",
@@ -40,8 +42,8 @@ the server's file (without --config: ~/.config/gwrms/server.toml, if it is there
 
   [recorder]
   spool = "/var/lib/gwrms/spool"   # default: ~/.local/share/gwrms/spool
-  upload = "always"                # a batch a minute; idle: while no robot has sent anything for 10 s, and
-                                   # when more than 2 GiB wait; manual: with --upload
+  upload = "always"                # as soon as a batch is full; idle: while no robot has sent rows for 10 s,
+                                   # or more than 2 GiB wait; manual: with --upload
   rate_hz = 100                    # rows a second; 0: every sample of every source
   channels = ["*"]                 # names or globs
   resources_s = 5                  # between looks at the robots' computers
@@ -50,6 +52,7 @@ the server's file (without --config: ~/.config/gwrms/server.toml, if it is there
 examples
   gwrms collect --robot exo-01=192.0.2.7:7420 --operator Ada --notes "new insoles"
   gwrms collect --status
+  gwrms collect --unit | sudo tee /etc/systemd/system/gwrms-collect.service
 
 exit status
   0 ended as asked, or a collector has answered --status or --upload; 1 it cannot record, or nobody answers;
@@ -59,6 +62,9 @@ exit status
 def main(argv: list[str]) -> int:
     """Run `gwrms collect`."""
     arguments = _parser().parse_args(argv)
+    if arguments.unit:
+        say(UNIT.read_text(encoding="utf-8").replace("@PYTHON@", sys.executable))
+        return 0
     settings = add_robots(load(arguments.config), dict(arguments.robot))
     spool = settings.recorder.spool
     if arguments.status:
@@ -168,6 +174,7 @@ def _parser() -> argparse.ArgumentParser:
     asking = parser.add_mutually_exclusive_group()
     asking.add_argument("--status", action="store_true", help="ask the collector that runs how it goes")
     asking.add_argument("--upload", action="store_true", help="tell it to upload what waits, now")
+    asking.add_argument("--unit", action="store_true", help="print a systemd unit for this installation")
     parser.add_argument("--json", action="store_true", help="with --status: one JSON object, for machines")
     return parser
 

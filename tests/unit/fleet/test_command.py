@@ -64,6 +64,14 @@ def test_nothing_that_a_window_needs_is_imported() -> None:
     assert found.stdout.strip() == "[]"
 
 
+def test_the_unit_is_for_this_installation(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["collect", "--unit"]) == 0
+    unit = capsys.readouterr().out
+    assert f"ExecStart={sys.executable} -P -m gateway.main collect --config" in unit
+    assert "@PYTHON@" not in unit
+    assert "ProtectSystem=strict" in unit
+
+
 def test_a_status_says_what_people_ask_first() -> None:
     alarm = Alarm(AlarmKind.DISK_FULL, "recording has stopped: the disk of /spool is nearly full")
     report = CollectorReport(
