@@ -98,3 +98,11 @@ def test_robots_of_the_command_line_come_on_top(tmp_path: Path) -> None:
     assert settings.robots["exo-03"].where == Address("127.0.0.1", 7430)
     with pytest.raises(SettingsError, match=r"exo-04: 127\.0\.0\.1:7430 is exo-03 already"):
         add_robots(settings, {"exo-04": ":7430"})
+
+
+def test_the_readmes_file_is_one(tmp_path: Path) -> None:
+    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+    block = readme.partition("## Keep everything")[2].partition("```toml\n")[2].partition("```")[0]
+    settings = load(written(tmp_path, block))
+    assert set(settings.robots) == {"exo-01", "exo-02"}
+    assert (settings.store.url, settings.recorder.upload) == ("s3://exoskeletons/lab", Upload.IDLE)
