@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from ml.store import reading
 from ml.store.errors import StoreError, translated
-from ml.store.reading import DataFile
+from ml.store.fragments import DataFile
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
 

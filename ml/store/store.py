@@ -20,11 +20,12 @@ from deltalake import (
     write_deltalake,
 )
 from deltalake.exceptions import CommitFailedError
-from pyarrow.fs import FileSystem, SubTreeFileSystem
+from pyarrow.fs import FileSystem
 
 from ml.store import durable
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
 from ml.store.files import filesystem
+from ml.store.fragments import as_dataset
 from ml.store.objects import RETRIES, Objects, s3_options
 from ml.store.probe import probe
 from ml.store.tables import Table
@@ -161,7 +162,7 @@ class Store:
         """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
         delta = self.table(location, version)
         with translated(f"{self.url}/{location}"):
-            return delta.to_pyarrow_dataset(filesystem=SubTreeFileSystem(location, self.files))
+            return as_dataset(delta, location, self.files)
 
     def units(self, location: str) -> dict[str, str | None]:
         """Each column's unit, None where none was given; nothing where there is no table yet."""

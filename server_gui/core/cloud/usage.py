@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from ml.store import reading
+from ml.store.fragments import DataFile
 from ml.store.objects import Object
-from ml.store.reading import DataFile
 from ml.store.store import Store
 from ml.store.tables import TABLES
 

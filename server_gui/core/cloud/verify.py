@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 
 from ml.store import reading
 from ml.store.errors import NoSuchTable, StoreError, translated
-from ml.store.reading import DataFile
+from ml.store.fragments import DataFile
 from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY

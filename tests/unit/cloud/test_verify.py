@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ml.store import Store
-from ml.store.reading import DataFile
+from ml.store.fragments import DataFile
 from server_gui.core.cloud import verify
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
