@@ -136,10 +136,10 @@ def _unit(desk: Desk, quantity: str) -> str:
 def _row(station: Station, joint: str, desk: Desk) -> list[tuple[str, str]]:
     robot = station.robot
     part = robot.parts[joint]
-    stale = robot.is_stale() or part.state in ("stale", "lost")
-    word = part.state if part.state in ("stale", "lost") else robot.word(f"{joint}.state")
-    mark = state_mark(word)
-    age = "" if not stale or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
+    gone = part.state in ("stale", "lost")
+    stale = gone or robot.is_stale()
+    mark = state_mark(part.state if gone else robot.word(f"{joint}.state"))
+    age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
     side = joint.partition("_")[0]
     cells = [
         (joint.replace("_", " "), side if side in ("left", "right") else "text"),

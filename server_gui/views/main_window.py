@@ -49,7 +49,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._settings = settings
+        self.kept = settings
         self._frame = 0
         self.setWindowTitle("GWRMS")
         self.resize(1680, 1000)
@@ -96,18 +96,18 @@ class MainWindow(QMainWindow):
         self._bar.refresh()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self._settings.setValue("geometry", self.saveGeometry())
-        self._settings.setValue("state", self.saveState(LAYOUT))
-        self._settings.setValue("look", self._theme.look.value)
-        self._settings.setValue("scale", round(self._theme.scale * 100))
-        self._settings.setValue("units", dict(self._desk.shown.units.by_si))
+        self.kept.setValue("geometry", self.saveGeometry())
+        self.kept.setValue("state", self.saveState(LAYOUT))
+        self.kept.setValue("look", self._theme.look.value)
+        self.kept.setValue("scale", round(self._theme.scale * 100))
+        self.kept.setValue("units", dict(self._desk.shown.units.by_si))
         super().closeEvent(event)
         self.closed.emit()
 
     def reset_layout(self) -> None:
         """Everything where it was at first."""
         self.restoreState(self._usual, LAYOUT)
-        for dock in self._docks:
+        for dock in self.docks:
             dock.show()
 
     # --- how it is put together
@@ -123,7 +123,7 @@ class MainWindow(QMainWindow):
         self.setCorner(Qt.Corner.BottomLeftCorner, Qt.DockWidgetArea.LeftDockWidgetArea)
         self.setCorner(Qt.Corner.BottomRightCorner, Qt.DockWidgetArea.RightDockWidgetArea)
         areas = Qt.DockWidgetArea
-        self._docks = [
+        self.docks = [
             self._dock("Robots", self.robots, areas.LeftDockWidgetArea),
             self._dock("Parameters", self.parameters, areas.RightDockWidgetArea),
             self._dock("Events", self.events, areas.BottomDockWidgetArea),
@@ -133,9 +133,9 @@ class MainWindow(QMainWindow):
 
     def _size_docks(self) -> None:
         px = self._theme.px
-        self.resizeDocks([self._docks[0]], [px(225)], Qt.Orientation.Horizontal)
-        self.resizeDocks([self._docks[1]], [px(400)], Qt.Orientation.Horizontal)
-        self.resizeDocks([self._docks[2]], [px(120)], Qt.Orientation.Vertical)
+        self.resizeDocks([self.docks[0]], [px(225)], Qt.Orientation.Horizontal)
+        self.resizeDocks([self.docks[1]], [px(400)], Qt.Orientation.Horizontal)
+        self.resizeDocks([self.docks[2]], [px(120)], Qt.Orientation.Vertical)
 
     def _dock(self, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
         dock = QDockWidget(title)
@@ -147,7 +147,7 @@ class MainWindow(QMainWindow):
     def _view_menu(self) -> QMenu:
         menu = QMenu(self)
         menu.setToolTipsVisible(True)
-        for dock in self._docks:
+        for dock in self.docks:
             menu.addAction(dock.toggleViewAction())
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
@@ -174,7 +174,7 @@ class MainWindow(QMainWindow):
         return choose
 
     def _restore(self) -> None:
-        geometry, state = self._settings.value("geometry"), self._settings.value("state")
+        geometry, state = self.kept.value("geometry"), self.kept.value("state")
         if isinstance(geometry, QByteArray):
             self.restoreGeometry(geometry)
         if isinstance(state, QByteArray):

@@ -110,6 +110,13 @@ class Overview(QWidget):
             live = not station.robot.is_stale()
             self._joints.set_note(f"age {age_text(station.robot.age_s())}" if live else _old(station))
 
+    @property
+    def notes(self) -> list[str]:
+        """What stands at the right of each card's title."""
+        return [
+            card.note for card in (self._status, self._posture, self._pressure, *self._plots, self._joints)
+        ]
+
     def _pressure_card(self) -> Card:
         card = Card("Plantar pressure")
         row = QHBoxLayout()

@@ -50,6 +50,11 @@ class RobotCard(QFrame):
         row.addLayout(words, 1)
         row.addWidget(self.stop, 0, Qt.AlignmentFlag.AlignTop)
 
+    @property
+    def texts(self) -> tuple[str, str, str]:
+        """What it says."""
+        return self._name.text(), self._state.text(), self._link.text()
+
     def refresh(self, *, selected: bool, twins: bool) -> None:
         """Show how it is now; `twins`: another robot has the same name."""
         station, robot = self.station, self.station.robot
@@ -84,7 +89,7 @@ class RobotsPanel(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._cards: list[RobotCard] = []
+        self.cards: list[RobotCard] = []
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         page = QWidget()
@@ -101,10 +106,10 @@ class RobotsPanel(QWidget):
         self.address.setPlaceholderText("Add a robot: HOST:PORT")
         self.address.setAccessibleName("Address of a robot to add")
         self.address.returnPressed.connect(self._add)
-        self._said = QLabel()
-        self._said.setObjectName("dim")
-        self._said.setWordWrap(True)
-        self._said.hide()
+        self.said = QLabel()
+        self.said.setObjectName("dim")
+        self.said.setWordWrap(True)
+        self.said.hide()
         self.all_stop = StopButton()
         self.all_stop.setText("STOP ALL")
         self.all_stop.setAccessibleName("STOP every robot")
@@ -112,7 +117,7 @@ class RobotsPanel(QWidget):
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addWidget(scroll, 1)
-        everything.addWidget(self._said)
+        everything.addWidget(self.said)
         everything.addWidget(self.address)
         everything.addWidget(self.all_stop)
         theme.changed.connect(self._restyle)
@@ -120,10 +125,10 @@ class RobotsPanel(QWidget):
 
     def refresh(self) -> None:
         """Show how all of them are now."""
-        for station in self._desk.stations[len(self._cards) :]:
+        for station in self._desk.stations[len(self.cards) :]:
             self._add_card(station)
         titles = [station.title for station in self._desk]
-        for card in self._cards:
+        for card in self.cards:
             card.refresh(
                 selected=card.station is self._desk.selected, twins=titles.count(card.station.title) > 1
             )
@@ -136,7 +141,7 @@ class RobotsPanel(QWidget):
         card.chosen.connect(lambda: self._desk.select(station))
         card.stop.stopped.connect(lambda: station.stop("stop button in the list of robots"))
         card.stop.setAccessibleName(f"STOP {station.name}")
-        self._cards.append(card)
+        self.cards.append(card)
         self._list.insertWidget(self._list.count() - 1, card)
 
     def _add(self) -> None:
@@ -155,8 +160,8 @@ class RobotsPanel(QWidget):
 
     def say(self, text: str) -> None:
         """What is wrong with the address that was typed."""
-        self._said.setText(text)
-        self._said.setVisible(bool(text))
+        self.said.setText(text)
+        self.said.setVisible(bool(text))
 
 
 def _why(station: Station) -> str:

@@ -88,7 +88,7 @@ class Signals(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._plots: list[UnitPlot] = []
+        self.plots: list[UnitPlot] = []
         self._frozen: Frozen | None = None
         self._frame = 0
         self._described: tuple[object, ...] = ()
@@ -103,10 +103,10 @@ class Signals(QWidget):
         self._words.setAccessibleName("Filter of the channels")
         self._words.textChanged.connect(self._filter)
         self._stack = QVBoxLayout()
-        self._empty = QLabel("Tick channels at the left to see them here.")
-        self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._empty.setObjectName("dim")
-        self._stack.addWidget(self._empty)
+        self.empty = QLabel("Tick channels at the left to see them here.")
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.empty.setObjectName("dim")
+        self._stack.addWidget(self.empty)
         left, right = QWidget(), QWidget()
         left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
         left_box.setContentsMargins(8, 8, 0, 8)
@@ -134,7 +134,7 @@ class Signals(QWidget):
         seconds = float(SPANS_S[self._span.currentIndex()])
         frozen = self._frozen
         times = station.rings.times(seconds) if frozen is None else frozen.times[frozen.times >= -seconds]
-        for plot in self._plots:
+        for plot in self.plots:
             found = [
                 station.rings.values(name, len(times))
                 if frozen is None
@@ -145,8 +145,8 @@ class Signals(QWidget):
             plot.plot.draw(times, columns, live=frozen is not None or not station.robot.is_stale())
         self._frame += 1
         if self._frame % SLOW == 1:
-            set_text(self._said, self._state(station))
-            for plot in self._plots:
+            set_text(self.said, self._state(station))
+            for plot in self.plots:
                 plot.show_values([self._newest(station, name) for name in plot.channels])
 
     @property
@@ -191,23 +191,23 @@ class Signals(QWidget):
         self.pause.setCheckable(True)
         self.pause.setToolTip("The view stands still; data and recording go on")
         self.pause.toggled.connect(self._paused)
-        follow = QPushButton("Fit")
-        follow.setToolTip("Undo zoom: the range follows the data again")
-        follow.clicked.connect(self._follow)
+        self.fit = QPushButton("Fit")
+        self.fit.setToolTip("Undo zoom: the range follows the data again")
+        self.fit.clicked.connect(self._follow)
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
         as_csv.clicked.connect(self._ask_csv)
         as_png.clicked.connect(self._ask_png)
-        self._said = QLabel()
-        self._said.setObjectName("dim")
+        self.said = QLabel()
+        self.said.setObjectName("dim")
         row = QHBoxLayout()
-        for widget in (self._span, self.pause, follow, as_csv, as_png):
+        for widget in (self._span, self.pause, self.fit, as_csv, as_png):
             row.addWidget(widget)
-        row.addWidget(self._said, 1)
+        row.addWidget(self.said, 1)
         return row
 
     def _list_channels(self, station: Station) -> None:
         infos = _infos(station)
-        described = (station, *(info.name for info in infos))
+        described = (station, self._desk.shown.revision, *(info.name for info in infos))
         if described == self._described:
             return
         before = self.chosen if self._described else list(USUAL)
@@ -235,7 +235,7 @@ class Signals(QWidget):
 
     def _rebuild(self) -> None:
         """A plot for each unit of the chosen channels."""
-        for plot in self._plots:
+        for plot in self.plots:
             self._stack.removeWidget(plot)
             plot.deleteLater()
         station = self._desk.selected
@@ -247,10 +247,10 @@ class Signals(QWidget):
                     info.name
                 )
         seconds = float(SPANS_S[self._span.currentIndex()])
-        self._plots = [UnitPlot(self._theme, unit, names, seconds) for unit, names in by_unit.items()]
-        for plot in self._plots:
+        self.plots = [UnitPlot(self._theme, unit, names, seconds) for unit, names in by_unit.items()]
+        for plot in self.plots:
             self._stack.addWidget(plot, 1)
-        self._empty.setVisible(not self._plots)
+        self.empty.setVisible(not self.plots)
         if self._frozen is not None and station is not None:
             self._freeze(station)
 
@@ -265,7 +265,7 @@ class Signals(QWidget):
     # --- what people do
 
     def _span_changed(self, place: int) -> None:
-        for plot in self._plots:
+        for plot in self.plots:
             plot.plot.set_seconds(float(SPANS_S[place]))
 
     def _paused(self, on: bool) -> None:
@@ -278,7 +278,7 @@ class Signals(QWidget):
         self._frozen = Frozen(times, columns)
 
     def _follow(self) -> None:
-        for plot in self._plots:
+        for plot in self.plots:
             plot.plot.follow_again()
 
     def _ask_csv(self) -> None:
@@ -307,7 +307,7 @@ class Signals(QWidget):
 
     def _live(self, station: Station, seconds: float) -> tuple[Floats, dict[str, Floats]]:
         times = station.rings.times(seconds)
-        names = [name for plot in self._plots for name in plot.channels]
+        names = [name for plot in self.plots for name in plot.channels]
         return times, {name: station.rings.values(name, len(times)).copy() for name in names}
 
     def _newest(self, station: Station, name: str) -> float | None:

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.desk import Desk
 from server_gui.views.main_window import MainWindow
-from server_gui.views.theme import Theme
+from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, described
 
 
@@ -46,9 +46,17 @@ def slots_raise_nothing(qt: QApplication, monkeypatch: pytest.MonkeyPatch) -> It
     assert raised == []
 
 
-@pytest.fixture
-def theme(qt: QApplication) -> Theme:
+@pytest.fixture(scope="session")
+def only_theme(qt: QApplication) -> Theme:
     return Theme(qt)
+
+
+@pytest.fixture
+def theme(only_theme: Theme) -> Theme:
+    """Dark and of usual size, whatever the test before has made of it."""
+    if (only_theme.look, only_theme.scale) != (Look.DARK, 1.0):
+        only_theme.set(Look.DARK, 1.0)
+    return only_theme
 
 
 @pytest.fixture

@@ -1,44 +1,56 @@
 """STOP: always there, at once, and never taken for done before the drives say so."""
 
+from collections.abc import Iterator
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QPushButton
 
 from gateway.client import LinkLost, NotConnected
 from gateway.messages import Reset, Stopped
 from server_gui.core.desk.stopping import StopState
+from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
+from server_gui.views.theme import Theme
 from tests.gui.fakes import JOINTS, Bench, described
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 
-def press(window: MainWindow, bench: Bench) -> None:
-    window.stopped.connect(lambda: bench.station.stop("test"))
-    QTest.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
+@pytest.fixture
+def header(theme: Theme, bench: Bench) -> Iterator[Header]:
+    """The header alone: its STOP stops the robot that is looked at."""
+    made = Header(bench.desk, theme, QPushButton())
+    made.stopped.connect(lambda: bench.station.stop("test"))
+    made.show()
+    made.refresh()
+    yield made
+    made.close()
 
 
-def shown(window: MainWindow, bench: Bench) -> str:
-    bench.draw(window)
-    return window.header.outcome_text
+def press(header: Header) -> None:
+    QTest.mousePress(header.stop, Qt.MouseButton.LeftButton)
 
 
-def test_stop_goes_out_when_the_button_goes_down_not_when_it_comes_up(
-    window: MainWindow, bench: Bench
-) -> None:
-    press(window, bench)
+def shown(header: Header) -> str:
+    header.refresh()
+    return header.outcome_text
+
+
+def test_stop_goes_out_when_the_button_goes_down_not_when_it_comes_up(header: Header, bench: Bench) -> None:
+    press(header)
     assert len(bench.first.named("stop")) == 1
-    QTest.mouseRelease(window.header.stop, Qt.MouseButton.LeftButton)
+    QTest.mouseRelease(header.stop, Qt.MouseButton.LeftButton)
     assert len(bench.first.named("stop")) == 1
 
 
-def test_stop_is_sent_then_confirmed(window: MainWindow, bench: Bench) -> None:
-    press(window, bench)
-    assert shown(window, bench) == "STOP sent"
+def test_stop_is_sent_then_confirmed(header: Header, bench: Bench) -> None:
+    press(header)
+    assert shown(header) == "STOP sent"
     bench.first.answer(ALL)
-    assert shown(window, bench) == "STOP confirmed"
+    assert shown(header) == "STOP confirmed"
 
 
 @pytest.mark.parametrize(
@@ -50,21 +62,19 @@ def test_stop_is_sent_then_confirmed(window: MainWindow, bench: Bench) -> None:
     ],
 )
 def test_one_drive_that_does_not_confirm_makes_the_stop_not_confirmed(
-    window: MainWindow, bench: Bench, drives: dict[str, str], said: str
+    header: Header, bench: Bench, drives: dict[str, str], said: str
 ) -> None:
-    press(window, bench)
+    press(header)
     bench.first.answer(Stopped(drives, held=True))  # type: ignore[arg-type]
-    assert shown(window, bench) == "STOP NOT CONFIRMED"
+    assert shown(header) == "STOP NOT CONFIRMED"
     assert said in bench.station.stopping.text
 
 
 @pytest.mark.parametrize("error", [NotConnected("there is no link"), LinkLost("the link dropped")])
-def test_a_stop_that_nobody_answers_is_not_confirmed(
-    window: MainWindow, bench: Bench, error: Exception
-) -> None:
-    press(window, bench)
+def test_a_stop_that_nobody_answers_is_not_confirmed(header: Header, bench: Bench, error: Exception) -> None:
+    press(header)
     bench.first.fail(error)
-    assert shown(window, bench) == "STOP NOT CONFIRMED"
+    assert shown(header) == "STOP NOT CONFIRMED"
     assert str(error) in bench.station.stopping.text
 
 
@@ -125,21 +135,20 @@ def test_stop_is_in_sight_on_every_tab_and_while_changes_are_reviewed(
     assert window.header.stop.isEnabled()
 
 
-def test_a_held_stop_is_reset_by_its_own_button_which_enables_nothing(
-    window: MainWindow, bench: Bench
-) -> None:
+def test_a_held_stop_is_reset_by_its_own_button_which_enables_nothing(header: Header, bench: Bench) -> None:
+    header.reset.connect(bench.station.reset)
     bench.station.stop("test")
     bench.first.answer(ALL)
-    bench.draw(window)
-    assert window.header.reset_button.isVisible()
-    window.header.reset_button.click()
+    header.refresh()
+    assert header.reset_button.isVisible()
+    header.reset_button.click()
     bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
-    bench.draw(window)
+    header.refresh()
     assert bench.first.asked[-1] == ("reset", ())
-    assert not window.header.reset_button.isVisible()
+    assert not header.reset_button.isVisible()
 
 
-def test_a_reset_that_leaves_the_stop_held_says_why(window: MainWindow, bench: Bench) -> None:
+def test_a_reset_that_leaves_the_stop_held_says_why(bench: Bench) -> None:
     bench.station.stop("test")
     bench.first.answer(ALL)
     bench.station.reset()
@@ -148,9 +157,9 @@ def test_a_reset_that_leaves_the_stop_held_says_why(window: MainWindow, bench: B
     assert bench.station.stopping.held
 
 
-def test_the_robot_is_named_on_the_button_and_so_is_another(window: MainWindow, bench: Bench) -> None:
+def test_the_robot_is_named_on_the_button_and_so_is_another(header: Header, bench: Bench) -> None:
     other = bench.add("exo-02", 7421)
     other.take([described("exo-02")])
     bench.desk.select(other)
-    bench.draw(window)
-    assert window.header.stop.text() == "STOP  exo-02"
+    header.refresh()
+    assert header.stop.text() == "STOP  exo-02"

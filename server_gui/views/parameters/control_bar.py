@@ -48,7 +48,7 @@ class ControlBar(QWidget):
             self._take.setText(set_text_of)
         if left_s is not None:
             self._icon.show_mark(Mark("disc", "good", "in control"))
-            set_text(self.words, f"You have control for {left_s // 60:.0f}:{left_s % 60:02.0f}")
+            set_text(self.words, f"You have control for {int(left_s) // 60}:{int(left_s) % 60:02}")
         else:
             self._icon.show_mark(Mark("ring", "dim", "not in control"))
             asking = "asking …" if station.control.asking else "Looking only: writing takes control"

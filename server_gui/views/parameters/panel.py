@@ -1,5 +1,6 @@
 """The parameters panel: filter, tree, chosen one; review, write or try, undo."""
 
+import math
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
@@ -38,7 +39,7 @@ class ParametersPanel(QWidget):
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.tree, self.detail, self.review = ParameterTree(desk, theme), Detail(desk), Review(theme)
-        self.trial, self._control = TrialBar(desk), ControlBar(desk, theme)
+        self.trial, self.control = TrialBar(desk), ControlBar(desk, theme)
         self.pages = QStackedWidget()
         self.pages.addWidget(self._edit_page())
         self.pages.addWidget(self.review)
@@ -47,7 +48,7 @@ class ParametersPanel(QWidget):
         self.banner.setWordWrap(True)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
-        everything.addWidget(self._control)
+        everything.addWidget(self.control)
         everything.addWidget(self.pages, 1)
         everything.addWidget(self.banner)
         everything.addWidget(self.trial)
@@ -56,7 +57,7 @@ class ParametersPanel(QWidget):
 
     def refresh(self) -> None:
         """Show how it is now."""
-        for part in (self._control, self.tree, self.trial, self.detail):
+        for part in (self.control, self.tree, self.trial, self.detail):
             part.refresh()
         station = self._desk.selected
         staged = 0 if station is None else len(station.difference(self._desk.shown.units))
@@ -67,7 +68,7 @@ class ParametersPanel(QWidget):
         self._review_button.setText(f"Review {staged} …" if staged else "Review …")
         self._review_button.setEnabled(bool(staged) and not reviewing)
         self._discard.setEnabled(bool(staged))
-        self._undo.setEnabled(station is not None and bool(station.writing.undo) and not reviewing)
+        self.undo.setEnabled(station is not None and bool(station.writing.undo) and not reviewing)
         self._filter()
         self._refresh_banner(station, staged)
         if reviewing and station is not None:
@@ -81,6 +82,8 @@ class ParametersPanel(QWidget):
         unit = unit_of(name, station.known[name].unit, self._desk.shown.units)
         try:
             value = unit.si_value(text.strip().replace(",", "."))
+            if not math.isfinite(value):
+                raise ValueError(f"{text!r} is not a number that a robot could hold")
         except ValueError as error:
             self._problem = f"{name}: {error}"
             return
@@ -127,12 +130,12 @@ class ParametersPanel(QWidget):
         return page
 
     def _buttons(self) -> QGridLayout:
-        self._undo, self._discard = QPushButton("Undo …"), QPushButton("Discard edits")
-        self._undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
+        self.undo, self._discard = QPushButton("Undo …"), QPushButton("Discard edits")
+        self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
         self._review_button = QPushButton("Review …")
         self._review_button.setObjectName("primary")
         grid = QGridLayout()
-        grid.addWidget(self._undo, 0, 0)
+        grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
         grid.addWidget(self._review_button, 0, 2)
         grid.setColumnStretch(2, 1)
@@ -147,10 +150,10 @@ class ParametersPanel(QWidget):
         self.detail.dropped.connect(lambda name: self._with(lambda station: station.edits.drop(name)))
         self.trial.keep.connect(lambda: self._with(Station.keep_trial))
         self.trial.take_back.connect(lambda: self._with(Station.end_trial))
-        self._control.take.connect(lambda: self._with(Station.take_control))
-        self._control.release.connect(lambda: self._with(Station.release_control))
+        self.control.take.connect(lambda: self._with(Station.take_control))
+        self.control.release.connect(lambda: self._with(Station.release_control))
         self._discard.clicked.connect(lambda: self._with(lambda station: station.edits.drop()))
-        self._undo.clicked.connect(self._undo_latest)
+        self.undo.clicked.connect(self._undo_latest)
         self._review_button.clicked.connect(self.begin_review)
         self.review.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.review.write.connect(self._write)

@@ -63,9 +63,9 @@ class Review(QWidget):
         for column in range(len(TITLES)):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        self._said = QLabel()
-        self._said.setObjectName("banner")
-        self._said.setWordWrap(True)
+        self.said = QLabel()
+        self.said.setObjectName("banner")
+        self.said.setWordWrap(True)
         self.seconds = CalmSpin()
         self.seconds.setRange(5, 300)
         self.seconds.setValue(TRIAL_S)
@@ -93,7 +93,7 @@ class Review(QWidget):
         everything.setContentsMargins(0, 0, 0, 0)
         everything.addWidget(title)
         everything.addWidget(self.table, 1)
-        everything.addWidget(self._said)
+        everything.addWidget(self.said)
         everything.addLayout(row)
 
     def show_changes(self, changes: tuple[Change, ...]) -> None:
@@ -109,11 +109,11 @@ class Review(QWidget):
             said.append(
                 f"Changed elsewhere since you began: {', '.join(elsewhere)}. Writing overwrites that."
             )
-        self._said.setText(
+        self.said.setText(
             "\n".join(said) or "All or none, read back from the device. Nothing is stored to flash."
         )
-        self._said.setProperty("tone", "bad" if said else "good")
-        self._said.style().polish(self._said)
+        self.said.setProperty("tone", "bad" if said else "good")
+        self.said.style().polish(self.said)
         self._enable(False)
         self._allowed = bool(changes) and not problems
         self._settled.start(SETTLE_MS)

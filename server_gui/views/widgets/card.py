@@ -32,6 +32,10 @@ class Card(QFrame):
     def set_title(self, title: str) -> None:
         set_text(self._title, title)
 
+    @property
+    def note(self) -> str:
+        return self._note.text()
+
     def set_note(self, text: str) -> None:
         """What stands at the right of the title."""
         set_text(self._note, text)

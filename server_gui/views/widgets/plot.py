@@ -36,7 +36,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def __init__(
         self, theme: Theme, seconds: float, least: float = 1.0, parent: QWidget | None = None
     ) -> None:
-        super().__init__(parent)
+        super().__init__(parent, enableMenu=False)
         self._theme = theme
         self._least = least
         self._lines: list[pg.PlotCurveItem] = []
@@ -45,7 +45,6 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self.follows = True  # the range follows the data; off once somebody has zoomed
         item = self.getPlotItem()
         item.hideButtons()
-        item.setMenuEnabled(False)
         item.setContentsMargins(0, 0, 0, 0)
         item.setClipToView(False)
         item.getViewBox().setDefaultPadding(0.0)

@@ -1,0 +1,49 @@
+"""What cannot work is refused before Qt is loaded, with what to do."""
+
+import pytest
+
+from server_gui import qt_needs
+from server_gui.commands.gui import main
+from server_gui.core.settings import SettingsError
+from server_gui.qt_needs import NoWindow
+
+
+def test_the_qt_that_aborts_on_this_python_is_refused_with_the_reason() -> None:
+    with pytest.raises(
+        NoWindow, match=r"6\.12\.0 on Python 3\.11 .*aborts.*pip install 'PySide6-Essentials==6\.11\.3'"
+    ):
+        qt_needs.check_version("6.12.0", (3, 11))
+
+
+@pytest.mark.parametrize(
+    ("version", "python"), [("6.12.0", (3, 12)), ("6.11.3", (3, 11)), ("6.12.1", (3, 11))]
+)
+def test_every_other_pair_is_taken(version: str, python: tuple[int, int]) -> None:
+    qt_needs.check_version(version, python)
+
+
+def test_missing_libraries_are_named_in_one_line_to_paste() -> None:
+    with pytest.raises(NoWindow, match=r"sudo apt-get install .* libegl1 libxcb-cursor0$"):
+        qt_needs.check_libraries(
+            qt_needs.ALWAYS | qt_needs.WINDOW,
+            lambda library: library not in ("libEGL.so.1", "libxcb-cursor.so.0"),
+        )
+
+
+def test_without_a_display_other_ways_are_named() -> None:
+    with pytest.raises(NoWindow, match=r"there is no display here.*gwrms watch"):
+        qt_needs.check_display({}, "")
+    qt_needs.check_display({"DISPLAY": ":0"}, "")
+    qt_needs.check_display({}, "offscreen")
+
+
+def test_a_wrong_address_is_refused_before_anything_is_opened() -> None:
+    with pytest.raises(SettingsError, match="is not a robot's address"):
+        main(["--robot", "exo-01=host:port"])
+
+
+@pytest.mark.parametrize("scale", ["79", "201", "big"])
+def test_a_size_out_of_range_is_wrong_usage(scale: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["--scale", scale])
+    assert "--scale" in capsys.readouterr().err

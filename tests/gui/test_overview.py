@@ -1,0 +1,164 @@
+"""The overview shows what is so, in the units of choice, and how old it is when it is so no more."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
+
+from server_gui.core.desk.soles import cells_of
+from server_gui.core.desk.walk import leg_phase, phase_at
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.units import Units
+from server_gui.views.joint_table import JointModel
+from server_gui.views.overview import Overview
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
+from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
+from tests.gui.fakes import Bench, described, looked, telemetry, walking
+
+
+@pytest.fixture
+def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
+    made = Overview(bench.desk, theme)
+    made.resize(1000, 800)
+    made.show()
+    yield made
+    made.close()
+
+
+def cells(model: JointModel, joint: int) -> list[str]:
+    model.refresh()
+    return [str(model.data(model.index(joint, column))) for column in range(model.columnCount())]
+
+
+def colours(image: QImage) -> set[int]:
+    return {image.pixel(x, y) for x in range(0, image.width(), 3) for y in range(0, image.height(), 3)}
+
+
+def test_a_walk_is_seen_as_a_walk(overview: Overview, bench: Bench) -> None:
+    bench.station.take([walking(600)])
+    overview.refresh()
+    derived = bench.station.components.shown()
+    assert derived.gait.walking
+    for leg in Leg:
+        phase = leg_phase(derived, leg, derived.stamp_ns)
+        assert phase is not None
+        assert 0.0 <= phase.percent <= 100.0
+    assert len(colours(overview.grab().toImage())) > 200
+
+
+@pytest.mark.parametrize(
+    ("percent", "name"),
+    [
+        (0.0, "loading response"),
+        (12.0, "mid-stance"),
+        (61.9, "pre-swing"),
+        (62.0, "initial swing"),
+        (100.0, "terminal swing"),
+    ],
+)
+def test_phases_end_where_the_literature_says(percent: float, name: str) -> None:
+    assert phase_at(percent) == name
+
+
+def test_the_joint_table_shows_degrees_and_the_drive_state_in_words(theme: Theme, bench: Bench) -> None:
+    bench.station.take([looked(), telemetry([1], {"left_knee.position": [0.5], "left_knee.state": [4.0]})])
+    left_knee = cells(JointModel(bench.desk, theme), 1)
+    assert left_knee[:3] == ["left knee", "● operation enabled", "+28.6"]
+
+
+def test_another_unit_is_shown_at_once(theme: Theme, bench: Bench) -> None:
+    bench.station.take([telemetry([1], {"left_knee.position": [0.5]})])
+    bench.desk.shown.change(Units(by_si={"rad": "rad"}))
+    model = JointModel(bench.desk, theme)
+    assert cells(model, 1)[2] == "+0.500"
+    assert model.headerData(2, Qt.Orientation.Horizontal) == "Angle rad"
+
+
+def test_a_missing_value_is_a_dash_and_never_the_old_one(theme: Theme, bench: Bench) -> None:
+    model = JointModel(bench.desk, theme)
+    bench.station.take([telemetry([1], {"left_knee.position": [0.5]})])
+    assert cells(model, 1)[2] == "+28.6"
+    bench.station.take([telemetry([2], {"left_knee.position": [None]})])
+    assert cells(model, 1)[2] == "–"
+
+
+def test_a_lost_joint_is_named_lost_with_its_age(theme: Theme, bench: Bench) -> None:
+    bench.station.take([walking(5), looked(state="lost", problem="no heartbeat")])
+    assert cells(JointModel(bench.desk, theme), 1)[1] == "✕ lost 0.0 s"
+
+
+def test_what_is_older_than_half_a_second_is_grey_and_says_so(
+    overview: Overview, theme: Theme, bench: Bench
+) -> None:
+    bench.station.take([walking(300, age_s=3.0)])
+    overview.refresh()
+    assert all(note.startswith("STALE, 3.") for note in overview.notes)
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    shown = model.data(model.index(1, 2), Qt.ItemDataRole.ForegroundRole)
+    assert shown == theme.colour("old")
+
+
+def test_before_the_first_data_it_says_that_there_are_none(overview: Overview) -> None:
+    overview.refresh()
+    assert set(overview.notes) == {"no data yet"}
+
+
+def test_an_insole_that_no_layout_describes_is_drawn_in_its_order(overview: Overview, bench: Bench) -> None:
+    bench.station.take([described(cells=20), walking(20, cells=20)])
+    overview.refresh()
+    assert "20 cells in their order" in overview.notes[2]
+    assert len(colours(overview.grab().toImage())) > 50
+
+
+def test_a_straight_leg_stands_below_its_hip_and_a_bent_knee_brings_the_ankle_back() -> None:
+    _, ankle, heel, toe = chain(Pose(0.0, 0.0, 0.0), 0.0)
+    assert (ankle.x(), ankle.y()) == pytest.approx((0.0, THIGH + SHANK))
+    assert heel.y() == toe.y() == pytest.approx(THIGH + SHANK + ANKLE)
+    assert heel.x() < ankle.x() < toe.x()
+    _, bent, _, _ = chain(Pose(0.0, math.pi / 2, 0.0), 0.0)
+    assert (bent.x(), bent.y()) == pytest.approx((-SHANK, THIGH))
+
+
+def test_who_leans_forward_with_a_flexed_hip_keeps_the_thigh_upright() -> None:
+    knee, *_ = chain(Pose(0.3, 0.0, 0.0), 0.3)
+    assert knee.x() == pytest.approx(0.0)
+
+
+def test_flexing_the_ankle_lifts_the_toes() -> None:
+    _, _, heel, toe = chain(Pose(0.0, 0.0, 0.3), 0.0)
+    assert toe.y() < heel.y()
+
+
+def test_pressure_lies_where_its_cell_is_and_mirrors_on_the_other_foot() -> None:
+    left, right = cells_of(16, right=False), cells_of(16, right=True)
+    assert left is not None
+    assert right is not None
+    pressures = np.zeros(16, np.float32)
+    pressures[13] = 100_000.0  # the great toe: before everything, on the inner side
+    for layout, inner in ((left, slice(COLUMNS // 2, None)), (right, slice(0, COLUMNS // 2))):
+        field = (weights(layout) @ pressures).reshape(ROWS, COLUMNS)
+        assert field[: ROWS // 3].max() == field.max() > 50_000.0
+        assert field[:, inner].max() == field.max()
+        assert field[ROWS // 2 :].max() < 1_000.0
+
+
+def test_equal_pressure_everywhere_is_shown_as_that_pressure() -> None:
+    layout = cells_of(16, right=False)
+    assert layout is not None
+    field = weights(layout) @ np.full(16, 100_000.0, np.float32)
+    assert field.max() == pytest.approx(100_000.0, rel=1e-3)
+
+
+def test_the_trail_is_bounded_and_a_foot_in_the_air_has_none(theme: Theme) -> None:
+    foot = PressureMap(theme, "left")
+    foot.set_cells(cells_of(16, right=False))
+    for _ in range(500):
+        foot.show_pressures([1000.0] * 16, (0.1, 0.0), live=True)
+    assert len(foot._trail) < 50
+    foot.show_pressures([0.0] * 16, None, live=True)
+    assert len(colours(foot.grab().toImage())) > 3

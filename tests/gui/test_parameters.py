@@ -1,0 +1,285 @@
+"""Parameters: what is written is exactly the difference shown, and nobody is overwritten unseen."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit
+
+from gateway.client import CallTimeout, RemoteError
+from gateway.messages import Confirmed, Lease, Reverted, Written
+from server_gui.core.processing.units import Units
+from server_gui.views.parameters.panel import ParametersPanel
+from server_gui.views.parameters.review import SETTLE_MS
+from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID
+from server_gui.views.theme import Theme
+from tests.gui.fakes import HELD, Bench, described, looked
+
+
+@pytest.fixture
+def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
+    """The panel of a robot whose parameters have been read."""
+    bench.station.take([looked()])
+    made = ParametersPanel(bench.desk, theme)
+    made.resize(420, 900)
+    made.show()
+    made.refresh()
+    yield made
+    made.close()
+
+
+def row(panel: ParametersPanel, name: str) -> list[str]:
+    """What stands in a parameter's row."""
+    panel.refresh()
+    panel.tree.select_name(name)
+    index = panel.tree.currentIndex()
+    return [str(index.siblingAtColumn(column).data() or "") for column in range(6)]
+
+
+def settle(panel: ParametersPanel) -> None:
+    """Wait until the review lets itself be written."""
+    deadline = time.monotonic() + 20 * SETTLE_MS / 1000
+    while not panel.review.write_it.isEnabled() and time.monotonic() < deadline:
+        QTest.qWait(20)
+    assert panel.review.write_it.isEnabled()
+
+
+def test_values_are_shown_in_degrees_and_millimetres(panel: ParametersPanel) -> None:
+    assert row(panel, "gait.step_length")[ROBOT] == "400"
+    assert row(panel, "gait.trunk_angle")[ROBOT] == "2.86479"
+
+
+def test_a_staged_value_is_shown_and_not_sent(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    assert row(panel, "gait.step_length")[NEW] == "430"
+    assert "nothing of it has been sent" in panel.banner.text()
+    assert bench.first.named("write") == []
+
+
+def test_what_is_written_is_exactly_the_difference(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.stage_text("left_knee.max_torque", "60")
+    panel.stage_text("gait.trunk_angle", "3")
+    panel.stage("gait.trunk_angle", HELD["gait.trunk_angle"])  # as it is: no edit any more
+    panel.begin_review()
+    assert [change.name for change in panel.review.changes] == ["gait.step_length", "left_knee.max_torque"]
+    settle(panel)
+    panel.review.write_it.click()
+    assert bench.first.named("write") == [({"gait.step_length": 0.43, "left_knee.max_torque": 60.0}, None)]
+
+
+def test_no_digit_is_lost_from_the_field_to_the_robot_and_back(panel: ParametersPanel, bench: Bench) -> None:
+    exact = 0.12345678901234567
+    bench.station.take([looked({**HELD, "gait.trunk_angle": exact})])
+    panel.refresh()
+    panel.tree.select_name("gait.trunk_angle")
+    text = panel.detail.field.text()
+    panel.stage_text("gait.trunk_angle", text)
+    assert bench.station.edits.staged == {}, "what was shown and typed again is another value"
+    panel.stage_text("gait.trunk_angle", "7.0735528")
+    staged = bench.station.edits.staged["gait.trunk_angle"].value
+    bench.station.take([looked({**HELD, "gait.trunk_angle": staged})])
+    panel.detail.refresh(anew=True)
+    assert panel.detail.field.text() == "7.0735528"
+
+
+def test_a_value_that_changed_elsewhere_is_flagged_before_it_is_overwritten(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.begin_review()
+    settle(panel)
+    bench.station.take([looked({**HELD, "gait.step_length": 0.45})])
+    panel.review.write_it.click()  # before anything was drawn anew
+    assert bench.first.named("write") == []
+    panel.refresh()
+    assert row(panel, "gait.step_length")[SAID] == "⚠ changed"
+    assert panel.review.write_it.text() == "Overwrite 1"
+    assert not panel.review.write_it.isEnabled(), "a click meant for what stood there before counts"
+    settle(panel)
+    panel.review.write_it.click()
+    assert bench.first.named("write") == [({"gait.step_length": 0.43}, None)]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("700", "above the largest allowed, 600 mm"), ("520", "further than one write may go, 100 mm")],
+)
+def test_what_the_robot_would_refuse_cannot_be_written(panel: ParametersPanel, text: str, said: str) -> None:
+    panel.stage_text("gait.step_length", text)
+    panel.begin_review()
+    QTest.qWait(SETTLE_MS + 100)
+    assert not panel.review.write_it.isEnabled()
+    assert said in panel.review.said.text()
+
+
+@pytest.mark.parametrize("text", ["", "abc", "nan", "inf", "1e999"])
+def test_what_is_no_number_is_refused_in_words(panel: ParametersPanel, bench: Bench, text: str) -> None:
+    panel.stage_text("gait.step_length", text)
+    panel.refresh()
+    assert bench.station.edits.staged == {}
+    assert "is not a number" in panel.banner.text()
+
+
+def test_a_refusal_stands_on_its_row_and_the_edit_stays(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    bench.station.write(bench.station.difference(Units()))
+    refusal = RemoteError(
+        -32012, "rolled back", {"kind": "rolled_back", "outcome": {"gait.step_length": "it holds 429"}}
+    )
+    bench.first.fail(refusal)
+    panel.refresh()
+    assert bench.station.writing.rows == {"gait.step_length": "it holds 429"}
+    assert row(panel, "gait.step_length")[NEW] == "430"
+    assert "not written: rolled back" in panel.banner.text()
+
+
+def test_an_answer_that_never_came_is_not_taken_for_a_refusal(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    bench.station.write(bench.station.difference(Units()))
+    bench.first.fail(CallTimeout("no answer in 30 s"))
+    panel.refresh()
+    assert panel.banner.text() == "NOT KNOWN: no answer in 30 s"
+
+
+def test_a_trial_counts_down_and_is_seen_to_go_back(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.begin_review()
+    settle(panel)
+    panel.review.seconds.setValue(20)
+    panel.review.try_it.click()
+    assert bench.first.named("write") == [({"gait.step_length": 0.43}, 20.0)]
+    bench.first.answer(Written(7, {"gait.step_length": 0.4}, {"gait.step_length": 0.43}, trial_s=20.0))
+    bench.station.take([looked({**HELD, "gait.step_length": 0.43})])
+    panel.refresh()
+    assert panel.trial.isVisible()
+    assert "400 → 430 mm; the robot takes it back in" in panel.trial.words.text()
+    assert row(panel, "gait.step_length")[SAID] == "◔ trial"
+    trial = bench.station.writing.trial
+    assert trial is not None
+    bench.station.take([looked()])
+    bench.station.end_trial_if_over(trial.until_ns + 3_000_000_000)
+    panel.refresh()
+    assert not panel.trial.isVisible()
+    assert "the robot has taken it back" in panel.banner.text()
+
+
+def test_a_trial_that_is_over_and_still_in_force_is_said_to_be(bench: Bench) -> None:
+    bench.station.take([looked({**HELD, "gait.step_length": 0.43})])
+    bench.station.writing.done(
+        Written(7, {"gait.step_length": 0.4}, {"gait.step_length": 0.43}, trial_s=0.001)
+    )
+    bench.station.end_trial_if_over(time.monotonic_ns() + 60_000_000_000)
+    assert "other values are held" in bench.station.writing.text
+
+
+def test_a_trial_is_kept_or_taken_back_by_its_number(panel: ParametersPanel, bench: Bench) -> None:
+    for ask, answer in (
+        (panel.trial.keep, Confirmed(7, {"gait.step_length": 0.43})),
+        (panel.trial.take_back, Reverted(7, {"gait.step_length": "taken back"})),
+    ):
+        bench.station.writing.done(
+            Written(7, {"gait.step_length": 0.4}, {"gait.step_length": 0.43}, trial_s=20.0)
+        )
+        ask.emit()
+        bench.first.answer(answer)
+        assert bench.station.writing.trial is None
+    assert [name for name, _ in bench.first.asked] == ["confirm", "revert"]
+
+
+def test_undo_stages_the_inverse_for_review(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    bench.station.write(bench.station.difference(Units()))
+    bench.first.answer(Written(1, {"gait.step_length": 0.4}, {"gait.step_length": 0.43}))
+    bench.station.take([looked({**HELD, "gait.step_length": 0.43})])
+    panel.refresh()
+    panel.undo.click()
+    assert [(change.name, change.old, change.new) for change in panel.review.changes] == [
+        ("gait.step_length", 0.43, 0.4)
+    ]
+    assert len(bench.first.named("write")) == 1, "undo wrote by itself"
+
+
+def test_edits_stay_with_their_robot(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.begin_review()
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02"), looked()])
+    bench.desk.select(other)
+    assert row(panel, "gait.step_length")[NEW] == ""
+    assert panel.pages.currentWidget() is not panel.review
+    assert bench.station.edits.staged.keys() == {"gait.step_length"}
+
+
+def test_parameters_that_are_gone_after_a_change_of_firmware_take_their_edits_along(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.stage_text("gait.step_length", "430")
+    bench.station.take([described(parameters={"left_knee.max_torque": 80.0})])
+    panel.refresh()
+    assert bench.station.edits.staged == {}
+    assert "gait.step_length" in bench.desk.news.items[0].text
+
+
+def test_the_wheel_changes_nothing_that_has_not_the_focus(panel: ParametersPanel, bench: Bench) -> None:
+    panel.tree.select_name("gait.step_length")
+    before = panel.detail.slider.value()
+    middle = QPointF(panel.detail.slider.rect().center())
+    turn = QWheelEvent(
+        middle,
+        panel.detail.slider.mapToGlobal(middle),
+        QPoint(0, 0),
+        QPoint(0, 120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(panel.detail.slider, turn)
+    assert panel.detail.slider.value() == before
+    assert bench.station.edits.staged == {}
+
+
+def test_the_slider_goes_as_far_as_one_write_may_and_gives_round_numbers(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.tree.select_name("gait.step_length")
+    panel.detail.slider.setValue(panel.detail.slider.maximum())
+    assert bench.station.edits.staged["gait.step_length"].value == 0.5
+    panel.detail.slider.setValue(77)
+    assert bench.station.edits.staged["gait.step_length"].value == 0.377
+
+
+def test_typing_into_the_table_edits_the_exact_value(panel: ParametersPanel, bench: Bench) -> None:
+    panel.tree.select_name("gait.trunk_angle")
+    panel.tree.edit(panel.tree.currentIndex())
+    field = panel.tree.findChild(QLineEdit)
+    assert field is not None
+    assert field.text() == "2.8647889756541162"
+    field.setText("3")
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    QApplication.processEvents()
+    assert bench.station.edits.staged["gait.trunk_angle"].value == pytest.approx(0.0523598775)
+
+
+def test_the_filter_finds_by_words_and_by_object(panel: ParametersPanel) -> None:
+    panel.words.setText("0x2001 torque")
+    panel.refresh()
+    shown = panel.tree.filter
+    groups = [shown.index(place, NAME) for place in range(shown.rowCount())]
+    assert [group.data() for group in groups] == ["left knee"]
+
+
+def test_control_shows_who_has_it_and_how_long(panel: ParametersPanel, bench: Bench) -> None:
+    panel.control.take.emit()
+    bench.first.answer(Lease("lease", 300.0))
+    panel.refresh()
+    assert panel.control.words.text().startswith(("You have control for 4:5", "You have control for 5:0"))
+    bench.station.lost_control()
+    panel.control.take.emit()
+    bench.first.fail(RemoteError(-32003, "ada at 10.0.0.3 has control", {"kind": "lease_held"}))
+    panel.refresh()
+    assert panel.control.words.text() == "ada at 10.0.0.3 has control"

@@ -1,0 +1,90 @@
+"""Resources: asked for only while they are looked at; the table keeps what people have done to it."""
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+
+from gateway.messages import ProcessUse
+from server_gui.views.processes import CPU, MEMORY, NAME
+from server_gui.views.resources import Resources
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, resources
+
+MIB = 1 << 20
+
+
+@pytest.fixture
+def view(theme: Theme, bench: Bench) -> Iterator[Resources]:
+    made = Resources(bench.desk, theme)
+    made.resize(900, 600)
+    made.show()
+    yield made
+    made.close()
+
+
+def show(view: Resources, bench: Bench, *uses: ProcessUse) -> list[str]:
+    """The names in the table's order, after a look."""
+    bench.station.take([resources(uses)])
+    for _ in range(6):
+        view.refresh()
+    table = view.table.sorted
+    return [str(table.index(row, NAME).data()) for row in range(table.rowCount())]
+
+
+def use(name: str, pid: int, cpu: float | None, memory: int = MIB) -> ProcessUse:
+    return ProcessUse(pid, name, cpu, memory)
+
+
+def test_processes_are_asked_for_only_while_they_are_visible(view: Resources, bench: Bench) -> None:
+    assert bench.first.named("show_processes") == [(True,)]
+    view.hide()
+    assert bench.first.named("show_processes") == [(True,), (False,)]
+
+
+def test_another_robot_is_asked_instead(view: Resources, bench: Bench) -> None:
+    other = bench.add("exo-02", 7421)
+    bench.desk.select(other)
+    assert bench.first.named("show_processes") == [(True,), (False,)]
+    assert bench.commands[1].named("show_processes") == [(True,)]
+
+
+def test_the_table_sorts_both_ways_on_every_column(view: Resources, bench: Bench) -> None:
+    uses = use("b", 2, 5.0, 3 * MIB), use("a", 10, None, 1 * MIB), use("c", 1, 50.0, 2 * MIB)
+    assert show(view, bench, *uses) == ["c", "b", "a"], "the highest CPU is not at the top"
+    for column, rising in (
+        (NAME, ["a", "b", "c"]),
+        (1, ["c", "b", "a"]),
+        (CPU, ["a", "b", "c"]),
+        (MEMORY, ["a", "c", "b"]),
+    ):
+        view.table.sortByColumn(column, Qt.SortOrder.AscendingOrder)
+        assert show(view, bench, *uses) == rising
+        view.table.sortByColumn(column, Qt.SortOrder.DescendingOrder)
+        assert show(view, bench, *uses) == rising[::-1]
+
+
+def test_a_look_keeps_the_selected_process_wherever_it_goes(view: Resources, bench: Bench) -> None:
+    show(view, bench, *(use(f"p{pid}", pid, float(pid)) for pid in range(60)))
+    table = view.table
+    place = next(row for row in range(60) if table.sorted.index(row, NAME).data() == "p20")
+    table.selectRow(place)
+    table.verticalScrollBar().setValue(25)
+    show(view, bench, *(use(f"p{pid}", pid, 100.0 - pid) for pid in range(5, 60)))
+    assert [index.data() for index in table.selectionModel().selectedRows()] == ["p20"]
+    assert table.verticalScrollBar().value() == 25
+
+
+def test_a_pid_that_another_program_has_now_is_another_row(view: Resources, bench: Bench) -> None:
+    show(view, bench, use("old", 7, 1.0))
+    assert show(view, bench, use("new", 7, 1.0)) == ["new"]
+
+
+def test_a_first_look_has_no_percentages_and_says_so(view: Resources, bench: Bench) -> None:
+    show(view, bench, use("a", 1, None))
+    assert view.table.sorted.index(0, CPU).data() == "–"
+
+
+def test_the_filter_finds_processes_by_name(view: Resources, bench: Bench) -> None:
+    view.words.setText("gait")
+    assert show(view, bench, use("gait_ctrl", 1, 1.0), use("sshd", 2, 1.0)) == ["gait_ctrl"]

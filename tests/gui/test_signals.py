@@ -1,0 +1,98 @@
+"""Signals: what is ticked is drawn; a paused view stands still while data go on; exports are exact."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from server_gui.core.processing.units import Units
+from server_gui.views.signals import MOST_CURVES, Signals
+from server_gui.views.theme import Theme
+from tests.gui.fakes import JOINTS, Bench, telemetry, walking
+
+
+@pytest.fixture
+def signals(theme: Theme, bench: Bench) -> Iterator[Signals]:
+    bench.station.take([walking(300)])
+    made = Signals(bench.desk, theme)
+    made.resize(900, 600)
+    made.show()
+    made.refresh()
+    yield made
+    made.close()
+
+
+def test_channels_of_one_unit_share_a_plot(signals: Signals) -> None:
+    signals.choose(["left_hip.position", "right_hip.position", "left_hip.torque"])
+    assert [plot.channels for plot in signals.plots] == [
+        ("left_hip.position", "right_hip.position"),
+        ("left_hip.torque",),
+    ]
+
+
+def test_nothing_ticked_says_what_to_do(signals: Signals) -> None:
+    signals.choose([])
+    assert signals.empty.isVisible()
+    assert "Tick channels" in signals.empty.text()
+
+
+def test_too_many_curves_are_named_not_dropped_silently(signals: Signals) -> None:
+    names = [
+        f"{joint}.{quantity}"
+        for joint in JOINTS
+        for quantity in ("position", "velocity", "torque", "current", "temperature")
+    ]
+    signals.choose(names)
+    signals._frame = 0
+    signals.refresh()
+    assert sum(len(plot.channels) for plot in signals.plots) == MOST_CURVES
+    assert f"{len(names) - MOST_CURVES} more are not drawn" in signals.said.text()
+
+
+def test_a_paused_view_stands_still_while_data_go_on(signals: Signals, bench: Bench, tmp_path: Path) -> None:
+    signals.choose(["left_hip.position"])
+    signals.pause.setChecked(True)
+    signals.save_csv(tmp_path / "before.csv")
+    newest = bench.station.rings.newest_ns
+    assert newest is not None
+    bench.station.take([telemetry([newest + 10_000_000], {"left_hip.position": [9.0]})])
+    signals.refresh()
+    signals.save_csv(tmp_path / "after.csv")
+    assert (tmp_path / "before.csv").read_bytes() == (tmp_path / "after.csv").read_bytes()
+    assert bench.station.rings.values("left_hip.position", 1).tolist() == [9.0]
+    signals.pause.setChecked(False)
+    signals.save_csv(tmp_path / "live.csv")
+    assert (tmp_path / "live.csv").read_text().rstrip().endswith(",9.0")
+
+
+def test_an_export_has_every_digit_in_si_units(signals: Signals, bench: Bench, tmp_path: Path) -> None:
+    signals.choose(["left_hip.position"])
+    signals.save_csv(tmp_path / "out.csv")
+    rows = list(csv.reader((tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()))
+    assert rows[0] == ["time s", "left_hip.position rad"]
+    assert float(rows[-1][1]) == bench.station.robot.values["left_hip.position"]
+    assert rows[-1][0] == "0.000000"
+
+
+def test_other_units_make_the_plots_anew(signals: Signals, bench: Bench) -> None:
+    signals.choose(["left_hip.position"])
+    assert signals.plots[0].unit.symbol == "°"
+    bench.desk.shown.change(Units(by_si={"rad": "rad"}))
+    signals.refresh()
+    assert signals.plots[0].unit.symbol == "rad"
+
+
+def test_the_range_follows_the_data_until_somebody_zooms(signals: Signals, bench: Bench) -> None:
+    signals.choose(["left_hip.position"])
+    signals.refresh()
+    plot = signals.plots[0].plot
+    plot.getViewBox().sigRangeChangedManually.emit([False, True])
+    plot.setYRange(-1.0, 1.0, padding=0.0)
+    signals.refresh()
+    assert plot.getViewBox().viewRange()[1] == [-1.0, 1.0]
+    signals.fit.click()
+    signals.refresh()
+    low, high = plot.getViewBox().viewRange()[1]
+    assert low < -20.0
+    assert high > 20.0

@@ -1,0 +1,194 @@
+"""The window as a whole: first run, robots, looks, sizes, layout, words that are always there."""
+
+import random
+import re
+import time
+
+import pytest
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QWidget
+
+from gateway.client import ConnectionState
+from server_gui.core.desk.desk import Desk
+from server_gui.core.events import LinkChanged
+from server_gui.views.main_window import MainWindow
+from server_gui.views.robots_panel import RobotsPanel
+from server_gui.views.theme import PALETTES, Look, Theme
+from tests.gui.fakes import Bench, described, looked, resources, walking
+
+TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
+
+
+def test_without_a_robot_the_window_says_what_to_do_and_offers_the_simulator(
+    theme: Theme, tmp_path: object
+) -> None:
+    window = MainWindow(Desk(), theme, QSettings(f"{tmp_path}/none.ini", QSettings.Format.IniFormat))
+    asked: list[bool] = []
+    window.simulator.connect(lambda: asked.append(True))
+    window.show()
+    Bench(Desk()).draw(window)
+    assert window.empty.isVisible()
+    window.empty.start.click()
+    assert asked == [True]
+    assert not window.empty.start.isEnabled(), "it could be asked for twice"
+    window.close()
+
+
+def test_a_robot_that_is_gone_says_so_and_how_old_its_data_are(window: MainWindow, bench: Bench) -> None:
+    bench.station.take([walking(50, age_s=70.0)])
+    why = "nothing came from 127.0.0.1:7420 for 3.0 s; the link is given up"
+    bench.station.take([LinkChanged(ConnectionState.WAITING, why, time.monotonic_ns())])
+    bench.draw(window)
+    card = window.robots.cards[0]
+    assert card.texts[:2] == ("exo-01", f"no link: {why}")
+    assert re.fullmatch(r"7\d\.\d s old", card.texts[2])
+    assert f"no link: {why}" in bench.desk.news.items[0].text
+
+
+def test_two_robots_of_one_name_are_told_apart(theme: Theme, bench: Bench) -> None:
+    bench.add("other", 7421).take([described("exo-01")])
+    panel = RobotsPanel(bench.desk, theme)
+    panel.refresh()
+    assert [card.texts[0] for card in panel.cards] == ["exo-01 at 127.0.0.1:7420", "exo-01 at 127.0.0.1:7421"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [("host:port", "is not a robot's address"), ("127.0.0.1:7420", "is in the list already")],
+)
+def test_an_address_that_cannot_be_added_says_why(theme: Theme, bench: Bench, typed: str, said: str) -> None:
+    panel = RobotsPanel(bench.desk, theme)
+    added: list[str] = []
+    panel.added.connect(added.append)
+    panel.address.setText(typed)
+    QTest.keyClick(panel.address, Qt.Key.Key_Return)
+    assert added == []
+    assert said in panel.said.text()
+
+
+def test_an_address_is_added(theme: Theme, bench: Bench) -> None:
+    panel = RobotsPanel(bench.desk, theme)
+    added: list[str] = []
+    panel.added.connect(added.append)
+    panel.address.setText(" 192.0.2.7 ")
+    QTest.keyClick(panel.address, Qt.Key.Key_Return)
+    assert added == ["192.0.2.7:7420"]
+
+
+def test_a_robot_is_chosen_by_keyboard(window: MainWindow, bench: Bench) -> None:
+    bench.add("exo-02", 7421)
+    bench.draw(window)
+    QTest.keyClick(window.robots.cards[1], Qt.Key.Key_Return)
+    assert bench.desk.selected is bench.desk.stations[1]
+
+
+def test_the_same_news_twice_in_a_row_are_told_once(bench: Bench) -> None:
+    for _ in range(3):
+        bench.station.take([looked(state="lost", problem="no heartbeat")])
+        bench.station._watched_ns = 0
+    assert [item.text for item in bench.desk.news.items].count("left_knee lost: no heartbeat") == 1
+
+
+def test_the_layout_is_kept_and_can_be_reset(window: MainWindow, bench: Bench, theme: Theme) -> None:
+    events = window.docks[2]
+    events.hide()
+    window.close()
+    again = MainWindow(bench.desk, theme, window.kept)
+    again.show()
+    assert again.docks[2].isHidden()
+    again.reset_layout()
+    assert not again.docks[2].isHidden()
+    again.close()
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "scale"), [(1366, 768, 0.8), (1366, 768, 1.0), (1920, 1080, 2.0), (3840, 2160, 2.0)]
+)
+def test_the_window_fits_the_screen_with_stop_whole_and_in_sight(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    bench.station.take([walking(100), looked()])
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.draw(window)
+    assert (window.width(), window.height()) == (width, height)
+    stop = window.header.stop
+    assert window.rect().contains(stop.mapTo(window, stop.rect().topLeft()))
+    assert window.rect().contains(stop.mapTo(window, stop.rect().bottomRight()))
+    assert stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
+
+
+def test_every_tab_is_drawn_dark_and_light(window: MainWindow, bench: Bench, theme: Theme) -> None:
+    bench.station.take([walking(600), looked(), resources([])])
+    for look in Look:
+        theme.set(look=look)
+        for tab in range(window.tabs.count()):
+            window.tabs.setCurrentIndex(tab)
+            bench.draw(window)
+            image = window.grab().toImage()
+            seen = {
+                image.pixel(x, y) for x in range(0, image.width(), 5) for y in range(0, image.height(), 5)
+            }
+            assert len(seen) > 60
+            assert theme.colour("window").rgb() in seen
+
+
+@pytest.mark.parametrize("look", Look)
+@pytest.mark.parametrize("name", TEXT)
+def test_every_text_can_be_read_on_its_ground(look: Look, name: str) -> None:
+    colours = PALETTES[look]
+    for ground in ("card", "panel", "window"):
+        assert contrast(getattr(colours, name), getattr(colours, ground)) >= 4.5
+
+
+def test_left_and_right_are_told_apart_by_those_who_see_no_red_or_green() -> None:
+    for colours in PALETTES.values():
+        blue = [int(getattr(colours, side)[5:7], 16) for side in ("left", "right")]
+        assert abs(blue[0] - blue[1]) > 150
+
+
+def test_everything_that_can_be_reached_has_a_name(window: MainWindow) -> None:
+    nameless = [
+        f"{type(widget).__name__} {widget.objectName()}"
+        for widget in window.findChildren(QWidget)
+        if isinstance(widget, QAbstractButton | QLineEdit)
+        and widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and not (widget.accessibleName() or (isinstance(widget, QAbstractButton) and widget.text()))
+        and widget.objectName() not in ("qt_spinbox_lineedit",)
+    ]
+    assert nameless == []
+
+
+def test_a_monkey_breaks_nothing(window: MainWindow, bench: Bench) -> None:
+    rng = random.Random(7)
+    bench.station.take([looked(), resources([])])
+    for step in range(120):
+        if step % 10 == 0:
+            bench.station.take([walking(20)])
+            bench.draw(window)
+        widgets = [
+            widget for widget in window.findChildren(QWidget) if widget.isVisible() and widget.isEnabled()
+        ]
+        widget = rng.choice(widgets)
+        if isinstance(widget, QAbstractButton) and "…" in widget.text():
+            continue  # opens a file dialog of the platform
+        if rng.random() < 0.6:
+            QTest.mouseClick(widget, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier)
+        else:
+            QTest.keyClicks(widget, rng.choice(["1", "-3.5", "x", "\t", " "]))
+    for popup in QApplication.topLevelWidgets():
+        if popup is not window:
+            popup.close()
+
+
+def contrast(one: str, other: str) -> float:
+    """WCAG 2.2: the ratio of two colours' relative luminances."""
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
