@@ -7,8 +7,8 @@ folds.py, search.py, metrics.py   splits, tuning on training subjects alone, fig
 outcome.py, report.py       what was found, and a page about it
 """
 
+from ml.errors import UnusableData
 from ml.evaluate.benchmarks import BENCHMARKS, Benchmark
-from ml.evaluate.errors import UnusableData
 from ml.evaluate.outcome import Goal, Outcome
 
 __all__ = ["BENCHMARKS", "Benchmark", "Goal", "Outcome", "UnusableData"]

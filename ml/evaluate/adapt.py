@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.errors import UnusableData
 from ml.evaluate import folds, ipol, metrics
-from ml.evaluate.errors import UnusableData
 from ml.evaluate.outcome import Outcome
 from ml.evaluate.phase import WHY, WITHIN, Decisions, decisions, errors_of, fitted, percent
 from ml.evaluate.search import Search, chosen, told

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate.errors import UnusableData
+from ml.errors import UnusableData
 
 Array = npt.NDArray[Any]
 GRAVITY_RANGE: Final = (8.5, 11.5)  # m/s²: the median length of what an accelerometer on a person measures

@@ -12,6 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.model_selection import GroupKFold
 from threadpoolctl import threadpool_limits
 
+from ml.models.scaling import fixed_epochs
+
 Rows = npt.NDArray[np.intp]
 Split = tuple[Rows, Rows]  # rows to train on, rows to judge by
 T = TypeVar("T")
@@ -45,5 +47,5 @@ def over(work: Callable[[T], R], folds: Sequence[T]) -> list[R]:
     """Do each fold's work, a few at a time, each on one core; results in the folds' order."""
     # OpenMP counts its threads by the thread that asks, OpenBLAS for the whole process: both are limited.
     one_core = functools.partial(threadpool_limits, limits=1)
-    with one_core(), ThreadPoolExecutor(TOGETHER, "fold", initializer=one_core) as pool:
+    with fixed_epochs(), one_core(), ThreadPoolExecutor(TOGETHER, "fold", initializer=one_core) as pool:
         return list(pool.map(work, folds))

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.errors import UnusableData
 from ml.evaluate import folds, ipol, metrics
-from ml.evaluate.errors import UnusableData
 from ml.evaluate.outcome import Outcome
 from ml.evaluate.search import Search, chosen, told
 from ml.features import Recipe, features

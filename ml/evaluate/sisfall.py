@@ -11,6 +11,7 @@ from ml.evaluate.arrays import Arrays
 from ml.features.falling import RATE_HZ
 
 CHANNELS: Final = ("acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z")
+FEWEST: Final = 3  # subjects: to judge by, to learn from, and to find a threshold with
 STUMBLE: Final = "D18"  # stumbling while walking: neither a fall nor quite daily life
 
 
@@ -51,8 +52,8 @@ def read(path: Path) -> list[Recording]:
             raise file.problem(f"has a fall {activity} of {subject} whose impact {peak} is outside of it")
         own = samples[start : start + length]
         recordings.append(Recording(str(subject), str(activity), own, int(peak) if fall else None))
-    if len({recording.subject for recording in recordings}) < 2:
-        raise file.problem("has fewer than two subjects: nobody is left to learn from")
+    if len({recording.subject for recording in recordings}) < FEWEST:
+        raise file.problem(f"has fewer than {FEWEST} subjects: nobody is left to find a threshold with")
     if len({recording.impact is None for recording in recordings}) < 2:
         raise file.problem("needs both falls (F…) and daily activities (D…)")
     return recordings

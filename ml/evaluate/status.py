@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.errors import UnusableData
 from ml.evaluate import folds, ipol, metrics
 from ml.evaluate.outcome import Outcome
 from ml.evaluate.search import Search, chosen, told
@@ -22,9 +23,9 @@ NEAR: Final = 50  # samples around a change that are not steady
 SETTINGS: Final = StatusSettings()
 GRID: Final = (
     SETTINGS,
-    StatusSettings(rounds=120),
+    StatusSettings(rounds=100),
     StatusSettings(leaves=31),
-    StatusSettings(learning_rate=0.05, rounds=160),
+    StatusSettings(penalty=0.1),
 )
 
 
@@ -60,6 +61,8 @@ def _of_trial(trial: ipol.Trial) -> tuple[Any, ...]:
 def evaluate(path: Path, search: Search) -> Outcome:
     """Leave one subject out, and judge by subjects."""
     data = decisions(ipol.read(path))
+    if len(np.unique(data.truth)) < 2:
+        raise UnusableData(f"{path} has one state alone: there is nothing to tell apart")
     splits = list(folds.one_left_out(data.subject))
     work = folds.over(lambda split: _fold(data, split, search), splits)
     predicted = np.empty_like(data.truth)

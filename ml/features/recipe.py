@@ -39,8 +39,10 @@ def features(recipe: Recipe, samples: Samples, ends: npt.NDArray[np.intp]) -> Fe
 
     Before a recording's first sample there is nothing to know: that sample is held.
     """
+    if not len(ends):
+        return features(recipe, samples, np.zeros(1, dtype=np.intp))[:0]
     parts = [
         recipe.compute(windows(samples, ends[at : at + CHUNK], recipe.look_back))
         for at in range(0, len(ends), CHUNK)
     ]
-    return np.concatenate(parts) if parts else recipe.compute(windows(samples, ends, recipe.look_back))
+    return np.concatenate(parts)

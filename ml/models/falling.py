@@ -13,6 +13,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import GroupKFold
 
+from ml.errors import UnusableData
 from ml.features.falling import moving
 
 Features = npt.NDArray[np.float32]
@@ -29,9 +30,9 @@ class FallSettings:
 
     falling: int = 20  # samples before the impact that are falling
     unclear: int = 50  # samples before the impact that are neither, up to those
-    moving_share: float = 0.2  # of the daily decisions in which somebody moves that are learned from
-    still_share: float = 0.02  # of the others: they are many and alike
-    rounds: int = 120
+    moving_share: float = 0.12  # of the daily decisions in which somebody moves that are learned from
+    still_share: float = 0.015  # of the others: they are many and alike
+    rounds: int = 80
     leaves: int = 15
     folds: int = 3
     decisions: int = 4  # whose mean is compared with the threshold
@@ -47,13 +48,19 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
     def fit(self, x: Features, to_impact: Integers, recording: Integers, subject: Integers) -> Self:
         """Learn from every decision (row) of whole recordings, in their order.
 
-        `to_impact`: samples until a fall's impact, very many where there is none.
+        `to_impact`: samples until a fall's impact, FAR where there is none.
+
+        Raises:
+            UnusableData: falls, or daily life, are those of too few people.
+
         """
         tuned = self.settings
         falling, learned = self._lessons(to_impact, moving(x))
         self.trees_, unseen = [], np.zeros(len(x))
-        for train, held_out in GroupKFold(tuned.folds).split(x, groups=subject):
+        for train, held_out in GroupKFold(min(tuned.folds, len(np.unique(subject)))).split(x, groups=subject):
             rows = train[learned[train]]
+            if len(np.unique(falling[rows])) < 2:
+                raise UnusableData("too few people fall, or too few do not: some have nobody to learn from")
             trees = _trees(tuned).fit(x[rows], falling[rows])
             unseen[held_out] = trees.predict_proba(x[held_out])[:, 1]
             self.trees_.append(trees)
@@ -108,7 +115,7 @@ def _trees(settings: FallSettings) -> Any:
         min_samples_leaf=50,
         l2_regularization=1.0,
         max_features=0.3,
-        max_bins=127,
+        max_bins=63,
         early_stopping=False,
         random_state=0,
     )

@@ -1,21 +1,21 @@
 """The gait phase of a foot: small neural networks that point round the cycle and learn a wearer's walk."""
 
 import copy
-import warnings
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import FunctionTransformer, StandardScaler
+from sklearn.pipeline import Pipeline
+
+from ml.models.scaling import scaled
 
 Features = npt.NDArray[np.float32]
 Phases = npt.NDArray[np.float64]
-FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
+
+BATCH: Final = 256  # rows a step
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +44,12 @@ class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit
     def fit(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> Self:
         """Learn from rows of which those of one stride have one number."""
         tuned = self.settings
-        self.scale_: Pipeline = make_pipeline(StandardScaler(), FunctionTransformer(_within))
+        self.scale_: Pipeline = scaled()
         inputs, targets = self.scale_.fit_transform(x), _on_circle(phase)
         self.networks_ = [_network(tuned, seed) for seed in range(tuned.networks)]
-        self._train(inputs, targets, tuned.first_epochs)
+        _train(self.networks_, inputs, targets, tuned.first_epochs)
         self.kept_ = self._believed(x, phase, stride)
-        self._train(inputs[self.kept_], targets[self.kept_], tuned.epochs)
+        _train(self.networks_, inputs[self.kept_], targets[self.kept_], tuned.epochs)
         self.sample_ = (inputs[self.kept_], targets[self.kept_])
         return self
 
@@ -75,14 +75,8 @@ class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit
                 for mine, general in zip((inputs, targets), self.sample_, strict=True)
             ]
             for network in own.networks_:
-                network.partial_fit(*mixed)
+                network.set_params(batch_size=min(BATCH, len(mixed[0]))).partial_fit(*mixed)
         return own
-
-    def _train(self, inputs: Features, targets: Features, epochs: int) -> None:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # the number of epochs is what was tuned
-            for network in self.networks_:
-                network.set_params(max_iter=epochs).fit(inputs, targets)
 
     def _believed(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> npt.NDArray[np.bool_]:
         """The rows of strides that this can follow; all of them where it can follow none."""
@@ -97,14 +91,14 @@ def _network(settings: PhaseSettings, seed: int) -> Any:
     return MLPRegressor(
         hidden_layer_sizes=settings.hidden,
         alpha=settings.penalty,
-        batch_size=256,
         random_state=seed,
         warm_start=True,
     )
 
 
-def _within(x: Features) -> Features:
-    return np.clip(x, -FAR, FAR)
+def _train(networks: list[Any], inputs: Features, targets: Features, epochs: int) -> None:
+    for network in networks:
+        network.set_params(max_iter=epochs, batch_size=min(BATCH, len(inputs))).fit(inputs, targets)
 
 
 def _on_circle(phase: Phases) -> Features:

@@ -1,0 +1,35 @@
+"""What a neural network needs around it."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import FunctionTransformer, StandardScaler
+
+FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
+
+
+def scaled(*steps: Any) -> Pipeline:
+    """Features in standard deviations, none far out; then `steps`."""
+    return make_pipeline(StandardScaler(), FunctionTransformer(_within), *steps)
+
+
+@contextmanager
+def fixed_epochs() -> Iterator[None]:
+    """A network that stops after the epochs that were tuned has not failed to converge: no warnings of that.
+
+    Warnings are the whole process's: enter this outside of any threads that train.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        yield
+
+
+def _within(x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    near: npt.NDArray[Any] = np.clip(x, -FAR, FAR)
+    return near

@@ -1,0 +1,1 @@
+"""Tests of features, models and evaluation, on recordings made up here."""

@@ -1,0 +1,136 @@
+"""Features: causal, and bit for bit the same in a batch, alone and live."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from ml.features import FeatureStream, Recipe, features
+from ml.features.blocks import bins, falls, moments, since
+from ml.features.falling import FALLING, moving
+from ml.features.gait_phase import LEFT_PHASE, RIGHT_PHASE, SWAPPED, mirrored
+from ml.features.gait_status import GAIT_STATUS
+from ml.features.terrain import TERRAIN
+from tests.unit.ml import recordings
+
+RECIPES = (GAIT_STATUS, LEFT_PHASE, RIGHT_PHASE, FALLING, TERRAIN)
+Samples = npt.NDArray[np.float64]
+
+
+def walk(recipe: Recipe, rows: int) -> Samples:
+    """Something that moves in every channel, around a gravity that is somewhere."""
+    random = np.random.default_rng(3)
+    shape = (rows, len(recipe.channels))
+    return random.normal(0, 3, (1, shape[1])) + random.normal(0, 1, shape).cumsum(axis=0) * 0.1
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_a_stream_gives_the_same_bits_as_a_recording(recipe: Recipe) -> None:
+    samples = walk(recipe, recipe.look_back + 40)
+    whole = features(recipe, samples, np.arange(len(samples)))
+    stream = FeatureStream(recipe)
+    for row, sample in enumerate(samples):
+        stream.push(sample)
+        assert np.array_equal(stream.features()[0], whole[row]), row
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_robots_in_one_batch_get_what_each_gets_alone(recipe: Recipe) -> None:
+    samples = walk(recipe, 300)
+    ends = np.arange(20, 300, 7)
+    together = features(recipe, samples, ends)
+    for row, end in enumerate(ends):
+        assert np.array_equal(features(recipe, samples, np.array([end]))[0], together[row])
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_the_future_changes_no_feature(recipe: Recipe) -> None:
+    samples = walk(recipe, 400)
+    ends = np.array([0, 5, 150, 250])
+    before = features(recipe, samples, ends)
+    for row, end in enumerate(ends):
+        other = samples.copy()
+        other[end + 1 :] = 1e3
+        assert np.array_equal(features(recipe, other, np.array([end]))[0], before[row])
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_what_is_older_than_the_look_back_changes_no_feature(recipe: Recipe) -> None:
+    samples = walk(recipe, 400)
+    other = samples.copy()
+    other[: 400 - recipe.look_back] = -7.0
+    end = np.array([399])
+    assert np.array_equal(features(recipe, samples, end), features(recipe, other, end))
+    other[400 - recipe.look_back] = -7.0
+    assert not np.array_equal(features(recipe, samples, end), features(recipe, other, end))
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_features_are_finite_where_nothing_moves_and_nothing_weighs(recipe: Recipe) -> None:
+    still = np.zeros((3, len(recipe.channels), recipe.look_back))
+    assert np.isfinite(recipe.compute(still)).all()
+
+
+def test_no_decisions_are_no_rows() -> None:
+    none = features(TERRAIN, walk(TERRAIN, 20), np.array([], dtype=np.intp))
+    assert none.shape[0] == 0
+    assert none.shape[1] == features(TERRAIN, walk(TERRAIN, 20), np.array([5])).shape[1]
+
+
+def test_a_stream_without_samples_says_so() -> None:
+    with pytest.raises(ValueError, match="no sample has come yet"):
+        FeatureStream(TERRAIN).features()
+
+
+def test_a_recipe_is_offered_only_with_every_sensor() -> None:
+    every = set(GAIT_STATUS.channels) | {"left_knee.position"}
+    assert GAIT_STATUS.offered(every)
+    assert not GAIT_STATUS.offered(every - {"left_foot.angular_velocity_y"})
+
+
+def test_no_recipe_reads_a_heading() -> None:
+    assert not [
+        name for recipe in RECIPES for name in recipe.channels if "yaw" in name or "orientation" in name
+    ]
+
+
+def test_the_right_foot_is_the_left_one_in_a_mirror() -> None:
+    window = walk(LEFT_PHASE, 200).T[None]
+    assert np.array_equal(mirrored(mirrored(window)), window)
+    assert np.array_equal(RIGHT_PHASE.compute(window), LEFT_PHASE.compute(mirrored(window)))
+    assert not np.array_equal(RIGHT_PHASE.compute(window), LEFT_PHASE.compute(window))
+
+
+def test_status_does_not_know_left_from_right_nor_which_way_it_turns() -> None:
+    window = walk(GAIT_STATUS, 200).T[None]
+    swapped = window[:, SWAPPED]
+    assert np.allclose(GAIT_STATUS.compute(window), GAIT_STATUS.compute(swapped), atol=1e-4)
+    other_way = mirrored(window)[:, SWAPPED]  # back to their own sides, but turning the other way
+    assert np.allclose(GAIT_STATUS.compute(window), GAIT_STATUS.compute(other_way), atol=1e-4)
+
+
+def test_a_window_of_a_walk_says_when_the_foot_last_struck() -> None:
+    samples, *_ = recordings.trial(8.0, 1.0, np.random.default_rng(0))
+    pitch = samples[None, 450:650, 10]
+    strikes = falls(pitch > 1.0, 2)[0]
+    assert strikes[1] - strikes[0] == pytest.approx(100, abs=3)
+
+
+def test_blocks_against_values_by_hand() -> None:
+    signal = np.arange(6.0).reshape(1, 1, 6)
+    assert bins(signal, 2, 2).tolist() == [[2.5, 4.5]]
+    assert moments(signal, 3).tolist() == [[4.0, pytest.approx(np.sqrt(2 / 3)), 5.0, 3.0]]
+    held = np.array([[True, False, True, False, False]])
+    assert since(held).tolist() == [2.0]
+    assert since(~held | held).tolist() == [0.0]
+    assert since(held & ~held).tolist() == [5.0]
+    assert falls(held, 3).tolist() == [[1.0, 3.0, 5.0]]
+
+
+def test_who_moves_is_told_from_who_stands() -> None:
+    random = np.random.default_rng(0)
+    standing, walking = (
+        np.tile(np.array([[0.0], [9.81], [0.0], [0.0], [0.0], [0.0]]), (1, 1, 75)) for _ in range(2)
+    )
+    walking[:, 1] += random.normal(0, 3, (1, 75))
+    assert moving(FALLING.compute(standing)).tolist() == [False]
+    assert moving(FALLING.compute(walking)).tolist() == [True]
