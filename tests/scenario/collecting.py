@@ -1,5 +1,6 @@
 """`gwrms collect` as a process, and what it has brought into its store."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -33,19 +34,22 @@ class Collecting:
         lines += ["[store]", f'url = "{self.url}"', "[recorder]", f'spool = "{self.spool}"']
         self.config.write_text("\n".join([*lines, f"batch_s = {batch_s}", ""]))
         self._log = folder / "collect.log"
+        self._answer = b""
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
         command = [sys.executable, "-P", "-m", "gateway.main", "collect", "--config", str(self.config)]
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=log, process_group=0)
-        until(self._answers, self.log)
+        self.report()
 
     def log(self) -> str:
         return self._log.read_text()
 
     def report(self) -> CollectorReport:
-        return msgspec.json.decode(ask(self.spool, "status"), type=CollectorReport)
+        """Waits for the answer, for as long as a busy computer takes."""
+        until(self._answers, self.log)
+        return msgspec.json.decode(self._answer, type=CollectorReport)
 
     def rows(self) -> dict[str, int]:
         return {robot: link.rows for robot, link in self.report().robots.items()}
@@ -72,10 +76,10 @@ class Collecting:
     def _answers(self) -> bool:
         assert self._process is not None
         assert self._process.poll() is None, self.log()
-        try:
-            return bool(ask(self.spool, "status"))
-        except NobodyCollects:
-            return False
+        with contextlib.suppress(NobodyCollects):
+            self._answer = ask(self.spool, "status")
+            return True
+        return False
 
     def _end(self, number: signal.Signals) -> int:
         assert self._process is not None
