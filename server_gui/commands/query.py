@@ -13,6 +13,7 @@ import pyarrow.csv
 from gateway.cli.text import NONE, say, table, warn
 from ml.store.query import Result, query
 from server_gui.commands.cloud_reach import add_url, parser, reach
+from server_gui.core.cloud.tabular import iso_8601
 
 SHOWN: Final = 100  # rows, for people
 _PLAIN: Final = (
@@ -20,7 +21,6 @@ _PLAIN: Final = (
     pa.types.is_floating,
     pa.types.is_boolean,
     pa.types.is_string,
-    pa.types.is_timestamp,
     pa.types.is_decimal,
     pa.types.is_null,
 )
@@ -87,6 +87,8 @@ def _is_plain(kind: pa.DataType) -> bool:
 def _flat(column: pa.Array) -> pa.Array:
     if _is_plain(column.type):
         return column
+    if pa.types.is_timestamp(column.type) and column.type.tz:
+        return iso_8601(column)
     return pa.array([None if value is None else _text(value) for value in column.to_pylist()], pa.string())
 
 

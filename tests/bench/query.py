@@ -141,7 +141,7 @@ def measured(folder: Path) -> Iterator[Row]:
     yield Row("  pyarrow, told in which files the hour is", plain_s, "s")
     yield Row("  ratio", asked_s / plain_s, "×")
     whole_s = took_s(functools.partial(command, store.url))
-    yield Row("  gwrms query --csv, a process of its own", whole_s, "s", MOST_S, True)
+    yield Row("  gwrms query --csv, a process of its own", whole_s, "s")
 
 
 def main() -> int:

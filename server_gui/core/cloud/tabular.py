@@ -5,6 +5,7 @@ from pathlib import Path
 
 import msgspec
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet as pq
 
@@ -18,9 +19,18 @@ def write_csv(file: Path, recording: Recording) -> int:
     """Columns like `left_knee.position [rad]`; a value that is missing is empty. How many rows."""
     schema = _schema(recording.channels)
     names = [f"{each.name} [{unit}]" if (unit := _unit(each)) else each.name for each in schema]
-    header = pa.schema([(name, each.type) for name, each in zip(names, schema, strict=True)])
-    with draft(file) as written, pyarrow.csv.CSVWriter(written, header) as writer:
-        return _write(writer, (table.rename_columns(names) for table in recording.tables))
+    kinds = [pa.string(), *schema.types[1:]]
+    with (
+        draft(file) as written,
+        pyarrow.csv.CSVWriter(written, pa.schema(zip(names, kinds, strict=True))) as writer,
+    ):
+        texts = (table.set_column(0, KEYS[0], iso_8601(table[KEYS[0]])) for table in recording.tables)
+        return _write(writer, (table.rename_columns(names) for table in texts))
+
+
+def iso_8601(utc: pa.ChunkedArray | pa.Array) -> pa.ChunkedArray | pa.Array:
+    """Times in UTC as text; Arrow's own way, which thinks of time zones, takes ten times as long."""
+    return pc.binary_join_element_wise(utc.cast(pa.timestamp(utc.type.unit)).cast(pa.string()), "Z", "")
 
 
 def write_parquet(file: Path, recording: Recording) -> int:
