@@ -77,18 +77,20 @@ def _modules(globs: Sequence[str], description: Description) -> list[ModuleName]
 def _rows(
     robot: Robot, channels: Sequence[str], modules: Sequence[ModuleName], rate_hz: float
 ) -> Iterator[Row]:
-    dropped = 0
+    dropped, shed = 0, 1
     for batch in robot.watch(*channels, rate_hz=rate_hz, modules=modules):
-        dropped = _report_losses(batch, dropped)
+        _report_losses(batch, dropped, shed)
+        dropped, shed = batch.dropped, batch.shed
         yield from batch.rows()
 
 
-def _report_losses(batch: Batch, dropped: int) -> int:
+def _report_losses(batch: Batch, dropped: int, shed: int) -> None:
     if batch.missed:
         warn("watch", f"{batch.missed} notifications were lost")
     if batch.dropped > dropped:
         warn("watch", f"the robot dropped {batch.dropped - dropped} rows: we read too slowly")
-    return batch.dropped
+    if batch.shed > shed:
+        warn("watch", f"the robot sends one row of {batch.shed}: it keeps to its max_cpu_percent")
 
 
 def _follow_json(rows: Iterator[Row]) -> None:

@@ -26,6 +26,7 @@ class Batch:
     missed: int  # notifications that are missing just before this one
     link: int  # connections made until now: when it grows, time has passed unseen
     received_ns: int  # our monotonic clock
+    shed: int = 1  # the robot sends one row of so many, because it keeps to its budget
 
     def rows(self) -> Iterator[tuple[int, dict[str, float | None]]]:
         """Each row as its stamp and its values by channel."""
@@ -108,7 +109,16 @@ class Subscription:
         counters.dropped = self._dropped_before + data.dropped
         counters.overflowed += len(self._waiting) == self._waiting.maxlen
         self._waiting.append(
-            Batch(data.stamp_ns, data.columns, data.seq, data.dropped, missed, self._link, received_ns)
+            Batch(
+                data.stamp_ns,
+                data.columns,
+                data.seq,
+                data.dropped,
+                missed,
+                self._link,
+                received_ns,
+                data.shed,
+            )
         )
         self._wake.set()
 

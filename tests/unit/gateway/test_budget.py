@@ -12,6 +12,7 @@ from gateway import budget
 from gateway.budget import MOST, OVER_LOOKS, UNDER_LOOKS, Budget
 from gateway.config import ConfigError
 from gateway.loop import Loop
+from gateway.main import main
 from gateway.modules.component import ComponentSource
 from gateway.sources import whole
 from gateway.streams import SampleFeed, TickFeed
@@ -132,6 +133,19 @@ def test_a_client_sees_that_rows_are_shed_and_everything_else_is_served(
         assert cost["clients"][0]["streams"][0]["shed"] == MOST
         assert client.call("robot.stop", reason="test")["drives"]["left_knee"] == "confirmed"
     assert "streams now send one row of 2" in caplog.text
+
+
+def test_watch_says_that_rows_are_shed(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(budget, "LOOK_S", 0.02)
+    monkeypatch.setattr(budget, "MOST", 2)
+    robot = config(tmp_path, ROBOT.replace("linger_s", "max_cpu_percent = 0.000001\nlinger_s"))
+    with serving(robot) as (host, port):
+        assert main(["watch", "*", "--robot", f"{host}:{port}", "--rate", "1000", "--count", "500"]) == 0
+    assert capsys.readouterr().err == (
+        "gwrms watch: the robot sends one row of 2: it keeps to its max_cpu_percent\n"
+    )
 
 
 def test_a_share_of_nothing_is_refused(tmp_path: Path) -> None:
