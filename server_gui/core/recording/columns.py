@@ -73,4 +73,5 @@ class Columns:
 
 
 def _nullable(column: npt.NDArray[np.float64]) -> pa.Array:
-    return pa.array(column, from_pandas=True)  # NaN, which is how a run says null, becomes null
+    missing = np.isnan(column)  # how a run says null
+    return pa.array(column, mask=missing if missing.any() else None)  # without a copy where nothing is

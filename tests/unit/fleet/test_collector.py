@@ -100,14 +100,14 @@ def test_by_hand_means_when_somebody_asks(settings: ServerSettings) -> None:
 def test_idle_means_while_no_robot_sends(
     settings: ServerSettings, robot: FakeRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "QUIET_S", 3.0)
+    monkeypatch.setattr(module, "QUIET_S", 3600.0)
     settings = upload(settings, Upload.IDLE)
     with Collector(settings) as collector:
         until(collector, lambda: answers(settings))
         until(collector, lambda: report(settings).uploader.waiting)
         assert not collector._wanted()
         robot.frozen = True
-        until(collector, collector._wanted)
+        monkeypatch.setattr(module, "QUIET_S", 0.2)
         until(collector, lambda: report(settings).uploader.uploaded)
 
 
