@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gateway.session import Answer, Session
 
 LOOK_S = 0.01
-MEET_S = 1.0  # how often new threads are looked for; a late frame looks, too
+MEET_S, LATE_MEET_S = 1.0, 0.1  # how often new threads are looked for, at most; also for a late frame
 KEPT = 256  # overruns that nobody has fetched
 LOOKED_AT, NAMED = 20, 5  # processes an overrun
 
@@ -90,7 +90,7 @@ class BlameModule:
             self._judge.in_time(before, self._look, self._control)
 
     def _meet(self, now_ns: int, *, because_late: bool) -> Collection[Id]:
-        if not because_late and now_ns - self._met_ns < MEET_S * 1e9:
+        if now_ns - self._met_ns < 1e9 * (LATE_MEET_S if because_late else MEET_S):
             return ()
         self._met_ns = now_ns
         new = self._tasks.meet()

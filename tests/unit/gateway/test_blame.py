@@ -91,6 +91,7 @@ class Turn:
         self.bus = CanBus("main", CanSettings(interface="virtual", channel="unused"))
         monkeypatch.setattr(module, "Tasks", lambda: Tasks(str(self.recorded.root)))
         monkeypatch.setattr(module, "LOOK_S", 0.0)
+        monkeypatch.setattr(module, "LATE_MEET_S", 0.0)
         component = SimpleNamespace(robot=SimpleNamespace(buses={"main": self.bus}))
         context: Any = SimpleNamespace(
             config=config(folder, HEAD + LOOP),

@@ -26,13 +26,16 @@ def running(loop: Loop) -> Iterator[Loop]:
     thread.join()
 
 
-def test_timers_run_in_the_order_of_their_times(loop: Loop) -> None:
+def test_timers_run_in_the_order_of_their_times(loop: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[str] = []
-    loop.call_later(0.03, lambda: ran.append("c"))
-    loop.call_later(0.04, loop.stop)
-    loop.call_later(0.01, lambda: ran.append("a"))
-    loop.call_later(0.02, lambda: ran.append("no")).cancel()
-    loop.call_later(0.02, lambda: ran.append("b"))
+    now_ns = time.monotonic_ns()
+    with monkeypatch.context() as clock:
+        clock.setattr(time, "monotonic_ns", lambda: now_ns)  # all of them at one instant
+        loop.call_later(0.03, lambda: ran.append("c"))
+        loop.call_later(0.04, loop.stop)
+        loop.call_later(0.01, lambda: ran.append("a"))
+        loop.call_later(0.02, lambda: ran.append("no")).cancel()
+        loop.call_later(0.02, lambda: ran.append("b"))
     loop.run()
     assert ran == ["a", "b", "c"]
 
