@@ -31,8 +31,8 @@ name has a dot, so write it in double quotes. Name a robot and a time where you 
 
 examples
   gwrms query "SELECT robot, kind, count(*) FROM events GROUP BY ALL"
-  gwrms query --csv 'SELECT utc, "left_knee.position" FROM telemetry
-      WHERE robot = '"'exo-01'"' AND utc >= '"'2026-11-21 15:00:00Z'"''
+  gwrms query --csv "SELECT utc, \\"left_knee.position\\" FROM telemetry
+      WHERE robot = 'exo-01' AND utc >= '2026-11-21 15:00Z'"
 
 Only reading: no other statement, no file outside the store. Times are UTC."""
 
