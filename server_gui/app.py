@@ -159,11 +159,11 @@ def run(settings: ServerSettings, look: Look | None = None, scale: float | None 
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())
         app.window.show()
-        with _x11_keys(qt, app):
+        with stop_keys(qt, app):
             return qt.exec()
 
 
-def _x11_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[object]:
+def stop_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[X11Keys | None]:
     """The keys that stop even while the window is busy, where there is an X server."""
     if qt.platformName() != "xcb":
         return contextlib.nullcontext()

@@ -19,7 +19,7 @@ KEYS: Final = ((F12, 0), (SPACE, CONTROL))
 LOCKS: Final = (0, CAPS_LOCK, NUM_LOCK, CAPS_LOCK | NUM_LOCK)
 GRAB_ASYNC: Final = 1
 KEY_PRESS: Final = 2
-HELD_S: Final = 0.2  # presses that follow each other so quickly are one key that is held down
+HELD_S: Final = 0.2  # presses of a key that follow each other so quickly are one that is held down
 
 
 class NoX(Exception):
@@ -39,7 +39,7 @@ class X11Keys:
         self._xcb = _library("libxcb.so.1")
         self._connection = _connect(self._xcb)
         self._end = os.pipe()
-        self._last_s = 0.0
+        self._last_s: dict[int, float] = {}  # of each key
         self._thread = threading.Thread(target=self._watch, name="stop keys")
 
     def __enter__(self) -> Self:
@@ -89,14 +89,15 @@ class X11Keys:
 
     def _take_events(self) -> None:
         while event := self._xcb.xcb_poll_for_event(self._connection):
-            kind = event.contents.response_type & 0x7F
+            kind, code = event.contents.response_type & 0x7F, event.contents.keycode
             _free(event)
             if kind == KEY_PRESS:
-                self._press()
+                self._press(code)
 
-    def _press(self) -> None:
+    def _press(self, code: int) -> None:
         now_s = time.monotonic()
-        held, self._last_s = now_s - self._last_s < HELD_S, now_s
+        held = now_s - self._last_s.get(code, 0.0) < HELD_S
+        self._last_s[code] = now_s
         if not held:
             self._pressed()
 

@@ -31,7 +31,7 @@ from gateway.messages import (
 from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.events import Described, LinkChanged, Looked, Resources, Telemetry
+from server_gui.core.events import Described, Event, LinkChanged, Looked, Resources, Telemetry
 from server_gui.views.main_window import MainWindow
 
 JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle"))
@@ -115,6 +115,11 @@ class Bench:
     def first(self) -> FakeCommands:
         """What the first robot was asked."""
         return self.commands[0]
+
+    def look_again(self, events: Sequence[Event]) -> None:
+        """Take these, and look for news at once."""
+        self.station._watched_ns = 0
+        self.station.take(events)
 
     def draw(self, window: MainWindow) -> None:
         """Frames enough for everything to have been refreshed, and Qt's own events."""

@@ -1,0 +1,118 @@
+"""Under a real X server: clicks and keys, and a STOP key while the window's own thread is held up."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.fake_robot import FakeRobot
+
+PROGRAM = Path(__file__).with_name("busy_window.py")
+WITHIN_S = 40.0
+
+pytestmark = [
+    pytest.mark.skipif(
+        not all(map(shutil.which, ("Xvfb", "xdotool"))), reason="needs apt-get install xvfb xauth xdotool"
+    ),
+    pytest.mark.timeout(150),
+]
+
+
+@dataclass
+class Shown:
+    """A window on an X server, and the robot that it shows."""
+
+    robot: FakeRobot
+    folder: Path
+    display: str
+    window: str
+    keys: str
+    stop_at: tuple[str, str]
+
+    def xdotool(self, *words: str) -> None:
+        subprocess.run(
+            ["xdotool", *words], env={**os.environ, "DISPLAY": self.display}, check=True, timeout=20
+        )
+
+    def touch(self, name: str) -> None:
+        (self.folder / name).touch()
+
+    @property
+    def stops(self) -> int:
+        return len(self.robot.called("robot.stop"))
+
+
+def wait(so: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + WITHIN_S
+    while not so():
+        assert time.monotonic() < deadline, f"never {what}"
+        time.sleep(0.01)
+
+
+@contextmanager
+def x_server() -> Iterator[str]:
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1400x900x24", "-nolisten", "tcp"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    try:
+        with os.fdopen(read) as said:
+            yield f":{said.readline().strip()}"
+    finally:
+        server.terminate()
+        server.wait(20)
+
+
+@pytest.fixture
+def shown(tmp_path: Path) -> Iterator[Shown]:
+    with FakeRobot() as robot, x_server() as display:
+        environment = {**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+        window = subprocess.Popen(
+            [sys.executable, str(PROGRAM), robot.address, str(tmp_path)],
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert window.stdout is not None
+            _, keys, number, x, y = window.stdout.readline().split()
+            made = Shown(robot, tmp_path, display, number, keys, (x, y))
+            wait(lambda: len(robot.called("stream.start")) > 0, "followed the robot")
+            made.xdotool("windowfocus", "--sync", number)
+            yield made
+        finally:
+            for name in ("free", "end"):
+                (tmp_path / name).touch()
+            try:
+                window.wait(20)
+            finally:
+                window.kill()
+                window.wait()
+                if window.stdout is not None:
+                    window.stdout.close()
+
+
+def test_keys_and_click_stop_also_while_the_window_is_held_up(shown: Shown) -> None:
+    assert shown.keys == "x11"
+    shown.xdotool("key", "F12")
+    wait(lambda: shown.stops == 1, "stopped by F12")
+    shown.xdotool("key", "ctrl+space")
+    wait(lambda: shown.stops == 2, "stopped by Ctrl+Space")
+    shown.xdotool("mousemove", *shown.stop_at, "click", "1")
+    wait(lambda: shown.stops == 3, "stopped by a click")
+    time.sleep(0.3)  # a second press within 0.2 s is taken for a key that is held down
+    shown.touch("hold")
+    wait(lambda: (shown.folder / "held").exists(), "held up")
+    shown.xdotool("key", "F12")
+    wait(lambda: shown.stops == 4, "stopped while the window was held up")
+    assert not (shown.folder / "free").exists(), "the window was not held up any more"
