@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 
 from gateway.cli.reach import ask
 from gateway.cli.text import say, say_json, table
-from ml.store import TABLES, TELEMETRY, upkeep
+from ml.store import TABLES, TELEMETRY, Store, UnsafeStore, upkeep
 from ml.store.tables import RESOURCES
 from server_gui.commands.cloud_reach import add_url, parser, reach, when
 
@@ -22,7 +22,7 @@ them, except those of versions that are younger than --grace days, or that a mod
 def compact(argv: list[str]) -> int:
     """Run `gwrms cloud compact`."""
     arguments = _parser("compact", "Put small files together.", COMPACT_EPILOG).parse_args(argv)
-    done = upkeep.compact(reach(arguments), dry_run=arguments.dry_run)
+    done = upkeep.compact(_writable(arguments), dry_run=arguments.dry_run)
     if arguments.json:
         say_json(done)
     else:
@@ -39,7 +39,7 @@ def retain(argv: list[str]) -> int:
     made.add_argument("--table", action="append", choices=TABLES, help="of this table; again for more")
     made.add_argument("--yes", action="store_true", help="do not ask")
     arguments = made.parse_args(argv)
-    store = reach(arguments)
+    store = _writable(arguments)
     tables = [TABLES[name] for name in arguments.table or (TELEMETRY.name, RESOURCES.name)]
     before = datetime.now(UTC) - timedelta(days=arguments.days)
     old = upkeep.retain(store, tables, before, dry_run=True)
@@ -64,7 +64,7 @@ def vacuum(argv: list[str]) -> int:
         "--grace", type=float, default=upkeep.GRACE.days, metavar="DAYS", help="(default: %(default)s)"
     )
     arguments = made.parse_args(argv)
-    store = reach(arguments)
+    store = _writable(arguments)
     gone = upkeep.vacuum(store, grace=timedelta(days=arguments.grace), dry_run=arguments.dry_run)
     if arguments.json:
         say_json({"files": gone, "pins": upkeep.pins(store)})
@@ -81,4 +81,16 @@ def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
     made = parser(f"cloud {command}", what, epilog)
     add_url(made, "url")
     made.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
+    made.add_argument(
+        "--alone", action="store_true", help="no server runs: for a store that keeps no two writers apart"
+    )
     return made
+
+
+def _writable(arguments: argparse.Namespace) -> Store:
+    store = reach(arguments)
+    if not (store.about.several_writers or arguments.alone):
+        raise UnsafeStore(
+            f"{store.url} is for one writer alone, which is its server: end that, and say --alone"
+        )
+    return store

@@ -139,7 +139,9 @@ def _told(
         "notes": session.notes,
         "configuration": session.configuration_hash,
         "software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),
-        "parameters": ", ".join(f"{name}={value}" for name, value in session.parameters.items()),
+        "parameters": ", ".join(
+            f"{name}={value}" for name, value in session.parameters.items() if value is not None
+        ),
     }
     yield f"session {session.session}"
     yield from (f"  {name:<14} {value}" for name, value in facts.items() if value)

@@ -121,6 +121,12 @@ def test_a_query_shows_whatever_sql_makes(desk: Desk) -> None:
     assert desk.run("query", sql).lower().splitlines()[1].split() == shown
 
 
+def test_upkeep_leaves_a_store_of_one_writer_to_it(desk: Desk) -> None:
+    Store(desk.url, several_writers=False)
+    assert "is for one writer alone" in desk.run("cloud", "compact", status=1)
+    assert desk.ask("cloud", "compact", "--alone") == []
+
+
 def rows(text: str) -> list[list[str]]:
     return list(csv.reader(text.splitlines()))
 
