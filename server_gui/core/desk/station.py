@@ -87,7 +87,7 @@ class Station:
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
-            self._end_trial_if_over(now_ns)
+            self.end_trial_if_over(now_ns)
 
     def _telemetry(self, event: Telemetry) -> None:
         self.rings.take(event.batch.stamps_ns, event.batch.columns)
@@ -233,7 +233,8 @@ class Station:
         self.writing.reverted(how)
         self.tell(NewsKind.PARAMETER, how)
 
-    def _end_trial_if_over(self, now_ns: int) -> None:
+    def end_trial_if_over(self, now_ns: int) -> None:
+        """A trial whose time is over has gone back when the robot holds the old values again, not before."""
         trial = self.writing.trial
         if trial is None or now_ns - trial.until_ns < OVERDUE_S * 1e9:
             return
