@@ -64,7 +64,7 @@ def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
     """
     number, process = environ.pop(_NUMBER, "0"), environ.pop(_PROCESS, "")
     names, woken = environ.pop(_NAMES, "").split(":"), environ.pop(_RESTING, "") != ""
-    if process != str(os.getpid()) or not int(number):
+    if process != str(os.getpid()) or not number.isdecimal() or not int(number):
         return None
     found: dict[str, socket.socket] = {}
     for place in range(int(number)):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 from gateway.messages import Overrun, Overruns, Params, RanInstead
 from gateway.modules.overruns import NOTHING, Blame, Deadline, Judge, Late
 from gateway.modules.tasks import TICK_NS, Id, Look, Tasks
+from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
     from drivers.bus.bus import CanBus
@@ -47,9 +48,7 @@ class BlameModule:
     def start(self) -> None:
         settings = self._settings
         if settings is None or settings.bus is None or settings.period_ms is None:
-            raise ValueError(
-                "the robot's file does not say when the control loop is late: [control_loop] bus"
-            )
+            return  # nothing to watch, and who asks is told so
         self._deadline = Deadline(round(settings.period_ms * 1e6), round(settings.tolerance_ms * 1e6))
         self._since_ns = time.monotonic_ns()
         self._tasks.meet()
@@ -139,6 +138,11 @@ class BlameModule:
         return [*ahead, *behind][:NAMED]
 
     def _answer(self, session: "Session", _params: Params) -> Overruns:
+        if self._bus is None:
+            raise refuse(
+                Kind.UNAVAILABLE,
+                "the robot's file does not say when its control loop is late: [control_loop] bus, period_ms",
+            )
         told = self._told.get(session)
         if told is None and not session.closed:
             session.on_close(lambda: self._forget(session))
