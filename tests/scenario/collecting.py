@@ -20,7 +20,14 @@ from server_gui.core.fleet.door import NobodyCollects, ask
 from tests.scenario.processes import DEADLINE_S, until
 
 KEYS = ("session", "connection", "stream", "seq", "row", "stamp_ns")
-GONE = {"gap", "dropped", "lost", "refused", "link"}  # kinds of events that tell of rows that are not there
+GONE = {
+    "gap",
+    "dropped",
+    "shed",
+    "lost",
+    "refused",
+    "link",
+}  # kinds of events that tell of rows that are not there
 
 
 class Collecting:

@@ -19,6 +19,7 @@ class EventKind(Enum):
 
     GAP = "gap"  # something was not seen: the link dropped, or notifications never came
     DROPPED = "dropped"  # the robot threw rows away
+    SHED = "shed"  # the robot sends one row of so many, to keep to its share of a core, or all of them again
     LOST = "lost"  # this server threw rows away: its queue or its disk was full
     LINK = "link"  # the link to the robot dropped
     NAME = "name"  # a robot calls itself by another name than the server's file, or by another robot's
@@ -55,7 +56,7 @@ class Gathering:
         self.connection = uuid.uuid4().hex[:16]
         self.units: dict[str, str] = {}
         self._link: int | None = None
-        self._newest: dict[int, tuple[int, int]] = {}  # by stream: newest `seq`, rows dropped until then
+        self._newest: dict[int, tuple[int, int, int]] = {}  # by stream: its newest `seq`, `dropped`, `shed`
         self._gathered: dict[Name, tuple[Layout, list[Notification]]] = {}
         self._layouts: dict[tuple[str, ...], Layout] = {}
 
@@ -75,9 +76,10 @@ class Gathering:
         channels = tuple(batch.columns)
         layout = self._layouts.get(channels) or self._layout(channels)
         _check(new)
-        follows = batch.link == self._link and self._newest.get(new.stream) == (batch.seq - 1, batch.dropped)
+        before = (batch.seq - 1, batch.dropped, batch.shed)
+        follows = batch.link == self._link and self._newest.get(new.stream) == before
         events = [] if follows else self._missing(new)
-        self._newest[new.stream] = (batch.seq, batch.dropped)
+        self._newest[new.stream] = (batch.seq, batch.dropped, batch.shed)
         if batch.stamps_ns:
             name = (self.session, self.connection, new.stream, id(layout))
             self._gathered.setdefault(name, (layout, []))[1].append(new)
@@ -114,15 +116,20 @@ class Gathering:
 
         if batch.link != self._link:
             self._new_connection(batch.link, "the link was made again", happened)
-        elif batch.seq <= self._newest.get(new.stream, (-1, 0))[0]:
+        elif batch.seq <= self._newest.get(new.stream, (-1, 0, 1))[0]:
             self._new_connection(batch.link, "the stream's numbers began anew", happened)
         # Counted here: what waited too long for us behind the link is missing as well.
-        newest, dropped = self._newest.get(new.stream, (batch.seq - batch.missed - 1, 0))
+        newest, dropped, shed = self._newest.get(new.stream, (batch.seq - batch.missed - 1, 0, 1))
         missed, rows = batch.seq - newest - 1, batch.dropped - dropped
         if missed:
             happened(EventKind.GAP, f"{missed} notifications never came", missed=missed)
         if rows > 0:
             happened(EventKind.DROPPED, f"the robot dropped {rows} rows: we read too slowly", rows=rows)
+        if batch.shed != shed:
+            share = (
+                f"one row of {batch.shed}: it keeps to its max_cpu_percent" if batch.shed > 1 else "every row"
+            )
+            happened(EventKind.SHED, f"the robot sends {share}", shed=batch.shed)
         return events
 
     def _new_connection(self, link: int, why: str, happened: Callable[[EventKind, str], None]) -> None:

@@ -1,6 +1,7 @@
 """The recorder: everything, never decimated; what is lost is told; nobody waits for the disk."""
 
 import collections
+import dataclasses
 import json
 import math
 import threading
@@ -311,3 +312,11 @@ def test_a_description_that_comes_between_rows_changes_the_units_of_those_after_
         recorder.record("exo-01", 1, batch(1))
     found = {int(seq): run.layout.units for run in kept(spool)[0] for seq in run.seqs}
     assert found == {0: (None, None, None), 1: ("rad", "rad/s", "rad")}
+
+
+def test_a_robot_that_sends_fewer_rows_to_save_work_is_told(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for seq, shed in enumerate((1, 1, 4, 4, 1)):
+            recorder.record("exo-01", 1, dataclasses.replace(batch(seq), shed=shed))
+    told = [json.loads(str(event["data"])) for event in events(spool, "shed")]
+    assert [(found["seq"], found["shed"]) for found in told] == [(2, 4), (4, 1)]
