@@ -87,12 +87,14 @@ def _copy(source: Objects, target: Objects, found: Object, advance: Advance) -> 
         file = Path(urlsplit(target.url).path) / found.path
         with translated(f"{file} cannot be written"):
             _into(file, source, found, digest, advance)
+        if source.url.startswith("file://"):  # which makes no tags: what was written is read
+            return proven(target, found, digest, ours=True)
         return proven(source, found, digest, ours=False)
     pieces = _told(digest.of(source.pieces(found)), advance)
     if _ENTRY.fullmatch(found.path):
         if not target.create(found.path, b"".join(pieces)):
             raise StoreError(f"{target.url} is written to by others: copy to a place of its own")
-        return True
+        return proven(target, replace(found, tag=""), digest, ours=True)
     return proven(target, replace(found, tag=target.write(found.path, pieces)), digest, ours=True)
 
 
