@@ -147,8 +147,14 @@ def whole(folder: Path) -> Iterator[Figure]:
     with robot(folder) as file, gateway(file) as (pid, address):
 
         def live(client: Client) -> bool:
-            values = client.call("component.snapshot")["values"]
-            return values["left_hip.position"] is not None and values["extra_8.position"] is not None
+            wanted = [f"{joint}.position" for joint in ("left_hip", "right_ankle", "extra_7", "extra_8")]
+
+            def there() -> bool:
+                values = client.call("component.snapshot", channels=wanted)["values"]
+                return None not in values.values()
+
+            until(there, "the joints are there")
+            return True
 
         wake_ms, cpu_ms = woken(pid, address, live)
         yield Figure("from rest to the values of eight joints, p50", wake_ms, "ms", 1500)
