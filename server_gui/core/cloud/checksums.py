@@ -11,6 +11,10 @@ from ml.store.objects import Object, Objects
 _PLAIN: Final = re.compile(r"[0-9a-f]{32}")
 
 
+class Altered(StoreError):
+    """What arrived is not what was sent."""
+
+
 class Digest:
     """Of an object's pieces: what a service would call it that got it in one go, or in these pieces."""
 
@@ -41,7 +45,7 @@ def proven(objects: Objects, found: Object, digest: Digest, *, ours: bool) -> bo
     again.
 
     Raises:
-        StoreError: it is not the same.
+        Altered: it is not the same.
 
     """
     if found.tag in digest.tags:
@@ -52,5 +56,5 @@ def proven(objects: Objects, found: Object, digest: Digest, *, ours: bool) -> bo
     for _ in again.of(objects.pieces(found)):
         pass
     if again.tags != digest.tags:
-        raise StoreError(f"{objects.url}/{found.path} was altered on its way; try again")
+        raise Altered(f"{objects.url}/{found.path} was altered on its way; try again")
     return True

@@ -17,7 +17,7 @@ from ml.store.errors import StoreError, translated
 from ml.store.objects import PIECE_BYTES, Object, Objects
 from ml.store.probe import probe
 from ml.store.store import ABOUT, Store
-from server_gui.core.cloud.checksums import Digest, proven
+from server_gui.core.cloud.checksums import Altered, Digest, proven
 
 Advance = Callable[[int], object]
 PART: Final = ".part"
@@ -76,7 +76,11 @@ def copy(source: Objects, target: Objects, wanted: Sequence[Object], advance: Ad
     """
     done = Copied()
     for found in wanted:
-        by_checksum = _copy(source, target, found, advance)
+        try:
+            by_checksum = _copy(source, target, found, advance)
+        except Altered:
+            target.remove(found.path)
+            raise
         done += Copied(int(by_checksum), int(not by_checksum), found.size_bytes)
     return done
 

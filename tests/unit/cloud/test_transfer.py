@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -129,26 +130,32 @@ def test_what_is_altered_on_its_way_is_noticed(
     source, target = ends if direction == "down" else ends[::-1]
     source.create("table/file", content)
     [found] = [each for each in source.listing() if each.path == "table/file"]
-    if direction == "down":
-        original = Objects.pieces
-        reads = iter([True])
-
-        def altered(self: Objects, found: Object, offset: int = 0) -> Iterator[bytes]:
-            once = next(reads, False)
-            return (
-                piece.replace(b"v", b"w", 1) if once else piece for piece in original(self, found, offset)
+    with monkeypatch.context() as network:
+        if direction == "down":
+            network.setattr(Objects, "pieces", _altered_once(Objects.pieces))
+        else:
+            write = Objects.write
+            network.setattr(
+                Objects, "write", lambda self, path, pieces: write(self, path, map(_altered, pieces))
             )
+        with pytest.raises(StoreError, match="altered on its way"):
+            transfer.copy(source, target, [found], lambda _: None)
+    assert target.read("table/file") is None
+    transfer.copy(source, target, [found], lambda _: None)
+    assert target.read("table/file") == content
 
-        monkeypatch.setattr(Objects, "pieces", altered)
-    else:
-        write = Objects.write
-        monkeypatch.setattr(
-            Objects,
-            "write",
-            lambda self, path, pieces: write(self, path, [each.replace(b"v", b"w", 1) for each in pieces]),
-        )
-    with pytest.raises(StoreError, match="altered on its way"):
-        transfer.copy(source, target, [found], lambda _: None)
+
+def _altered(piece: bytes) -> bytes:
+    return piece.replace(b"v", b"w", 1)
+
+
+def _altered_once(pieces: Callable[..., Iterator[bytes]]) -> Callable[..., Iterator[bytes]]:
+    times = iter([_altered])
+
+    def made(*arguments: Any) -> Iterator[bytes]:
+        return map(next(times, bytes), pieces(*arguments))
+
+    return made
 
 
 def test_a_place_where_something_else_was_written_is_refused(store_url: str, tmp_path: Path) -> None:
