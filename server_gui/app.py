@@ -148,8 +148,13 @@ class App:
             self.desk.shown.units = Units(by_si=by_si)
 
 
-def run(settings: ServerSettings, look: Look | None = None, scale: float | None = None) -> int:
-    """Open the window until it is closed; the exit status."""
+def run(
+    settings: ServerSettings,
+    look: Look | None = None,
+    scale: float | None = None,
+    seconds: float | None = None,
+) -> int:
+    """Open the window until it is closed, or for so many seconds; the exit status."""
     sys.setswitchinterval(SWITCH_S)
     qt = QApplication(sys.argv[:1])
     qt.setApplicationName("gwrms")
@@ -159,6 +164,8 @@ def run(settings: ServerSettings, look: Look | None = None, scale: float | None 
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())
         app.window.show()
+        if seconds is not None:
+            QTimer.singleShot(round(seconds * 1000), qt.quit)
         with stop_keys(qt, app):
             return qt.exec()
 

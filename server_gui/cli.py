@@ -1,11 +1,16 @@
 """The server's commands. What needs rich is imported only when a command runs."""
 
 import argparse
+import importlib.metadata
 import math
 import sys
 from pathlib import Path
 
-EPILOG = """keys
+from server_gui.qt_needs import NoWindow, check
+
+EPILOG = """Where there is a display, the view is the window (gwrms gui --help); else it is in the terminal.
+
+keys in the terminal
   s            STOP: quick stop on every drive (software, not safety-rated)
   ↑ ↓          choose a gait parameter
   ← →          lower or raise it; the lease is held only while it is written
@@ -23,11 +28,13 @@ def demo(argv: list[str]) -> int:
     arguments = _parser().parse_args(argv)
     from server_gui.terminal.demo import Options, run
 
+    window = not (arguments.headless or arguments.terminal or arguments.picture) and _can_open_a_window()
     screen = sys.stdout.isatty() and sys.stdin.isatty()
-    if not screen and not arguments.headless:
+    if not (screen or window or arguments.headless):
         sys.stderr.write("gwrms demo: this is no terminal, so the run is headless\n")
     return run(
         Options(
+            window=window,
             headless=arguments.headless or not screen,
             seconds=arguments.seconds,
             folder=arguments.dir,
@@ -35,6 +42,15 @@ def demo(argv: list[str]) -> int:
             picture=arguments.picture,
         )
     )
+
+
+def _can_open_a_window() -> bool:
+    """Whether there are a display and all that the window needs; else the terminal is as good a place."""
+    try:
+        check()
+    except (NoWindow, importlib.metadata.PackageNotFoundError):
+        return False
+    return True
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -49,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--headless", action="store_true", help="no screen: a line a second, at last a table of what was seen"
     )
+    parser.add_argument("--terminal", action="store_true", help="in the terminal, display or not")
     parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds")
     parser.add_argument(
         "--dir", type=Path, help="keep the simulated robot's files here (default: a temporary folder)"

@@ -1,23 +1,20 @@
 """The demo: simulator and gateway as processes, a view on them, and all three ended together."""
 
 import contextlib
-import json
-import re
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gateway.client import Address
+from server_gui.core.settings import ServerSettings, add_robots
+from server_gui.simulated import simulated_robot
 from server_gui.terminal import headless
-from server_gui.terminal.children import Child
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.dashboard import Dashboard, save_picture
 from server_gui.terminal.ending import Ended, Ending
 from server_gui.terminal.session import Session
 
-START_S = 60.0  # for a simulator or a gateway to become ready, on a slow machine
 WHOLE_S = 60.0  # for every component to be there
 TICK_S = 0.05
 LINE_S = 1.0
@@ -31,6 +28,7 @@ class DemoFailed(Exception):
 class Options:
     """What the command line asked for."""
 
+    window: bool
     headless: bool
     seconds: float | None
     folder: Path | None
@@ -48,11 +46,20 @@ def run(options: Options) -> int:
     """
     with Ending() as ending, _folder(options.folder) as folder:
         try:
-            with _robot(folder, options.scenario, ending) as (address, check), Session(address) as session:
-                _view(session, options, str(address), check)
+            with simulated_robot(folder, options.scenario, ending.check) as (address, check):
+                if options.window:
+                    return _window(str(address), options.seconds)
+                with Session(address) as session:
+                    _view(session, options, str(address), check)
         except Ended as ended:
             return ended.status
     return 0
+
+
+def _window(address: str, seconds: float | None) -> int:
+    from server_gui.app import run  # Qt is only here when it is wanted
+
+    return run(add_robots(ServerSettings(), {"simulated": address}), seconds=seconds)
 
 
 @contextlib.contextmanager
@@ -62,41 +69,6 @@ def _folder(wanted: Path | None) -> Iterator[Path]:
         return
     with tempfile.TemporaryDirectory(prefix="gwrms-demo-") as made:
         yield Path(made)
-
-
-@contextlib.contextmanager
-def _robot(folder: Path, scenario: str, ending: Ending) -> Iterator[tuple[Address, Callable[[], None]]]:
-    """A running simulator and its gateway: where it listens, and how to check that all is well."""
-    with Child("simulator", ["sim", "--dir", str(folder), "--scenario", scenario]) as simulator:
-        config = simulator.wait_ready(_config_in, START_S, ending.check)
-
-        def check_simulator() -> None:
-            ending.check()
-            simulator.check()
-
-        with Child("gateway", ["gateway", config, "--port", "0"]) as gateway:
-            address = gateway.wait_ready(_address_in, START_S, check_simulator)
-
-            def check() -> None:
-                check_simulator()
-                gateway.check()
-
-            yield address, check
-
-
-def _config_in(line: str) -> str | None:
-    """The simulator says `{"ready": true, "config": …}`."""
-    try:
-        said = json.loads(line)
-    except ValueError:
-        return None
-    return str(said["config"]) if isinstance(said, dict) and said.get("ready") else None
-
-
-def _address_in(line: str) -> Address | None:
-    """The gateway says `listening on HOST:PORT`."""
-    said = re.fullmatch(r"listening on (\S+)", line.strip())
-    return Address.parse(said[1]) if said else None
 
 
 def _view(session: Session, options: Options, where: str, check: Callable[[], None]) -> None:

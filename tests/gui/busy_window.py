@@ -1,7 +1,7 @@
 """A window whose thread is held up until a file appears: what a STOP key does meanwhile is what is tested.
 
-`python busy_window.py HOST:PORT FOLDER` says `ready`, how it hears of keys, its number, and where STOP is on
-the screen. It holds its thread as soon as FOLDER/hold is there, lets go with FOLDER/free, ends with FOLDER/end.
+`python busy_window.py HOST:PORT FOLDER` says `ready`, how it hears of keys, its number, and where STOP is
+on the screen. It holds its thread as soon as FOLDER/hold is there, until FOLDER/free; ends with FOLDER/end.
 """
 
 import contextlib
