@@ -5,7 +5,7 @@ Python (see files.py).
 """
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Final
@@ -50,6 +50,29 @@ class DataFile:
     session: str | None
     first: datetime | None
     last: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """What some files hold together."""
+
+    files: Sequence[DataFile]
+
+    @property
+    def first(self) -> datetime | None:
+        return min((file.first for file in self.files if file.first), default=None)
+
+    @property
+    def last(self) -> datetime | None:
+        return max((file.last for file in self.files if file.last), default=None)
+
+    @property
+    def rows(self) -> int:
+        return sum(file.rows for file in self.files)
+
+    @property
+    def size_bytes(self) -> int:
+        return sum(file.size_bytes for file in self.files)
 
 
 def data_files(delta: DeltaTable, location: str) -> Iterator[DataFile]:

@@ -66,8 +66,7 @@ class Objects:
 
     def names(self, folder: str) -> list[str]:
         """Every object below a folder."""
-        with translated(f"{self.url}/{folder} cannot be listed"):
-            return sorted(found["path"] for chunk in obstore.list(self._objects, folder) for found in chunk)
+        return sorted(found.path for found in self.listing(folder))
 
     def listing(self, folder: str = "") -> Iterator[Object]:
         """Every object below a folder, in no order."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
@@ -13,7 +12,7 @@ import pyarrow.parquet as pq
 
 from ml.store import reading
 from ml.store.errors import StoreError, translated
-from ml.store.fragments import DataFile
+from ml.store.fragments import DataFile, Extent
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
 
@@ -64,29 +63,6 @@ class Channel(msgspec.Struct, frozen=True):
     name: str
     unit: str | None
     samples: int
-
-
-@dataclass(frozen=True, slots=True)
-class Extent:
-    """The telemetry of a session as the log knows it."""
-
-    files: Sequence[DataFile]
-
-    @property
-    def first(self) -> datetime | None:
-        return min((file.first for file in self.files if file.first), default=None)
-
-    @property
-    def last(self) -> datetime | None:
-        return max((file.last for file in self.files if file.last), default=None)
-
-    @property
-    def rows(self) -> int:
-        return sum(file.rows for file in self.files)
-
-    @property
-    def size_bytes(self) -> int:
-        return sum(file.size_bytes for file in self.files)
 
 
 def sessions(store: Store, robot: str | None = None) -> list[Session]:

@@ -9,6 +9,8 @@ from pathlib import Path
 @contextlib.contextmanager
 def draft(file: Path) -> Iterator[Path]:
     """Another name to write to within the block; it becomes `file` where that ends well, else it goes."""
+    if not file.parent.is_dir():
+        raise FileNotFoundError(f"{file} cannot be written: there is no folder {file.parent}")
     written = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:
         yield written

@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import msgspec
 
-from ml.store.sessions import Extent, Session, made, newest
+from ml.store.fragments import Extent
+from ml.store.sessions import Session, made, newest
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import Record
 

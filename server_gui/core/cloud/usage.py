@@ -1,12 +1,12 @@
 """What a store holds: its tables, and who takes how much of it."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
 from ml.store import reading
-from ml.store.fragments import DataFile
+from ml.store.fragments import DataFile, Extent
 from ml.store.objects import Object
 from ml.store.store import Store
 from ml.store.tables import TABLES
@@ -46,14 +46,6 @@ def below(store: Store, prefix: str) -> list[Object]:
     return sorted(store.objects.listing(prefix), key=lambda found: found.path)
 
 
-def _usage(table: str, robot: str | None, files: Iterable[DataFile]) -> Usage:
-    files = list(files)
-    return Usage(
-        table,
-        robot,
-        len(files),
-        sum(file.rows for file in files),
-        sum(file.size_bytes for file in files),
-        min((file.first for file in files if file.first), default=None),
-        max((file.last for file in files if file.last), default=None),
-    )
+def _usage(table: str, robot: str | None, files: Sequence[DataFile]) -> Usage:
+    held = Extent(files)
+    return Usage(table, robot, len(files), held.rows, held.size_bytes, held.first, held.last)

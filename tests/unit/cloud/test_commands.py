@@ -93,7 +93,12 @@ def test_a_session_is_exported_as_what_the_files_name_says(desk: Desk, tmp_path:
     assert file.stat().st_size > 1000
 
 
-def test_an_export_needs_a_format(desk: Desk, tmp_path: Path) -> None:
+def test_an_export_needs_a_format_and_a_folder(desk: Desk, tmp_path: Path) -> None:
+    recorded = desk.record()
+    file = tmp_path / "nowhere" / "walk.csv"
+    assert "there is no folder" in desk.run(
+        "sessions", "export", recorded.session, "--out", str(file), status=1
+    )
     with pytest.raises(SystemExit) as left:
         desk.run("sessions", "export", "x", "--out", str(tmp_path / "walk.bag"))
     assert left.value.code == 2
