@@ -68,7 +68,7 @@ class RecorderState:
 class RecorderSettings:
     """How the recorder behaves; a batch goes to the store when it is as old or as long as this."""
 
-    capacity: int = 200_000  # rows that may wait for the disk
+    capacity: int = 50_000  # rows that may wait for the disk: of 60 channels they take half a gigabyte
     batch_s: float = 60.0
     batch_rows: int = 200_000
 
