@@ -99,8 +99,8 @@ def _kind(error: Exception) -> type[StoreError]:
 def _reason(error: Exception) -> str:
     """The error in few words; what a server answered is reduced to its code."""
     text = str(error)
-    found = [reason for reason in _REASONS if reason in text]
-    found += [next(filter(None, groups)) for groups in _CODE.findall(text)]
+    found = [next(filter(None, groups)) for groups in _CODE.findall(text)]
+    found = found or [reason for reason in _REASONS if reason in text]
     if not found and not _ANSWERED.search(text):
         found = [_COLOUR.sub("", text).strip().partition("\n")[0][:200]]
     return ", ".join(dict.fromkeys(found)) or type(error).__name__
