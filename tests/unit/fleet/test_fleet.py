@@ -2,9 +2,10 @@
 
 import json
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -69,9 +70,27 @@ def test_what_a_gateway_has_journalled_is_recorded_once(gateway: str, tmp_path: 
     assert sum(entry["what"] == "write" for entry in entries) == 3
 
 
+def test_a_journal_that_is_longer_than_a_look_is_recorded_from_its_beginning(
+    start: Start, tmp_path: Path
+) -> None:
+    entries = [{"n": n, "hash": f"h{n}", "utc_ns": n, "who": "ada", "what": "write"} for n in range(1, 51)]
+    robot = start()
+    robot.overrides["journal.tail"] = lambda params: {"entries": entries[-params["n"] :]}
+    with recording(tmp_path, {"exo-fake": robot.address}) as fleet:
+        fleet.until(lambda: any(_writes(event) == 50 for _, event in fleet.shown))
+        entries += [{"n": n, "hash": f"h{n}", "who": "ada", "what": "stop"} for n in range(51, 101)]
+        fleet.until(lambda: any(len(_entries(event)) == 100 for _, event in fleet.shown))
+    kept = Kept.of(tmp_path)
+    assert [entry["n"] for entry in kept.table("journal", "exo-fake")] == list(range(1, 101))
+    assert kept.events("exo-fake") == []
+
+
 def _writes(event: Event) -> int:
-    entries = event.journal.entries if isinstance(event, Journalled) else ()
-    return sum(entry["what"] == "write" for entry in entries)
+    return sum(entry["what"] == "write" for entry in _entries(event))
+
+
+def _entries(event: Event) -> Sequence[dict[str, Any]]:
+    return event.journal.entries if isinstance(event, Journalled) else ()
 
 
 def test_two_robots_are_recorded_whole_and_nobody_sees_what_is_not(start: Start, tmp_path: Path) -> None:
