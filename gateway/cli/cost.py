@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 
 from gateway.cli.reach import parser, reach
-from gateway.cli.text import NONE, percent, say, say_json, size, table
+from gateway.cli.text import NONE, budget, percent, say, say_json, size, table
 from gateway.messages import BusCost, ClientCost, GatewayCost, StreamCost
 
 SECONDS = 2.0
@@ -67,8 +67,7 @@ def _facts(cost: GatewayCost) -> Iterator[tuple[str, str]]:
     for name, bus in cost.buses.items():
         yield "bus", f"{name}: {_bus(bus)}"
     if cost.budget is not None:
-        shed = f": streams send one row of {cost.budget.shed}" if cost.budget.shed > 1 else ""
-        yield "budget", f"at most {percent(cost.budget.max_cpu_percent)} of a core{shed}"
+        yield "budget", budget(cost.budget)
 
 
 def _bus(bus: BusCost) -> str:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
-from gateway.cli.text import NONE, exact, say, say_json, table
+from gateway.cli.text import NONE, budget, exact, say, say_json, table
 from gateway.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo, StopInfo
 
 PAGE = 100  # columns
@@ -44,6 +44,8 @@ def _chapters(robot: Description) -> Iterator[str]:
     yield _stop(robot)
     if robot.guard.configured:
         yield _guard(robot.guard)
+    if robot.budget is not None:
+        yield f"BUDGET  {budget(robot.budget)}\n"
 
 
 def _channels(channels: list[ChannelInfo]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from gateway.coding import text as digits
-from gateway.messages import ChannelInfo
+from gateway.messages import BudgetInfo, ChannelInfo
 
 NONE = "–"
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole
@@ -73,6 +73,12 @@ def size(count: float) -> str:
             return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
         count /= 1024
     return f"{count:.2f} GiB"
+
+
+def budget(info: BudgetInfo) -> str:
+    """What the gateway may use, and what its streams give up for it."""
+    shed = f": streams send one row of {info.shed}" if info.shed > 1 else ""
+    return f"at most {percent(info.max_cpu_percent)} of a core{shed}"
 
 
 def age(seconds: float | None) -> str:

@@ -135,6 +135,15 @@ def test_a_client_sees_that_rows_are_shed_and_everything_else_is_served(
     assert "streams now send one row of 2" in caplog.text
 
 
+def test_describe_shows_the_budget(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with serving(config(tmp_path, ROBOT.replace("linger_s", "max_cpu_percent = 8\nlinger_s"))) as (
+        host,
+        port,
+    ):
+        assert main(["describe", "--robot", f"{host}:{port}"]) == 0
+    assert capsys.readouterr().out.endswith("BUDGET  at most 8.0 % of a core\n")
+
+
 def test_watch_says_that_rows_are_shed(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
