@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server_gui.core.desk.rings import Rings
-from server_gui.views.widgets.plot import decimated
 
 MS = 1_000_000
 
@@ -63,11 +62,3 @@ def test_memory_does_not_grow_with_time() -> None:
     for number in range(1, 2000):
         rings.take([number * 10 * MS], {"a": [0.0]})
     assert rings._values.nbytes == size
-
-
-def test_decimation_loses_no_spike() -> None:
-    values = np.zeros(10_000)
-    values[1234], values[8765] = 9.0, -7.0
-    _, y = decimated(np.arange(10_000.0), values, 600)
-    assert len(y) <= 1300
-    assert (y.max(), y.min()) == (9.0, -7.0)

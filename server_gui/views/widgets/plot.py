@@ -1,21 +1,23 @@
-"""Curves that are cheap to draw 30 times a second: thin, not antialiased, decimated, with cached axes."""
+"""A plot that is cheap to draw 30 times a second: pyqtgraph's axes, cached, around our own raster."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from server_gui.views.theme import Theme
+from server_gui.views.widgets import raster
 
 Floats = npt.NDArray[np.float64]
 SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only now and then
 MARGIN: Final = 0.06
+OLD: Final = 0.35  # opacity of what is not live
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,57 @@ class Curve:
     channel: str
     colour: str
     dashed: bool = False
+
+
+class Curves(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
+    """All lines of one plot as one picture, made anew when data, range or size have changed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._times: Floats = np.zeros(0)
+        self._values: Sequence[Floats] = ()
+        self._inks: Sequence[tuple[int, bool]] = ()
+        self._image: QImage | None = None
+        self._drawn: tuple[raster.View, float] | None = None
+
+    def set_inks(self, inks: Sequence[tuple[int, bool]]) -> None:
+        """Colours (0xAARRGGBB), and which lines are dashed."""
+        self._inks, self._times, self._values, self._drawn = inks, np.zeros(0), (), None
+        self.update()
+
+    def show_data(self, times: Floats, values: Sequence[Floats]) -> None:
+        """Draw these from now on."""
+        self._times, self._values, self._drawn = times, values, None
+        self.update()
+
+    def boundingRect(self) -> QRectF:
+        found: QRectF = self.viewRect()
+        return found
+
+    def paint(self, painter: QPainter, *_rest: Any) -> None:
+        place: QRectF = self.getViewBox().sceneBoundingRect()
+        ratio = painter.device().devicePixelRatio()
+        (left, right), (low, high) = self.getViewBox().viewRange()
+        width, height = max(1, round(place.width() * ratio)), max(1, round(place.height() * ratio))
+        view = raster.View(left, right, low, high, width, height)
+        if self._drawn != (view, ratio):
+            self._drawn = (view, ratio)
+            self._image = self._picture(view)
+            self._image.setDevicePixelRatio(ratio)
+        to_scene, _ = self.sceneTransform().inverted()
+        painter.setTransform(to_scene, True)
+        if self._image is not None:
+            painter.drawImage(place.topLeft(), self._image)
+
+    def _picture(self, view: raster.View) -> QImage:
+        pixels = np.zeros((view.height, view.width), np.uint32)
+        raster.draw(pixels, view, self._times, self._values, self._inks)
+        data = pixels.data
+        image = QImage(
+            data, view.width, view.height, 4 * view.width, QImage.Format.Format_ARGB32_Premultiplied
+        )
+        self._pixels = pixels  # the picture does not keep its memory itself
+        return image
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
@@ -39,14 +92,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         super().__init__(parent, enableMenu=False)
         self._theme = theme
         self._least = least
-        self._lines: list[pg.PlotCurveItem] = []
         self._curves: Sequence[Curve] = ()
+        self._lines = Curves()
         self._low, self._high, self._frames = 0.0, least, 0
         self.follows = True  # the range follows the data; off once somebody has zoomed
         item = self.getPlotItem()
         item.hideButtons()
         item.setContentsMargins(0, 0, 0, 0)
-        item.setClipToView(False)
+        item.addItem(self._lines, ignoreBounds=True)
         item.getViewBox().setDefaultPadding(0.0)
         item.getViewBox().setMouseEnabled(x=False, y=True)
         item.getViewBox().sigRangeChangedManually.connect(self._zoomed)
@@ -71,27 +124,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         """Which lines there are."""
         if list(curves) == list(self._curves):
             return
-        for line in self._lines:
-            self.removeItem(line)
         self._curves = tuple(curves)
-        self._lines = [pg.PlotCurveItem(skipFiniteCheck=True) for _ in curves]
-        for line in self._lines:
-            self.addItem(line, ignoreBounds=True)
         self._frames = 0
         self._restyle()
 
     def draw(self, times: Floats, columns: Sequence[Floats], *, live: bool) -> None:
         """Draw a column a curve over the times; grey where not `live`."""
-        low, high = np.inf, -np.inf
-        for line, values in zip(self._lines, columns, strict=True):
-            x, y = decimated(times, values, 2 * max(64, self.width()))
-            missing = bool(np.isnan(y).any())
-            line.setData(x, y, connect="finite" if missing else "all", skipFiniteCheck=not missing)
-            line.setOpacity(1.0 if live else 0.35)
-            if len(y) and not (missing and np.isnan(y).all()):
-                low, high = min(low, float(np.nanmin(y))), max(high, float(np.nanmax(y)))
-        if self.follows and low <= high:
-            self._follow(low, high)
+        ends = [(np.fmin.reduce(values), np.fmax.reduce(values)) for values in columns if len(values)]
+        known = [end for end in ends if end[0] <= end[1]]  # not where all are missing
+        if self.follows and known:
+            self._follow(float(min(low for low, _ in known)), float(max(high for _, high in known)))
+        self._lines.setOpacity(1.0 if live else OLD)
+        self._lines.show_data(times, columns)
 
     def follow_again(self) -> None:
         """Let the range follow the data again."""
@@ -121,24 +165,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setStyle(tickLength=-4)
             if width is not None:
                 axis.setWidth(theme.px(width))
-        for line, curve in zip(self._lines, self._curves, strict=True):
-            style = Qt.PenStyle.DashLine if curve.dashed else Qt.PenStyle.SolidLine
-            line.setPen(pg.mkPen(_colour(theme, curve.colour), width=1, style=style))
+        self._lines.set_inks([(_colour(theme, curve.colour).rgba(), curve.dashed) for curve in self._curves])
 
 
 def _colour(theme: Theme, name: str) -> QColor:
     return QColor(name) if name.startswith("#") else theme.colour(name)
-
-
-def decimated(times: Floats, values: Floats, points: int) -> tuple[Floats, Floats]:
-    """At most about `points` of them, the smallest and largest of each stretch, so that no spike is lost."""
-    count = len(values)
-    step = 2 * count // max(points, 2)
-    if step < 2:
-        return times[:count], values
-    whole = count // step * step
-    blocks = values[:whole].reshape(-1, step)
-    x = np.repeat(times[:whole:step], 2)
-    y = np.empty(2 * len(blocks))
-    y[0::2], y[1::2] = blocks.min(axis=1), blocks.max(axis=1)
-    return x, y

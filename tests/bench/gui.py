@@ -1,0 +1,203 @@
+"""`./dev bench gui`: what a frame of the window costs, beside the same curves with pyqtgraph as it comes.
+
+CPU time of this process, not wall time. Drawn offscreen by Qt's raster engine, as on a screen without OpenGL.
+"""
+
+import functools
+import os
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import count
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+import pyqtgraph as pg
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+
+from gateway.messages import StreamData
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.soles import cells_of
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.figure import Pose, StickFigure
+from server_gui.views.widgets.plot import Curve, Plot
+from server_gui.views.widgets.pressure_map import PressureMap
+from tests.gui.fakes import Bench, described, walking
+
+Floats = npt.NDArray[np.float64]
+FRAMES, WARM_UP = 45, 8
+FRAMES_PER_S = 30
+ROWS_A_FRAME = 1000 // FRAMES_PER_S  # at 1 kHz
+FEW, MANY = (6, 4, 1_000), (2, 4, 10_000)  # plots, curves in each, points in each
+SIZE = 520, 190
+COLOURS = ("left", "right", "good", "accent")
+MOST_OF_A_CORE = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table; `limit` is what `value` must not pass."""
+
+    what: str
+    value: float
+    unit: str
+    limit: float | None = None
+
+    @property
+    def text(self) -> str:
+        asked = "" if self.limit is None else f"≤ {self.limit:g}"
+        return f"{self.what:<72}{self.value:>10,.3g} {self.unit:<10}{asked}\n"
+
+
+Draw = Callable[[int], None]
+
+
+def curves(frame: int, number: int, points: int) -> tuple[Floats, Floats]:
+    """What a curve shows in a frame: it has moved on by a thirtieth of its span's second."""
+    times = np.linspace(-10.0, 0.0, points)
+    return times, np.sin(2 * np.pi * (times + frame / FRAMES_PER_S) + number) + 0.01 * np.cos(37 * times)
+
+
+def ours(theme: Theme, page: QVBoxLayout, plots: int, each: int, points: int) -> Draw:
+    """Our plots."""
+    made = [Plot(theme, 10.0) for _ in range(plots)]
+    for plot in made:
+        plot.set_curves([Curve(f"curve {number}", COLOURS[number]) for number in range(each)])
+        page.addWidget(plot)
+
+    def draw(frame: int) -> None:
+        for number, plot in enumerate(made):
+            found = [curves(frame, number * each + curve, points) for curve in range(each)]
+            plot.draw(found[0][0], [values for _, values in found], live=True)
+
+    return draw
+
+
+def plain(theme: Theme, page: QVBoxLayout, plots: int, each: int, points: int) -> Draw:
+    """The same with pyqtgraph's own defaults."""
+    made = [pg.PlotWidget() for _ in range(plots)]
+    lines = [[plot.plot(pen=theme.colour(COLOURS[number])) for number in range(each)] for plot in made]
+    for plot in made:
+        page.addWidget(plot)
+
+    def draw(frame: int) -> None:
+        for number, drawn in enumerate(lines):
+            for curve, line in enumerate(drawn):
+                line.setData(*curves(frame, number * each + curve, points))
+
+    return draw
+
+
+def maps_and_figure(theme: Theme, page: QVBoxLayout) -> Draw:
+    """Both feet and the stick figure."""
+    feet = [PressureMap(theme, side) for side in ("left", "right")]
+    for side, foot in zip(("left", "right"), feet, strict=True):
+        foot.set_cells(cells_of(16, right=side == "right"))
+        page.addWidget(foot)
+    figure = StickFigure(theme)
+    page.addWidget(figure)
+
+    def draw(frame: int) -> None:
+        phase = 2 * np.pi * frame / FRAMES_PER_S
+        pressures = [150_000.0 * max(0.0, float(np.sin(phase + cell / 5))) for cell in range(16)]
+        for foot in feet:
+            foot.show_pressures(pressures, (0.1 + 0.05 * float(np.sin(phase)), 0.0), live=True)
+        pose = Pose(0.4 * float(np.sin(phase)), 0.5 + 0.5 * float(np.cos(phase)), 0.1)
+        texts = {side: ["+12°", "+30°", "-4°"] for side in ("left", "right")}
+        figure.show_pose(dict.fromkeys(("left", "right"), pose), 0.05, frozenset(), texts, live=True)
+
+    return draw
+
+
+def ms_a_frame(make: Callable[[QVBoxLayout], Draw]) -> float:
+    """The median CPU time of a frame; what it takes to make the curves' numbers is taken off before."""
+    window = QWidget()
+    page = QVBoxLayout(window)
+    draw = make(page)
+    window.resize(SIZE[0], SIZE[1] * max(1, page.count()))
+    window.show()
+    QApplication.processEvents()
+    took = []
+    for frame in range(WARM_UP + FRAMES):
+        began = time.process_time()
+        draw(frame)
+        QApplication.processEvents()
+        took.append((time.process_time() - began) * 1e3)
+    window.close()
+    window.deleteLater()
+    return statistics.median(took[WARM_UP:])
+
+
+def making(plots: int, each: int, points: int) -> float:
+    """What the numbers alone cost, ms a frame."""
+    frames = count()
+
+    def make() -> None:
+        frame = next(frames)
+        for number in range(plots * each):
+            curves(frame, number, points)
+
+    return _median_ms(make)
+
+
+def telemetry() -> Iterator[Row]:
+    """What 1 kHz of all channels costs: decoded, and taken into rings, gait and joints."""
+    event = walking(ROWS_A_FRAME, rate_hz=1000.0)
+    batch = event.batch
+    line = msgspec.json.encode(StreamData(1, 0, 0, batch.stamps_ns, batch.columns))
+    decode = msgspec.json.Decoder(StreamData).decode
+    station = Bench(Desk()).add("robot")
+    station.take([described()])
+    events = iter([walking(ROWS_A_FRAME, rate_hz=1000.0) for _ in range(FRAMES)])
+    channels = len(batch.columns)
+    yield Row(f"telemetry, {channels} channels at 1 kHz: decode", _median_ms(lambda: decode(line)), "ms")
+    taken = _median_ms(lambda: station.take([next(events)]))
+    yield Row("telemetry: rings, gait events, joints", taken, "ms")
+
+
+def _median_ms(do: Callable[[], object]) -> float:
+    took = []
+    for _ in range(FRAMES):
+        began = time.process_time()
+        do()
+        took.append((time.process_time() - began) * 1e3)
+    return statistics.median(took)
+
+
+def rows() -> Iterator[Row]:
+    """Everything that is measured."""
+    theme = Theme(QApplication.instance() or QApplication([]))  # type: ignore[arg-type]
+    total = 0.0
+    for plots, each, points in (FEW, MANY):
+        numbers = making(plots, each, points)
+        mine, theirs = (
+            ms_a_frame(functools.partial(make, theme, plots=plots, each=each, points=points)) - numbers
+            for make in (ours, plain)
+        )
+        name = f"{plots * each} curves × {points:,} points"
+        yield Row(f"{name}, ours", mine, "ms")
+        yield Row(f"{name}, pyqtgraph's defaults", theirs, "ms")
+        yield Row(f"{name}: defaults cost", theirs / mine, "times")
+        total += mine
+    drawings = ms_a_frame(lambda page: maps_and_figure(theme, page))
+    yield Row("both pressure maps and the figure", drawings, "ms")
+    incoming = list(telemetry())
+    yield from incoming
+    everything = total + drawings + sum(row.value for row in incoming)
+    yield Row("all of it together, a frame", everything, "ms")
+    yield Row("share of one core at 30 frames a second", everything * FRAMES_PER_S / 1e3, "", MOST_OF_A_CORE)
+
+
+def main() -> int:
+    """Print the table; 1 where a limit is not kept."""
+    kept = True
+    for row in rows():
+        sys.stdout.write(row.text)
+        sys.stdout.flush()
+        kept = kept and (row.limit is None or row.value <= row.limit)
+    return 0 if kept else 1
