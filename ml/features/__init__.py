@@ -1,6 +1,7 @@
 """Features: one causal path from samples to numbers, the same live, in training and in replay.
 
-windows.py    the samples before each decision, from a recording or from a stream
+windows.py    the samples before each decision of a recording
+stream.py     the same, live
 recipe.py     what a model wants to know: rate, look-back, channels, and how its features are computed
 signals.py    signals that do not depend on how a sensor is worn
 blocks.py     signals of windows → columns
@@ -8,6 +9,6 @@ gait_status.py, gait_phase.py, falling.py, terrain.py    the recipes
 """
 
 from ml.features.recipe import Recipe, features
-from ml.features.windows import FeatureStream
+from ml.features.stream import FeatureStream
 
 __all__ = ["FeatureStream", "Recipe", "features"]

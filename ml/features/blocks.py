@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-Samples = npt.NDArray[np.float64]
+from ml.features.windows import Samples
 
 
 def flat(values: Samples) -> Samples:

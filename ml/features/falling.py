@@ -11,8 +11,7 @@ import numpy.typing as npt
 from ml.features.gait_status import QUANTITIES
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, TINY, along, length
-
-Samples = npt.NDArray[np.float64]
+from ml.features.windows import Samples
 
 RATE_HZ: Final = 50
 LOOK_BACK: Final = 75

@@ -7,14 +7,12 @@ holds for both.
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ml.features.blocks import bins, falls
 from ml.features.gait_status import CHANNELS, LOOK_BACK, RATE_HZ
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, along, length, up
-
-Samples = npt.NDArray[np.float64]
+from ml.features.windows import Samples
 
 SWAPPED: Final = [*range(6), *range(12, 18), *range(6, 12)]  # trunk, right foot, left foot
 # Seen in a mirror: what points left points right, and what turns about x or z turns the other way.

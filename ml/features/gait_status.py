@@ -6,13 +6,11 @@ Feet count without left and right, turns without their direction: a new wearer's
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ml.features.blocks import bins, flat, moments, since
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, across, along, length, up
-
-Samples = npt.NDArray[np.float64]
+from ml.features.windows import Samples
 
 RATE_HZ: Final = 100
 LOOK_BACK: Final = 200

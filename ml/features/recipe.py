@@ -7,9 +7,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.features.windows import windows
+from ml.features.windows import Samples, windows
 
-Samples = npt.NDArray[np.float64]
 Features = npt.NDArray[np.float32]
 CHUNK: Final = 256  # windows computed together: they stay in the processor's cache
 

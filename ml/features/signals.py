@@ -6,9 +6,9 @@ Arrays are (n, axes, samples) or (n, samples); a row never depends on another.
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Samples = npt.NDArray[np.float64]
+from ml.features.windows import Samples
+
 GRAVITY: Final = 9.81  # m/s²
 TINY: Final = 1e-9
 

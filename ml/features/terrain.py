@@ -6,14 +6,12 @@ It looks back 0.2 s and never at the yaw, which tells where somebody walked and 
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ml.features.blocks import flat, moments
 from ml.features.gait_status import QUANTITIES
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import length
-
-Samples = npt.NDArray[np.float64]
+from ml.features.windows import Samples
 
 RATE_HZ: Final = 50
 LOOK_BACK: Final = 11
