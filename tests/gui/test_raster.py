@@ -49,8 +49,8 @@ def test_no_spike_is_lost_among_many_points() -> None:
     values = np.zeros(50_000)
     values[12_345], values[40_001] = 0.9, -0.9
     seen = drawn(np.linspace(-10, 0, 50_000), values, VIEW)
-    assert seen[5].sum() == 1
-    assert seen[95].sum() == 1
+    assert (seen[5] != 0).sum() == 1
+    assert (seen[95] != 0).sum() == 1
 
 
 def test_what_is_missing_leaves_a_hole() -> None:
