@@ -42,6 +42,7 @@ class BlameModule:
         self._control: Mapping[int, str] = {}  # its processes
         self._bus: CanBus | None = None
         self._stopped = False
+        self._cycles = 0  # since the last look
         self._looked_ns = self._met_ns = 0
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.overruns": self._answer}
 
@@ -74,6 +75,7 @@ class BlameModule:
     def _follow(self) -> None:
         late = []
         while self._frames:
+            self._cycles += 1
             found = self._deadline.met(self._frames.popleft())
             late += [] if found is None else [found]
         now_ns = time.monotonic_ns()
@@ -81,12 +83,13 @@ class BlameModule:
             return
         before, looked_ns, new = self._look, self._looked_ns, self._meet(now_ns, because_late=bool(late))
         self._look, self._looked_ns = self._tasks.look(), now_ns
+        cycles, self._cycles = self._cycles, 0
         if late:
             before = before | self._older(new, looked_ns)
             worst = max(late, key=lambda one: one.late_ns)
-            self._put_down(worst, self._judge.late(worst, before, self._look, self._control))
+            self._put_down(worst, self._judge.late(worst, cycles, before, self._look, self._control))
         else:
-            self._judge.in_time(before, self._look, self._control)
+            self._judge.in_time(cycles, before, self._look, self._control)
 
     def _meet(self, now_ns: int, *, because_late: bool) -> Collection[Id]:
         if now_ns - self._met_ns < 1e9 * (LATE_MEET_S if because_late else MEET_S):

@@ -65,14 +65,14 @@ class Judge:
     def __init__(self) -> None:
         self._usual: deque[int] = deque(maxlen=USUAL)
 
-    def in_time(self, before: Look, after: Look, control: Collection[int]) -> None:
-        """A cycle that came in time."""
-        self._usual.append(_own(before, after, control).ran_ns)
+    def in_time(self, cycles: int, before: Look, after: Look, control: Collection[int]) -> None:
+        """So many cycles that came in time."""
+        self._usual.append(_own(before, after, control).ran_ns // cycles)
 
-    def late(self, late: Late, before: Look, after: Look, control: Collection[int]) -> Blame:
-        """One that did not. A thread that is not in `before` has begun since then."""
+    def late(self, late: Late, cycles: int, before: Look, after: Look, control: Collection[int]) -> Blame:
+        """One or more, and one of them did not. A thread that is not in `before` has begun since then."""
         own = _own(before, after, control)
-        usual_ns = sorted(self._usual)[len(self._usual) // 2] if self._usual else 0
+        usual_ns = cycles * sorted(self._usual)[len(self._usual) // 2] if self._usual else 0
         if 2 * own.waited_ns >= late.late_ns:
             reason = Reason.OTHERS
         elif 2 * (own.ran_ns - usual_ns) >= late.late_ns:

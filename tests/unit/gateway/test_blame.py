@@ -43,12 +43,12 @@ CONTROL = (40, 40)
 LATE = Late(0, 8 * MS)
 
 
-def judged(own: tuple[float, float], *, usual_ms: float = 3.0) -> Reason:
+def judged(own: tuple[float, float], *, usual_ms: float = 3.0, cycles: int = 1) -> Reason:
     judge = Judge()
     for _ in range(5):
-        judge.in_time({CONTROL: Spent(0, 0)}, {CONTROL: Spent(round(usual_ms * MS), 0)}, [40])
+        judge.in_time(2, {CONTROL: Spent(0, 0)}, {CONTROL: Spent(round(2 * usual_ms * MS), 0)}, [40])
     spent = Spent(round(own[0] * MS), round(own[1] * MS))
-    return judge.late(LATE, {CONTROL: Spent(0, 0)}, {CONTROL: spent}, [40]).reason
+    return judge.late(LATE, cycles, {CONTROL: Spent(0, 0)}, {CONTROL: spent}, [40]).reason
 
 
 def test_where_it_waited_for_a_core_others_ran() -> None:
@@ -61,6 +61,7 @@ def test_where_it_ran_longer_than_it_usually_does_it_is_its_own_work() -> None:
     assert judged((7, 0)) is Reason.OWN_WORK
     assert judged((6.9, 0)) is Reason.ASLEEP
     assert judged((11, 0), usual_ms=10) is Reason.ASLEEP
+    assert judged((11, 0), cycles=3) is Reason.ASLEEP  # as much as usual, in more than one cycle
 
 
 def test_where_it_did_neither_it_slept() -> None:
@@ -70,7 +71,7 @@ def test_where_it_did_neither_it_slept() -> None:
 def test_the_processes_come_with_the_time_of_all_their_threads_the_longest_first() -> None:
     before = {CONTROL: Spent(0, 0), (1, 1): Spent(100, 0), (2, 2): Spent(5, 0), (3, 3): Spent(9, 0)}
     after = {CONTROL: Spent(50, 0), (1, 1): Spent(103, 0), (2, 2): Spent(7, 0), (2, 21): Spent(4, 0)}
-    blame = Judge().late(LATE, before, after | {(3, 3): Spent(9, 0)}, [40])
+    blame = Judge().late(LATE, 1, before, after | {(3, 3): Spent(9, 0)}, [40])
     assert blame.others == [(2, 21, 6), (1, 1, 3)]
 
 
