@@ -1,9 +1,11 @@
 """The overview: gait phase, posture, pressure of both feet, three plots, and the joint table."""
 
+import time
 from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.soles import cells_of, layout_name
@@ -16,13 +18,14 @@ from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.colour_bar import ColourBar
+from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.gait_ring import GaitRing
 from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
 
 SECONDS: Final = 10.0
-SLOW: Final = 5  # frames between two looks at what people read
+READ_S: Final = 0.15  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLAIN: Final = ("good", "#cc79a7")  # of what belongs to no side
 # title, channels, SI unit, smallest range shown (SI)
@@ -68,7 +71,7 @@ class Overview(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._frame = 0
+        self._read_s = 0.0  # when what is read was last shown
         self._cells: tuple[int, int] | None = None
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
@@ -77,7 +80,7 @@ class Overview(QWidget):
         self._posture, self._figure = Card("Posture: hip, knee, ankle"), StickFigure(theme)
         self._posture.body.addWidget(self._figure)
         self._maps = {side: PressureMap(theme, side) for side in SIDES}
-        self._loads = {side: QLabel() for side in SIDES}
+        self._loads = {side: ElidedLabel("title") for side in SIDES}
         self._pressure = self._pressure_card()
         self._plots = [KeyPlot(desk, theme, *plot) for plot in PLOTS]
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
@@ -98,8 +101,10 @@ class Overview(QWidget):
         station = self._desk.selected
         if station is None:
             return
-        self._frame += 1
-        slow = self._frame % SLOW == 1
+        now_s = time.monotonic()
+        slow = now_s - self._read_s >= READ_S
+        if slow:
+            self._read_s = now_s
         self._refresh_status(station)
         self._refresh_posture(station, slow=slow)
         self._refresh_pressure(station, slow=slow)
@@ -123,12 +128,8 @@ class Overview(QWidget):
         for side in SIDES:
             column = QVBoxLayout()
             column.addWidget(self._maps[side], 1)
-            self._loads[side].setObjectName("title")
-            row_of_words = QHBoxLayout()
-            row_of_words.addStretch(1)
-            row_of_words.addWidget(self._loads[side])
-            row_of_words.addStretch(1)
-            column.addLayout(row_of_words)
+            self._loads[side].setAlignment(Qt.AlignmentFlag.AlignCenter)
+            column.addWidget(self._loads[side])
             row.addLayout(column, 1)
         row.addWidget(ColourBar(self._desk, self._theme))
         card.body.addLayout(row)
@@ -177,10 +178,9 @@ class Overview(QWidget):
             x, y = values.get(f"{side}_insole.cop_x"), values.get(f"{side}_insole.cop_y")
             cop = None if x is None or y is None else (x, y)
             self._maps[side].show_pressures(pressures, cop, live=live)
-            if slow:
-                force = self._desk.shown.units.unit("force", "N")
-                text = f"{side.upper()}  {force.text(values.get(f'{side}_insole.force'))} {force.symbol}"
-                set_text(self._loads[side], text)
+            force = self._desk.shown.units.unit("force", "N")
+            text = f"{side.upper()}  {force.text(values.get(f'{side}_insole.force'))} {force.symbol}"
+            set_text(self._loads[side], text)
         if slow:
             self._pressure.set_note(_layout_note(counts) if live else _old(station))
 
