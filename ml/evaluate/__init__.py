@@ -3,6 +3,7 @@
 benchmarks.py               their names, questions and goals
 status.py, phase.py, adapt.py, fall.py, terrain.py    one each
 ipol.py, sisfall.py, arrays.py    how recordings are read and checked
+strides.py                  decisions within strides, for phase.py and adapt.py
 folds.py, search.py, metrics.py   splits, tuning on training subjects alone, figures
 outcome.py, report.py       what was found, and a page about it
 """

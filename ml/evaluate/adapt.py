@@ -9,8 +9,9 @@ import numpy.typing as npt
 from ml.errors import UnusableData
 from ml.evaluate import folds, ipol, metrics
 from ml.evaluate.outcome import Outcome
-from ml.evaluate.phase import WHY, WITHIN, Decisions, decisions, errors_of, fitted, percent
+from ml.evaluate.phase import WHY, WITHIN, errors_of, fitted, percent
 from ml.evaluate.search import Search, chosen, told
+from ml.evaluate.strides import Decisions, decisions, lessons
 from ml.features.gait_status import RATE_HZ
 from ml.models.gait_phase import PhaseSettings
 
@@ -29,19 +30,24 @@ Pair = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]  # errors without
 def evaluate(path: Path, search: Search) -> Outcome:
     """Leave one subject out; his first minute adapts, his later trials judge."""
     trials = ipol.read(path)
-    data, minute = decisions(trials), _minutes(trials)
-    late = np.array(
-        [number > minute[subject] for subject, number in zip(data.subject, data.trial, strict=True)]
-    )
-    splits = [
-        split
-        for split in folds.one_left_out(data.subject)
-        if late[split[1]].any() and not late[split[1]].all()
+    taught, data, minute = lessons(trials), decisions(trials), _minutes(trials)
+    late = _late(data, minute)
+    people = [
+        person
+        for person in np.unique(data.subject).tolist()
+        if 0 < late[data.subject == person].sum() < (data.subject == person).sum()
     ]
-    if not splits:
+    if not people:
         raise UnusableData(f"{path}: nobody walks on in a later trial after {MINUTE_S:.0f} s of walking")
-    work = folds.over(lambda split: _fold(data, late, split, search), splits)
-    return _outcome(data, late, splits, [pair for pair, _ in work], told([one for _, one in work], search))
+    work = folds.over(lambda person: _fold(taught, minute, data.of(data.subject == person), search), people)
+    judged = [data.of((data.subject == person) & late) for person in people]
+    return _outcome(judged, [pair for pair, _ in work], told([one for _, one in work], search))
+
+
+def _late(data: Decisions, minute: dict[int, int]) -> npt.NDArray[np.bool_]:
+    """The decisions of trials after a subject's first minute."""
+    last = np.array([minute[person] for person in data.subject.tolist()])
+    return np.asarray(data.trial > last)
 
 
 def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
@@ -57,70 +63,46 @@ def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
 
 
 def _fold(
-    data: Decisions, late: npt.NDArray[np.bool_], split: folds.Split, search: Search
+    taught: Decisions, minute: dict[int, int], own: Decisions, search: Search
 ) -> tuple[Pair, PhaseSettings]:
-    train, held_out = split
+    others = taught.of(taught.subject != own.subject[0])
     settings = chosen(
         SETTINGS,
         GRID,
-        data.subject[train],
+        others.subject,
         search,
-        lambda one, rows, judge: _cut(data, late, train[rows], train[judge], one),
+        lambda one, rows, judge: _cut(others.of(rows), minute, others.of(judge), one),
     )
-    return _both(data, late, train, held_out, settings), settings
+    return _both(others, minute, own, settings), settings
 
 
-def _both(
-    data: Decisions,
-    late: npt.NDArray[np.bool_],
-    train: folds.Rows,
-    person: folds.Rows,
-    settings: PhaseSettings,
-) -> Pair:
-    model = fitted(data.of(train), settings)
-    early, later = data.of(person[~late[person]]), data.of(person[late[person]])
-    own = model.personal(early.features, early.phase, early.stride)
-    return errors_of(model, later), errors_of(own, later)
+def _both(others: Decisions, minute: dict[int, int], own: Decisions, settings: PhaseSettings) -> Pair:
+    model = fitted(others, settings)
+    late = _late(own, minute)
+    early, later = own.of(~late), own.of(late)
+    personal = model.personal(early.features, early.phase, early.stride)
+    return errors_of(model, later), errors_of(personal, later)
 
 
-def _cut(
-    data: Decisions,
-    late: npt.NDArray[np.bool_],
-    train: folds.Rows,
-    judge: folds.Rows,
-    settings: PhaseSettings,
-) -> float:
-    """The mean over people, for a search."""
-    pairs = [
-        _both(data, late, train, judge[data.subject[judge] == person], settings)
-        for person in np.unique(data.subject[judge])
-        if late[judge[data.subject[judge] == person]].any()
-    ]
+def _cut(others: Decisions, minute: dict[int, int], judge: Decisions, settings: PhaseSettings) -> float:
+    """For a search: how much of the error adaptation takes away, over these people."""
+    people = [judge.of(judge.subject == person) for person in np.unique(judge.subject)]
+    pairs = [_both(others, minute, own, settings) for own in people if _late(own, minute).any()]
     before, after = (np.mean([metrics.rms(pair[which]) for pair in pairs]) for which in (0, 1))
     return float(1.0 - after / before)
 
 
-def _outcome(
-    data: Decisions,
-    late: npt.NDArray[np.bool_],
-    splits: list[folds.Split],
-    pairs: list[Pair],
-    settings: str,
-) -> Outcome:
+def _outcome(judged: list[Decisions], pairs: list[Pair], settings: str) -> Outcome:
     by_subject = {}
-    for (_, person), (before, after) in zip(splits, pairs, strict=True):
-        rows = person[late[person]]
-        in_step = data.in_step[rows]
-        by_subject[str(data.subject[rows[0]])] = {
+    for own, (before, after) in zip(judged, pairs, strict=True):
+        by_subject[str(own.subject[0])] = {
             "rmse_percent": percent(before),
             "adapted_rmse_percent": percent(after),
-            "in_step_rmse_percent": percent(before[in_step]),
-            "in_step_adapted_rmse_percent": percent(after[in_step]),
+            "in_step_rmse_percent": percent(before[own.in_step]),
+            "in_step_adapted_rmse_percent": percent(after[own.in_step]),
         }
-    mean = {
-        key: float(np.nanmean([one[key] for one in by_subject.values()]))
-        for key in by_subject[min(by_subject)]
-    }
+    first = next(iter(by_subject.values()))
+    mean = {name: float(np.nanmean([one[name] for one in by_subject.values()])) for name in first}
     adapted = np.concatenate([after for _, after in pairs])
     figures = mean | {
         "adaptation_cut": 1.0 - mean["adapted_rmse_percent"] / mean["rmse_percent"],

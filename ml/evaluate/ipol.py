@@ -1,7 +1,6 @@
 """The format of IPOL 2023/497: IMUs at the low back and on both feet, walked there and back, labelled."""
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -20,6 +19,7 @@ CHANNELS: Final = tuple(
     for quantity in ("acc", "gyr")
     for axis in "xyz"
 )
+RATES: Final = [at for at, channel in enumerate(CHANNELS) if "_gyr_" in channel]
 STRIDE_S: Final = (0.7, 2.0)  # shorter and longer ones are no strides of a walk
 
 
@@ -65,8 +65,15 @@ def read(path: Path) -> list[Trial]:
     return trials
 
 
-def subjects(trials: Sequence[Trial]) -> npt.NDArray[np.int_]:
-    return np.unique([trial.subject for trial in trials])
+def stretched(trial: Trial, factor: float) -> Trial:
+    """The same walk as somebody `factor` times as slow would have walked it."""
+    rows = np.arange(int(len(trial.samples) * factor)) / factor
+    whole = np.arange(len(trial.samples))
+    samples = np.stack([np.interp(rows, whole, channel) for channel in trial.samples.T], axis=1)
+    samples[:, RATES] /= factor
+    nearest = np.minimum(np.rint(rows).astype(np.intp), len(whole) - 1)
+    left, right = (in_air[nearest] for in_air in trial.in_air)
+    return Trial(trial.subject, trial.number, samples, trial.status[nearest], (left, right))
 
 
 def strikes(in_air: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:

@@ -1,23 +1,17 @@
 """`ipol-phase`: the gait phase of both feet, of people never seen before."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ml.errors import UnusableData
 from ml.evaluate import folds, ipol, metrics
 from ml.evaluate.outcome import Outcome
 from ml.evaluate.search import Search, chosen, told
-from ml.features import Recipe, features
-from ml.features.gait_phase import LEFT_PHASE, RIGHT_PHASE
-from ml.features.gait_status import CHANNELS
+from ml.evaluate.strides import Decisions, decisions, lessons
 from ml.models.gait_phase import PhaseModel, PhaseSettings
 
-STEP: Final = 10  # samples between decisions: 100 ms
 SETTINGS: Final = PhaseSettings()
 GRID: Final = (
     SETTINGS,
@@ -25,14 +19,6 @@ GRID: Final = (
     PhaseSettings(doubtful=0.1),
     PhaseSettings(hidden=(64, 32)),
 )
-FEET: Final = tuple(
-    (recipe, CHANNELS.index(f"{side}_foot.angular_velocity_y"))
-    for side, recipe in (("left", LEFT_PHASE), ("right", RIGHT_PHASE))
-)
-SWUNG: Final = 1.5  # rad/s of pitch that a foot surely reaches in its swing
-AT_LEAST: Final = 45  # samples between two heel strikes of a foot
-LABELLED_LATER: Final = 3  # samples: the labels put the foot on the ground this much after its rate's zero
-AGREE: Final = 12  # samples that the labels and the foot's own signal may lie apart
 WITHIN: Final = 0.05  # of a cycle: what `accuracy` counts as right
 WHY: Final = (
     "The labels of some trials drift away from the sensors' samples, up to two seconds within a walk. "
@@ -41,110 +27,33 @@ WHY: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Decisions:
-    """Every decision within a stride, of both feet; arrays have a row each."""
-
-    features: npt.NDArray[np.float32]
-    phase: npt.NDArray[np.float64]
-    stride: npt.NDArray[np.int_]  # a number of its own for each stride
-    in_step: npt.NDArray[np.bool_]  # whether the foot's own signal strikes where the labels say
-    hindsight: npt.NDArray[np.float64]  # the phase by the strikes in the foot's own signal; NaN without any
-    subject: npt.NDArray[np.int_]
-    trial: npt.NDArray[np.int_]
-
-    def of(self, rows: npt.NDArray[Any]) -> "Decisions":
-        return Decisions(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-
-def decisions(trials: Sequence[ipol.Trial]) -> Decisions:
-    """Read every trial's strides.
-
-    Raises:
-        UnusableData: there is none of which to learn.
-
-    """
-    parts = [part for trial in trials for part in _of_trial(trial) if len(part[0])]
-    if len({part[-2][0] for part in parts}) < 2:
-        raise UnusableData("fewer than two subjects have strides of 0.7 to 2.0 s: nothing can be learned")
-    columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    columns[2] = _apart([part[2] for part in parts])
-    return Decisions(*columns)
-
-
-def _apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
-    """Numbers counted on from list to list, so that no two lists share one."""
-    sizes = [int(own.max()) + 1 for own in numbers]
-    offsets = np.cumsum([0, *sizes[:-1]])
-    return np.concatenate([own + offset for own, offset in zip(numbers, offsets, strict=True)])
-
-
-def _of_trial(trial: ipol.Trial) -> Iterator[tuple[Any, ...]]:
-    for (recipe, pitch), in_air in zip(FEET, trial.in_air, strict=True):
-        yield _of_foot(trial, recipe, trial.samples[:, pitch], in_air)
-
-
-def _of_foot(
-    trial: ipol.Trial, recipe: Recipe, pitch: npt.NDArray[np.float64], in_air: npt.NDArray[np.bool_]
-) -> tuple[Any, ...]:
-    labelled, own = ipol.strikes(in_air), heel_strikes(pitch) + LABELLED_LATER
-    phase = ipol.phase(labelled, len(in_air))
-    ends = np.arange(0, len(phase), STEP)
-    ends = ends[~np.isnan(phase[ends])]
-    stride = np.searchsorted(labelled, ends, side="right")
-    agrees = np.zeros(len(labelled) + 1, dtype=bool)
-    if len(own):
-        agrees[:-1] = np.abs(labelled[:, None] - own).min(axis=1) <= AGREE
-    return (
-        features(recipe, trial.samples, ends),
-        phase[ends],
-        stride,
-        agrees[stride - 1] & agrees[stride],
-        ipol.phase(own, len(in_air))[ends],
-        np.full(len(ends), trial.subject),
-        np.full(len(ends), trial.number),
-    )
-
-
-def heel_strikes(pitch: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
-    """Where a foot's pitch rate falls through zero after a swing; with hindsight, for judging labels."""
-    smooth = np.convolve(pitch, np.ones(3) / 3.0, mode="same")
-    falling = np.flatnonzero((smooth[:-1] > 0) & (smooth[1:] <= 0)) + 1
-    found: list[int] = []
-    begin = 0
-    for at in falling.tolist():
-        if smooth[begin:at].max() > SWUNG and (not found or at - found[-1] >= AT_LEAST):
-            found.append(at)
-        begin = at
-    return np.array(found, dtype=np.intp)
-
-
 def evaluate(path: Path, search: Search) -> Outcome:
     """Leave one subject out, and judge by subjects."""
-    data = decisions(ipol.read(path))
-    splits = list(folds.one_left_out(data.subject))
-    work = folds.over(lambda split: _fold(data, split, search), splits)
+    trials = ipol.read(path)
+    taught, data = lessons(trials), decisions(trials)
+    people = np.unique(data.subject).tolist()
+    work = folds.over(lambda person: _fold(taught, data, person, search), people)
     error = np.empty(len(data.phase))
-    for (_, held_out), (errors, _) in zip(splits, work, strict=True):
-        error[held_out] = errors
+    for person, (errors, _) in zip(people, work, strict=True):
+        error[data.subject == person] = errors
     return _outcome(data, error, told([settings for _, settings in work], search))
 
 
 def _fold(
-    data: Decisions, split: folds.Split, search: Search
+    taught: Decisions, data: Decisions, person: int, search: Search
 ) -> tuple[npt.NDArray[np.float64], PhaseSettings]:
-    train, held_out = (data.of(rows) for rows in split)
+    others = taught.of(taught.subject != person)
     settings = chosen(
         SETTINGS,
         GRID,
-        train.subject,
+        others.subject,
         search,
-        lambda one, rows, judge: -metrics.rms(errors_of(fitted(train.of(rows), one), train.of(judge))),
+        lambda one, rows, judge: -metrics.rms(errors_of(fitted(others.of(rows), one), others.of(judge))),
     )
-    return errors_of(fitted(train, settings), held_out), settings
+    return errors_of(fitted(others, settings), data.of(data.subject == person)), settings
 
 
-def fitted(data: Decisions, settings: PhaseSettings = SETTINGS) -> PhaseModel:
+def fitted(data: Decisions, settings: PhaseSettings) -> PhaseModel:
     return PhaseModel(settings).fit(data.features, data.phase, data.stride)
 
 

@@ -25,8 +25,8 @@ class PhaseSettings:
     hidden: tuple[int, int] = (96, 48)
     penalty: float = 1e-3
     networks: int = 2
-    first_epochs: int = 8  # on every stride
-    epochs: int = 12  # on those that are not doubtful
+    first_epochs: int = 5  # on every stride
+    epochs: int = 8  # on those that are not doubtful
     doubtful: float = 0.15  # cycles: a stride with a larger mean error is not believed
     personal_epochs: int = 20
     general_share: float = 0.5  # of samples of other people beside each personal one

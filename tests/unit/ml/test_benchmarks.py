@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ml.errors import UnusableData
-from ml.evaluate import BENCHMARKS, adapt, fall, ipol, metrics, phase
+from ml.evaluate import BENCHMARKS, adapt, fall, ipol, metrics, phase, strides
 from ml.evaluate.sisfall import Recording
 from ml.models.falling import FallSettings
 from ml.models.gait_phase import PhaseSettings
@@ -69,7 +69,7 @@ def test_labels_that_drift_away_are_told_by_the_feet_themselves(tmp_path: Path) 
     drifts = (arrays["subject"] == 1) & (arrays["trial"] == 1)
     for side in ("left_event", "right_event"):
         arrays[side][drifts] = np.roll(arrays[side][drifts], 35)
-    data = phase.decisions(ipol.read(saved(tmp_path / "gait.npz", arrays)))
+    data = strides.decisions(ipol.read(saved(tmp_path / "gait.npz", arrays)))
     drifts = (data.subject == 1) & (data.trial == 1)
     assert not data.in_step[drifts].any()
     assert data.in_step[~drifts].mean() > 0.85

@@ -5,8 +5,8 @@ import pytest
 
 from ml.evaluate import folds, ipol, metrics
 from ml.evaluate.outcome import Goal
-from ml.evaluate.phase import heel_strikes
 from ml.evaluate.search import chosen, told
+from ml.evaluate.strides import heel_strikes
 from tests.unit.ml import recordings
 
 PEOPLE = np.array([1, 1, 2, 2, 2, 3, 4, 4, 5])
