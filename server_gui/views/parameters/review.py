@@ -70,7 +70,6 @@ class Review(QWidget):
         self.seconds.setRange(5, 300)
         self.seconds.setValue(TRIAL_S)
         self.seconds.setSuffix(" s")
-        self.seconds.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         self.seconds.setAccessibleName("Length of the trial")
         self.seconds.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.try_it = QPushButton("Try it for")

@@ -1,0 +1,104 @@
+"""The whole window on a gateway over TCP: it follows, writes, stops, and lets go of everything at its end."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from server_gui.app import FOLLOWING, App
+from server_gui.core.desk.stopping import StopState
+from server_gui.core.desk.writing import WriteState
+from server_gui.core.settings import ServerSettings, add_robots
+from tests.fake_robot import FakeRobot
+
+WITHIN_S = 30.0
+
+
+@pytest.fixture
+def robot() -> Iterator[FakeRobot]:
+    with FakeRobot() as made:
+        yield made
+
+
+@pytest.fixture
+def app(qt: QApplication, robot: FakeRobot, tmp_path: Path) -> Iterator[App]:
+    settings = add_robots(ServerSettings(), {"exo-01": robot.address})
+    kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
+    with App(qt, settings, kept, FOLLOWING) as made:
+        made.window.show()
+        wait(lambda: bool(made.desk.stations[0].robot.parameters), "read the parameters")
+        yield made
+        made.window.hide()
+
+
+def wait(so: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + WITHIN_S
+    while not so():
+        assert time.monotonic() < deadline, f"never {what}"
+        QTest.qWait(10)
+
+
+def test_a_value_goes_from_the_table_to_the_robot_on_trial_and_back(app: App, robot: FakeRobot) -> None:
+    station = app.desk.stations[0]
+    wait(lambda: not station.robot.is_stale(), "saw live data")
+    app.window.parameters.stage_text("gait.step_length", "430")
+    app.window.parameters.begin_review()
+    wait(app.window.parameters.review.try_it.isEnabled, "let it be tried")
+    QTest.mouseClick(app.window.parameters.review.try_it, Qt.MouseButton.LeftButton)
+    wait(lambda: station.writing.trial is not None, "was on trial")
+    assert robot.called("parameter.write") == [{"changes": {"gait.step_length": 0.43}, "trial_s": 30.0}]
+    wait(lambda: station.robot.parameters["gait.step_length"].value == 0.43, "saw the new value")
+    station.end_trial()
+    wait(lambda: station.writing.trial is None, "went back")
+    assert robot.parameters["gait.step_length"] == 0.4
+
+
+def test_stop_is_confirmed_by_the_robot_and_not_confirmed_without_one(app: App, robot: FakeRobot) -> None:
+    station = app.desk.stations[0]
+    QTest.mousePress(app.window.header.stop, Qt.MouseButton.LeftButton)
+    wait(lambda: station.stopping.state is StopState.CONFIRMED, "confirmed the stop")
+    robot.refuse()
+    wait(lambda: not station.is_linked, "lost the link")
+    app.stop("test")
+    wait(lambda: station.stopping.state is StopState.NOT_CONFIRMED, "said that it was not confirmed")
+
+
+def test_a_robot_that_comes_back_is_followed_again_and_control_was_lost(app: App, robot: FakeRobot) -> None:
+    station = app.desk.stations[0]
+    station.take_control()
+    wait(lambda: station.control.left_s() is not None, "had control")
+    robot.refuse()
+    wait(lambda: not station.is_linked and station.robot.is_stale(), "was stale")
+    assert station.control.left_s() is None
+    robot.listen()
+    wait(lambda: station.is_linked and not station.robot.is_stale(), "was live again")
+
+
+def test_a_refused_write_leaves_the_robot_as_it_is(app: App, robot: FakeRobot) -> None:
+    station = app.desk.stations[0]
+    station.edits.stage("gait.step_length", 9.0, station.robot.parameters["gait.step_length"])
+    station.write(station.difference(app.desk.shown.units))
+    wait(lambda: station.writing.state is WriteState.FAILED, "was refused")
+    assert "above 0.6" in station.writing.text
+    assert robot.parameters["gait.step_length"] == 0.4
+
+
+def test_processes_are_asked_for_only_while_they_are_looked_at(app: App, robot: FakeRobot) -> None:
+    asked = [params for params in robot.called("resource.snapshot") if params.get("processes", True)]
+    assert asked == []
+    app.window.tabs.setCurrentIndex(2)
+    wait(lambda: app.window.resources.table.processes.rowCount() == 12, "showed the processes")
+
+
+def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> None:
+    with FakeRobot() as other:
+        app.window.added.emit(other.address)
+        wait(lambda: app.desk.stations[1].is_linked, "followed the other")
+        assert app.desk.selected is app.desk.stations[0]
+        other.refuse()
+        wait(lambda: not app.desk.stations[1].is_linked, "lost the other")
+        assert app.desk.stations[0].is_linked
