@@ -17,6 +17,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
     "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),
     "cost": ("gateway.cli.cost:main", "what monitoring costs the robot, and who causes it"),
+    "bench": ("gateway.cli.bench:main", "measure a robot's gateway: latency, CPU and memory of what it does"),
     "blame": ("gateway.cli.blame:main", "when the control loop is late, and who ran instead"),
     "watch": ("gateway.cli.watch:main", "follow channels live"),
     "get": ("gateway.cli.parameters:get", "read parameters from the devices"),

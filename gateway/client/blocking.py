@@ -8,6 +8,7 @@ from typing import Any, Self, TypeVar
 
 from gateway.client.address import Address
 from gateway.client.client import Client
+from gateway.client.clock import ClockOffset
 from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
 from gateway.messages import (
@@ -76,6 +77,11 @@ class Robot:
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join()
             self._loop.close()
+
+    @property
+    def clock_offset(self) -> ClockOffset | None:
+        """The robot's monotonic clock minus ours; None before the first exchange."""
+        return self._client.link.clock.offset
 
     def describe(self) -> Description:
         """What the robot is made of."""
