@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from typing import Final
 
+from msgspec.structs import replace
+
 from gateway.client import ConnectionState
 from gateway.messages import Lease, ParameterInfo, ResourceSnapshot, Stopped, Written
 from server_gui.core.desk.answers import Deliver, Result, when_done
@@ -75,6 +77,9 @@ class Station:
     def take(self, events: Iterable[Event]) -> None:
         """Apply what has come, and look for what is new."""
         for event in events:
+            if isinstance(event, Resources) and isinstance(event.snapshot.processes, list):
+                self._processes(event)
+                continue
             self.robot.apply(event)
             match event:
                 case Telemetry():
@@ -82,7 +87,7 @@ class Station:
                 case Described():
                     self._described(event)
                 case Resources():
-                    self._resources(event)
+                    self.computer.take(event.snapshot)
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
@@ -105,10 +110,12 @@ class Station:
         if gone:
             self.tell(NewsKind.WARNING, f"staged edits dropped, the robot no longer has {', '.join(gone)}")
 
-    def _resources(self, event: Resources) -> None:
-        if isinstance(event.snapshot.processes, list):
-            self.processes, self.processes_at_ns = event.snapshot, event.at_ns
-        self.computer.take(event.snapshot)
+    def _processes(self, event: Resources) -> None:
+        """A look at the process table; of CPU and memory the other looks tell, over their own periods."""
+        self.processes, self.processes_at_ns = event.snapshot, event.at_ns
+        seen = self.robot.resources
+        if seen is not None:
+            self.computer.take(replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway))
 
     # --- STOP and reset
 

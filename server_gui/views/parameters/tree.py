@@ -232,8 +232,8 @@ class ParameterTree(QTreeView):
 
 def range_text(info: ParameterInfo, unit: Unit) -> str:
     """The smallest and largest that are allowed."""
-    low = "" if info.min is None else unit.text(info.min)
-    high = "" if info.max is None else unit.text(info.max)
+    low = "" if info.min is None else brief(unit, info.min)
+    high = "" if info.max is None else brief(unit, info.max)
     return f"{low} … {high}" if low or high else "–"
 
 
