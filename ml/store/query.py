@@ -2,9 +2,11 @@
 
 import contextlib
 import re
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import duckdb
 import pyarrow as pa
@@ -14,7 +16,9 @@ from ml.store.errors import StoreError, translated
 from ml.store.store import Store
 from ml.store.tables import TABLES
 
+Found = TypeVar("Found")
 BATCH_ROWS: Final = 50_000
+AGAIN_S: Final = 0.1  # between looks whether it has ended, and attempts to interrupt it
 _CLOSED: Final[dict[str, str | bool | int | float | list[str]]] = {
     "enable_external_access": "false",  # no file, no network, no extension
     "autoinstall_known_extensions": "false",
@@ -63,12 +67,35 @@ def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
         for setting in _SETTINGS:
             connection.execute(f"SET {setting}")
         with _said(store):
-            reader = _run(connection, sql)
+            reader = _run(connection, lambda: _found(connection, sql))
         with contextlib.closing(reader):
-            yield Result(reader.schema, _read(reader, store))
+            yield Result(reader.schema, _read(reader, connection, store))
 
 
-def _run(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.RecordBatchReader:
+def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Found:
+    """What may take long, in a thread, so that Ctrl-C ends it."""
+    outcome: Future[Found] = Future()
+    thread = threading.Thread(target=_settle, args=(outcome, work), name="query")
+    thread.start()
+    try:
+        while not outcome.done():  # Ctrl-C just before a wait without end would be lost
+            wait([outcome], AGAIN_S)
+    finally:
+        while not outcome.done():
+            connection.interrupt()
+            wait([outcome], AGAIN_S)
+        thread.join()
+    return outcome.result()
+
+
+def _settle(outcome: "Future[Found]", work: Callable[[], Found]) -> None:
+    try:
+        outcome.set_result(work())
+    except BaseException as error:  # noqa: BLE001 - whatever it is, who waits for it gets it
+        outcome.set_exception(error)
+
+
+def _found(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.RecordBatchReader:
     try:
         return connection.sql(sql).to_arrow_reader(BATCH_ROWS)
     except (duckdb.BinderException, duckdb.CatalogException):
@@ -86,11 +113,13 @@ def _is(column: str, value: str) -> str:
     return "{} = '{}'".format(column, value.replace("'", "''"))
 
 
-def _read(reader: pa.RecordBatchReader, store: Store) -> Iterator[pa.RecordBatch]:
+def _read(
+    reader: pa.RecordBatchReader, connection: duckdb.DuckDBPyConnection, store: Store
+) -> Iterator[pa.RecordBatch]:
     while True:
         try:
             with _said(store):
-                batch = reader.read_next_batch()
+                batch = _run(connection, reader.read_next_batch)
         except StopIteration:
             return
         yield batch

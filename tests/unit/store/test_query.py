@@ -1,6 +1,10 @@
 """SQL over a store: every table is one view, only what is needed is read, and nothing but the tables is."""
 
 import datetime
+import os
+import signal
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -158,6 +162,23 @@ def test_a_robots_name_cannot_leave_its_quotes(folder_url: str) -> None:
     store.append(EVENTS, "events", data.schema, data.to_reader, "spool-a", 1)
     assert [row["robot"] for row in ask(store, "SELECT robot FROM events", "o'hara")] == ["o'hara"]
     assert ask(store, "SELECT robot FROM events", "' OR '1'='1") == []
+
+
+def test_ctrl_c_ends_a_query_that_takes_long(folder_url: str) -> None:
+    def runs() -> bool:
+        return any(thread.name == "query" and thread.is_alive() for thread in threading.enumerate())
+
+    def press() -> None:
+        while not runs():
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    presser = threading.Thread(target=press)
+    presser.start()
+    with pytest.raises(KeyboardInterrupt):
+        ask(Store(folder_url), "SELECT count(*) FROM range(100000000000) numbers(n) WHERE n % 7 = 3")
+    presser.join()
+    assert not runs()
 
 
 def test_python_reads_no_file_for_arrow(store_url: str) -> None:
