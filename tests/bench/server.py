@@ -126,9 +126,9 @@ def fleet(folder: Path) -> Iterator[Row]:
     yield Row(what, cost["cores"], "cores", MOST_CORES, True)
     yield Row("  rows lost", cost["lost"], "", 0, True)
     found = _fleet.memory(ROBOTS)
-    what = f"{_fleet.SIMULATED_S:g} s of {ROBOTS} robots' time: memory in its second half ÷ before"
+    what = f"{_fleet.COLLECT_S:g} s of {ROBOTS} robots: memory in the second half ÷ in the quarter before"
     yield Row(what, found["second"] / found["first"], "", MOST_GROWTH, True)
-    yield Row("  peak", found["peak"], "MB")
+    yield Row("  memory", found["second"], "MB")
     yield Row("  rows lost", found["lost"], "", 0, True)
 
 
