@@ -15,7 +15,7 @@ from server_gui.core.desk.writing import WriteState
 from server_gui.core.settings import ServerSettings, add_robots
 from tests.fake_robot import FakeRobot
 
-WITHIN_S = 30.0
+WITHIN_S = 50.0
 
 
 @pytest.fixture
@@ -102,3 +102,17 @@ def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> N
         other.refuse()
         wait(lambda: not app.desk.stations[1].is_linked, "lost the other")
         assert app.desk.stations[0].is_linked
+
+
+@pytest.mark.timeout(120)
+def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplication, tmp_path: Path) -> None:
+    kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
+    with App(qt, ServerSettings(), kept, FOLLOWING) as app:
+        app.window.show()
+        wait(app.window.empty.isVisible, "offered it")
+        app.window.empty.start.click()
+        wait(lambda: app.desk.selected is not None, "started it")
+        station = app.desk.stations[0]
+        wait(lambda: station.title == "simulated-exo" and not station.robot.is_stale(), "was live")
+        wait(lambda: station.components.shown().gait.walking, "walked")
+        app.window.hide()
