@@ -1,7 +1,7 @@
 """What collecting a fleet costs: a collector in a process of its own, and its robots in another.
 
-`GWRMS_COLLECT_S` is for how long memory is watched: 3600 for an hour. Robots that send faster than in real time
-would show how much waits, not how much is kept.
+`GWRMS_COLLECT_S` is for how long memory is watched: 3600 for an hour. Robots faster than real time would show
+how much waits, not how much is kept.
 """
 
 import gc
@@ -19,7 +19,7 @@ from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSet
 RATE_HZ, CHANNELS = 100, 60
 WARM_S, MEASURE_S = 3.0, 20.0
 OFTEN_S = 2.0  # between uploads: thirty times as many as usual
-COLLECT_S = float(os.environ.get("GWRMS_COLLECT_S", "40"))
+COLLECT_S = float(os.environ.get("GWRMS_COLLECT_S", "60"))
 LOOK_S = 0.2
 
 
