@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from gateway.client import Batch, ClockOffset, ConnectionState
 from gateway.messages import (
     Description,
+    GatewayCost,
     JournalEntries,
     ParameterValues,
     ResourceSnapshot,
@@ -81,6 +82,13 @@ class Changed:
 
 
 @dataclass(frozen=True, slots=True)
+class Costs:
+    """What monitoring costs the robot, client by client."""
+
+    cost: GatewayCost
+
+
+@dataclass(frozen=True, slots=True)
 class StopAnswered:
     """What the drives said to a stop."""
 
@@ -96,5 +104,14 @@ class Failed:
 
 
 Event = (
-    LinkChanged | Described | Telemetry | Looked | Resources | Journalled | Changed | StopAnswered | Failed
+    LinkChanged
+    | Described
+    | Telemetry
+    | Looked
+    | Resources
+    | Costs
+    | Journalled
+    | Changed
+    | StopAnswered
+    | Failed
 )

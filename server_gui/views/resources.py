@@ -7,7 +7,7 @@ import msgspec
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
-from gateway.messages import ResourceSnapshot
+from gateway.messages import GatewayCost, ResourceSnapshot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.resource import SERIES
@@ -20,8 +20,10 @@ from server_gui.views.widgets.plot import Curve, Plot
 SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest that holds what there is
 GIB: Final = 1 << 30
 MIB: Final = 1 << 20
+KIB: Final = 1 << 10
 OLD_S: Final = 5.0
 SLOW: Final = 6  # frames between two looks
+CLIENTS: Final = 4  # those that cost the most
 
 
 class Resources(QWidget):
@@ -40,9 +42,9 @@ class Resources(QWidget):
         self._cards = {name: Card(name) for name in ("CPU", "Memory", "Computer")}
         self._cards["CPU"].body.addWidget(self._cpu)
         self._cards["Memory"].body.addWidget(self._memory)
-        self._facts = QLabel()
-        self._facts.setWordWrap(True)
-        self._cards["Computer"].body.addWidget(self._facts)
+        self.facts = QLabel()
+        self.facts.setWordWrap(True)
+        self._cards["Computer"].body.addWidget(self.facts)
         self._cards["Computer"].body.addStretch(1)
         self.table = ProcessTable(theme)
         self.words = QLineEdit()
@@ -118,7 +120,7 @@ class Resources(QWidget):
     def _refresh_facts(self, station: Station) -> None:
         seen = station.robot.resources
         if seen is None:
-            set_text(self._facts, "The robot has not been asked yet, or has not answered.")
+            set_text(self.facts, "The robot has not been asked yet, or has not answered.")
             return
         age_s = _age_s(station.robot.resources_at_ns)
         old = f"STALE, {age_text(age_s)} old · " if _is_old(station) else ""
@@ -132,7 +134,7 @@ class Resources(QWidget):
         self._cards["Memory"].set_note(
             f"{old}{share:.0f} % · {memory.used / GIB:.2f} of {memory.total / GIB:.1f} GiB, in MiB"
         )
-        set_text(self._facts, _facts(station, seen))
+        set_text(self.facts, _facts(station, seen))
 
 
 def _facts(station: Station, seen: ResourceSnapshot) -> str:
@@ -142,10 +144,26 @@ def _facts(station: Station, seen: ResourceSnapshot) -> str:
     if table is not None and not isinstance(table.thermal, msgspec.UnsetType):
         known = [f"{name} {value:.0f} °C" for name, value in table.thermal.items() if value is not None]
         lines.append(f"Temperatures: {', '.join(known) or 'this computer tells none'}")
+    lines += _costs(station.cost)
     if seen.memory.swap_used:
         lines.append(f"Swapped out: {seen.memory.swap_used / MIB:.0f} MiB")
     lines += [f"▲ {leak.text}" for leak in station.computer.leaks()]
     return "\n".join(lines)
+
+
+def _costs(cost: GatewayCost | None) -> list[str]:
+    """Who causes what the gateway takes, the most first."""
+    if cost is None or cost.wake_ups_per_s is None:
+        return []
+    lines = [f"Monitoring wakes the computer {cost.wake_ups_per_s:.0f} times a second; for"]
+    known = [one for one in cost.clients if one.cpu_percent is not None]
+    clients = sorted(known, key=lambda one: -(one.cpu_percent or 0.0))
+    for one in clients[:CLIENTS]:
+        sent_bytes = one.sent_bytes_per_s or 0.0
+        lines.append(f"   {one.who}: {one.cpu_percent or 0.0:.1f} % of a core, {sent_bytes / KIB:.0f} KiB/s")
+    if cost.budget is not None and cost.budget.shed > 1:
+        lines.append(f"▲ To keep to its budget the robot sends one row of {cost.budget.shed}")
+    return lines
 
 
 def _age_s(at_ns: int | None) -> float | None:

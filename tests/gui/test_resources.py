@@ -1,11 +1,14 @@
 """Resources: asked for only while they are looked at; the table keeps what people have done to it."""
 
+import time
 from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
 
-from gateway.messages import ProcessUse
+from gateway.client import ConnectionState
+from gateway.messages import BudgetInfo, ClientCost, GatewayCost, ProcessUse
+from server_gui.core.events import Costs, LinkChanged
 from server_gui.views.processes import CPU, MEMORY, NAME
 from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
@@ -78,6 +81,28 @@ def test_a_look_keeps_the_selected_process_wherever_it_goes(view: Resources, ben
 def test_a_pid_that_another_program_has_now_is_another_row(view: Resources, bench: Bench) -> None:
     show(view, bench, use("old", 7, 1.0))
     assert show(view, bench, use("new", 7, 1.0)) == ["new"]
+
+
+def test_who_causes_what_monitoring_costs_is_told_until_the_link_drops(view: Resources, bench: Bench) -> None:
+    clients = [client("watch", 1.5), client("gwrms gui", 3.25), client("new", None)]
+    cost = GatewayCost(0, 5.0, 20 << 20, 3, 410.2, {}, {}, clients, BudgetInfo(8.0, 4))
+    bench.station.take([resources(), Costs(cost)])
+    show(view, bench, use("python3", 7, 1.0))
+    told = view.facts.text().splitlines()
+    at = told.index("Monitoring wakes the computer 410 times a second; for")
+    assert told[at + 1 : at + 3] == [
+        "   gwrms gui: 3.2 % of a core, 12 KiB/s",
+        "   watch: 1.5 % of a core, 12 KiB/s",
+    ]
+    assert told[at + 3] == "▲ To keep to its budget the robot sends one row of 4"
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "no route", time.monotonic_ns())])
+    show(view, bench, use("python3", 7, 1.0))
+    assert "Monitoring" not in view.facts.text()
+
+
+def client(who: str, cpu_percent: float | None) -> ClientCost:
+    rate = None if cpu_percent is None else 12288.0
+    return ClientCost(who, cpu_percent, rate, rate, rate, 0, [])
 
 
 def test_a_first_look_has_no_percentages_and_says_so(view: Resources, bench: Bench) -> None:

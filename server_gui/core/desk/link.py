@@ -1,6 +1,7 @@
 """Commands to one robot over a link of its own: no telemetry is ever before a STOP."""
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -16,7 +17,7 @@ from gateway.messages import (
     Stopped,
     Written,
 )
-from server_gui.core.events import Failed, Resources
+from server_gui.core.events import Costs, Failed, Resources
 from server_gui.core.feed import Tell
 from server_gui.core.network import Network
 
@@ -28,8 +29,8 @@ PROCESSES: Final = ResourceSnapshotParams(include=["thermal"])
 class Link:
     """One robot's commands; `run` keeps the link until it is cancelled. Implements `Commands`.
 
-    `tell` gets the process table while it is wanted, `dropped` is called when the link has gone, and with it
-    the lease: both in the network's thread.
+    `tell` gets the process table, and what monitoring costs, while that is wanted; `dropped` is called when
+    the link has gone, and with it the lease: both in the network's thread.
     """
 
     def __init__(self, network: Network, address: Address, tell: Tell, dropped: Callable[[], None]) -> None:
@@ -100,6 +101,8 @@ class Link:
                 self._tell(Failed("the process table", str(error)))
             return
         self._tell(Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns()))
+        with contextlib.suppress(ClientError):  # an older gateway does not know it
+            self._tell(Costs(await self._client.cost()))
 
     def _state_changed(self, state: ConnectionState) -> None:
         if state in (ConnectionState.WAITING, ConnectionState.CLOSED):

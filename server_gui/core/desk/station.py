@@ -8,7 +8,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
-from gateway.messages import Lease, ParameterInfo, ResourceSnapshot, Stopped, Written
+from gateway.messages import GatewayCost, Lease, ParameterInfo, ResourceSnapshot, Stopped, Written
 from server_gui.core.desk.answers import Deliver, Result, when_done
 from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.control import Control
@@ -19,7 +19,7 @@ from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.stopping import Stopping
 from server_gui.core.desk.watch import Watch
 from server_gui.core.desk.writing import WriteState, Writing
-from server_gui.core.events import Described, Event, Resources, Telemetry
+from server_gui.core.events import Costs, Described, Event, LinkChanged, Resources, Telemetry
 from server_gui.core.processing.component import ComponentProcessing
 from server_gui.core.processing.resource import ResourceProcessing
 from server_gui.core.processing.units import Units
@@ -41,6 +41,7 @@ class Station:
         self.computer = ResourceProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
+        self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.stopping = Stopping()
         self.control = Control()
         self.edits = Edits()
@@ -86,6 +87,10 @@ class Station:
                     self._telemetry(event)
                 case Described():
                     self._described(event)
+                case Costs():
+                    self.cost = event.cost
+                case LinkChanged():
+                    self.cost = None  # it was of the link that there was
                 case Resources():
                     self.computer.take(event.snapshot)
         now_ns = time.monotonic_ns()
