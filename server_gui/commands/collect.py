@@ -52,10 +52,11 @@ the server's file (without --config: ~/.config/gwrms/server.toml, if it is there
 examples
   gwrms collect --robot exo-01=192.0.2.7:7420 --operator Ada --notes "new insoles"
   gwrms collect --status
+  gwrms collect --mark "stairs, second try"
   gwrms collect --unit | sudo tee /etc/systemd/system/gwrms-collect.service
 
 exit status
-  0 ended as asked, or a collector has answered --status or --upload; 1 it cannot record, or nobody answers;
+  0 ended as asked, or a collector has answered; 1 it cannot record, or nobody answers;
   2 usage"""
 
 
@@ -71,6 +72,9 @@ def main(argv: list[str]) -> int:
         return _status(spool, as_json=arguments.json)
     if arguments.upload:
         say(f"the collector uploads; batches that wait: {ask(spool, 'upload').decode()}")
+        return 0
+    if arguments.mark is not None:
+        say(f"marked in the recordings of {ask(spool, 'mark', arguments.mark).decode().strip()} robots\n")
         return 0
     if not settings.robots:
         file = arguments.config or default_file()
@@ -174,6 +178,9 @@ def _parser() -> argparse.ArgumentParser:
     asking = parser.add_mutually_exclusive_group()
     asking.add_argument("--status", action="store_true", help="ask the collector that runs how it goes")
     asking.add_argument("--upload", action="store_true", help="tell it to upload what waits, now")
+    asking.add_argument(
+        "--mark", metavar="TEXT", help="tell it to mark this instant in every robot's recording"
+    )
     asking.add_argument("--unit", action="store_true", help="print a systemd unit for this installation")
     parser.add_argument("--json", action="store_true", help="with --status: one JSON object, for machines")
     return parser

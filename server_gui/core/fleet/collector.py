@@ -89,10 +89,10 @@ class Collector:
         return self._network.run(self._told()).result()
 
     async def _told(self) -> CollectorReport:
-        return self._report()
+        return self._report("")
 
     async def _run(self) -> None:
-        answers = {"status": self._report, "upload": self._upload}
+        answers = {"status": self._report, "upload": self._upload, "mark": self._mark}
         async with door(self._spool.folder, answers):
             await self._fleet.run()
 
@@ -108,12 +108,18 @@ class Collector:
                 quiet = newest_ns is None or time.monotonic_ns() - newest_ns > QUIET_S * 1e9
                 return quiet or self._uploader.state.backlog_bytes > MOST_BACKLOG_BYTES
 
-    def _upload(self) -> int:
+    def _mark(self, text: str) -> int:
+        """Mark this instant in the recording of every robot; how many there are."""
+        for name in self._settings.robots:
+            self._recorder.mark(name, text)
+        return len(self._settings.robots)
+
+    def _upload(self, _text: str) -> int:
         """Begin to upload; how many batches wait."""
         self._uploader.now()
         return len(self._spool.waiting())
 
-    def _report(self) -> CollectorReport:
+    def _report(self, _text: str) -> CollectorReport:
         settings = self._settings
         return CollectorReport(
             version=importlib.metadata.version("gwrms"),

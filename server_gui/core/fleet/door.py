@@ -13,7 +13,7 @@ import msgspec
 NAME: Final = "collector"
 ANSWER_S: Final = 5.0
 
-Answers = Mapping[str, Callable[[], object]]
+Answers = Mapping[str, Callable[[str], object]]
 
 
 class NobodyCollects(Exception):
@@ -21,9 +21,10 @@ class NobodyCollects(Exception):
 
 
 class Request(msgspec.Struct, frozen=True):
-    """What is asked for."""
+    """What is asked for, and what is said with it."""
 
     ask: str
+    text: str = ""
 
 
 @contextlib.asynccontextmanager
@@ -50,7 +51,7 @@ async def door(folder: Path, answers: Answers) -> AsyncIterator[None]:
         (folder / NAME).unlink(missing_ok=True)
 
 
-def ask(folder: Path, what: str) -> bytes:
+def ask(folder: Path, what: str, text: str = "") -> bytes:
     """The answer of the collector that works on this spool, as a line of JSON.
 
     Raises:
@@ -61,7 +62,7 @@ def ask(folder: Path, what: str) -> bytes:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking, _short(folder) as name:
             asking.settimeout(ANSWER_S)
             asking.connect(name)
-            asking.sendall(msgspec.json.encode(Request(what)) + b"\n")
+            asking.sendall(msgspec.json.encode(Request(what, text)) + b"\n")
             with asking.makefile("rb") as lines:
                 answer = lines.readline()
     except TimeoutError as error:
@@ -80,8 +81,9 @@ def ask(folder: Path, what: str) -> bytes:
 
 
 def _answer(line: bytes, answers: Answers) -> bytes:
-    asked = msgspec.json.decode(line, type=Request).ask
-    return msgspec.json.encode(answers[asked]()) + b"\n" if asked in answers else b""
+    asked = msgspec.json.decode(line, type=Request)
+    answer = answers.get(asked.ask)
+    return b"" if answer is None else msgspec.json.encode(answer(asked.text)) + b"\n"
 
 
 @contextlib.contextmanager

@@ -77,6 +77,17 @@ def test_what_was_recorded_is_in_the_store_when_it_has_ended(settings: ServerSet
         assert spool.waiting() == []
 
 
+def test_a_mark_is_in_the_recording(settings: ServerSettings) -> None:
+    with Collector(settings) as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: rows(settings) > 1)
+        assert ask(settings.recorder.spool, "mark", "stairs") == b"1\n"
+    events = (
+        Store(settings.store.url).dataset("events").to_table(columns=["robot", "kind", "text"]).to_pylist()
+    )
+    assert {"robot": "exo-fake", "kind": "marker", "text": "stairs"} in events
+
+
 def test_a_second_collector_on_one_spool_is_refused(settings: ServerSettings) -> None:
     with (
         Collector(settings),

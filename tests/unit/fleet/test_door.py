@@ -40,8 +40,13 @@ def opened(network: Network, folder: Path, answers: Answers) -> None:
     assert ready.wait(20)
 
 
+def test_what_is_said_with_a_question_is_handed_on(network: Network, folder: Path) -> None:
+    opened(network, folder, {"mark": lambda text: text.upper()})
+    assert ask(folder, "mark", "stairs, up") == b'"STAIRS, UP"\n'
+
+
 def test_a_question_is_answered(network: Network, folder: Path) -> None:
-    opened(network, folder, {"status": lambda: {"rows": 5}})
+    opened(network, folder, {"status": lambda _: {"rows": 5}})
     assert ask(folder, "status") == b'{"rows":5}\n'
     assert ask(folder, "status") == b'{"rows":5}\n'
 
@@ -54,7 +59,7 @@ def test_what_is_not_known_is_said_so(network: Network, folder: Path) -> None:
 
 @pytest.mark.parametrize("said", [b"", b"\n", b"nonsense\n", b'{"ask": 5}\n', b"x" * 100_000])
 def test_nonsense_at_the_door_disturbs_nobody(network: Network, folder: Path, said: bytes) -> None:
-    opened(network, folder, {"status": lambda: 1})
+    opened(network, folder, {"status": lambda _: 1})
     with socket.socket(socket.AF_UNIX) as guest, module._short(folder) as name:
         guest.connect(name)
         guest.sendall(said)
@@ -76,7 +81,7 @@ def test_what_a_killed_collector_left_is_no_collector(network: Network, folder: 
         dead.bind(name)
     with pytest.raises(NobodyCollects, match="no collector runs"):
         ask(folder, "status")
-    opened(network, folder, {"status": lambda: 1})
+    opened(network, folder, {"status": lambda _: 1})
     assert ask(folder, "status") == b"1\n"
 
 
