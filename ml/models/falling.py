@@ -63,7 +63,7 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
             rows = train[learned[train]]
             if len(np.unique(falling[rows])) < 2:
                 raise UnusableData("too few people fall, or too few do not: some have nobody to learn from")
-            trees = _trees(tuned).fit(x[rows], falling[rows])
+            trees = fall_trees(tuned).fit(x[rows], falling[rows])
             unseen[held_out] = trees.predict_proba(x[held_out])[:, 1]
             self.trees_.append(trees)
         daily = ~np.isin(recording, recording[falling])
@@ -109,7 +109,8 @@ def trailing_mean(values: Floats, recording: Integers, count: int) -> Floats:
     return total / count
 
 
-def _trees(settings: FallSettings) -> Any:
+def fall_trees(settings: FallSettings) -> Any:
+    """The trees of one fold."""
     return HistGradientBoostingClassifier(
         max_iter=settings.rounds,
         learning_rate=0.1,

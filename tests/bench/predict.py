@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from ml.features import FeatureStream, Recipe, features
 from ml.features.falling import FALLING
 from ml.features.gait_phase import LEFT_PHASE
 from ml.features.gait_status import GAIT_STATUS
 from ml.features.terrain import TERRAIN
+from ml.models.falling import FallSettings, fall_trees
 from ml.models.gait_phase import PhaseModel, PhaseSettings
 from ml.models.gait_status import status_model
 from ml.models.scaling import fixed_epochs
@@ -36,7 +38,8 @@ def main() -> int:
     sys.stdout.write(f"{'recipe':<18}{'1 robot':>10}{'p99':>8}{f'{ROBOTS} robots':>12}{'p99':>8}   ms\n")
     over = False
     for recipe, predict in _models():
-        one, every = (_times(recipe, predict, robots) for robots in (1, ROBOTS))
+        with threadpool_limits(limits=1):
+            one, every = (_times(recipe, predict, robots) for robots in (1, ROBOTS))
         medians_and_tails = [np.percentile(times, share) for times in (one, every) for share in (50, 99)]
         sys.stdout.write(
             f"{recipe.name:<18}{medians_and_tails[0]:10.2f}{medians_and_tails[1]:8.2f}"
@@ -57,7 +60,7 @@ def _models() -> list[tuple[Recipe, Predict]]:
     """Each recipe with a model of full size."""
     random = np.random.default_rng(0)
     made: list[tuple[Recipe, Predict]] = []
-    with fixed_epochs():
+    with fixed_epochs(), threadpool_limits(limits=1):
         for recipe in (GAIT_STATUS, LEFT_PHASE, FALLING, TERRAIN):
             x = features(recipe, _samples(recipe, LEARNED, 1), np.arange(LEARNED))
             made.append((recipe, _fitted(recipe, x, random)))
@@ -71,10 +74,12 @@ def _fitted(recipe: Recipe, x: npt.NDArray[np.float32], random: np.random.Genera
         return PhaseModel(PhaseSettings(doubtful=1.0)).fit(x, phase, np.arange(len(x))).predict
     if recipe is TERRAIN:
         return terrain_model().fit(x, classes).predict  # type: ignore[no-any-return]
+    if recipe is FALLING:
+        model = FallSettings()
+        sets = [QuickTrees(fall_trees(model).fit(x, classes == one)) for one in range(model.folds)]
+        return lambda rows: [trees.predict_proba(rows) for trees in sets]
     vote = status_model().fit(x, classes)
     trees, network = QuickTrees(vote.named_estimators_["trees"]), vote.named_estimators_["network"]
-    if recipe is FALLING:
-        return lambda rows: [trees.predict_proba(rows) for _ in range(3)]
     return lambda rows: trees.predict_proba(rows) + network.predict_proba(rows)
 
 
