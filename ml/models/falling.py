@@ -30,9 +30,9 @@ class FallSettings:
 
     falling: int = 20  # samples before the impact that are falling
     unclear: int = 50  # samples before the impact that are neither, up to those
-    moving_share: float = 0.12  # of the daily decisions in which somebody moves that are learned from
+    moving_share: float = 0.22  # of the daily decisions in which somebody moves that are learned from
     still_share: float = 0.015  # of the others: they are many and alike
-    rounds: int = 80
+    rounds: int = 120
     leaves: int = 15
     folds: int = 3
     decisions: int = 4  # whose mean is compared with the threshold
