@@ -36,9 +36,7 @@ class FallSettings:
     leaves: int = 15
     folds: int = 3
     decisions: int = 4  # whose mean is compared with the threshold
-    false_alarms: float = (
-        0.06  # of daily recordings, by trees that learned from fewer; all together cost less
-    )
+    false_alarms: float = 0.06  # of daily recordings, by one set of trees; all together cost less
 
 
 class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn ships no types
