@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,6 +13,7 @@ import can
 import pytest
 
 from gateway.config import load
+from gateway.guard.inputs import AGAIN_NS
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
 from hil_sim.control_socket import ask
@@ -112,10 +114,17 @@ def guarded(robot: SimulatedRobot) -> Iterator[Callable[[str], Client]]:
         def start(text: str) -> Client:
             address = stack.enter_context(serving(load(configure(robot, text))))
             client = stack.enter_context(Client(address))
+            until(lambda: qualities(client) == {"ok"}, "everything is heard")
+            looked = time.monotonic() + 3 * AGAIN_NS / 1e9
+            until(lambda: time.monotonic() > looked, "the guard has heard it too")
             until(lambda: states(client) and set(states(client).values()) == {"watching"}, "it watches")
             return client
 
         yield start
+
+
+def qualities(client: Client) -> set[str]:
+    return {one["state"] for one in client.call("component.snapshot")["quality"].values()}
 
 
 def states(client: Client) -> dict[str, str]:
