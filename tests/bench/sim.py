@@ -136,13 +136,29 @@ def judged(title: str, hubs: list[Heard], cpu_s: float, period_s: float) -> Iter
     syncs = [[stamp for stamp, cob_id in of if cob_id == SYNC] for of in frames]
     simulated_s = len(syncs[0]) * period_s
     yield Row(f"{title}: processor, share of a core", 100.0 * cpu_s / simulated_s, "%", 60.0)
-    off_ms = sorted(
-        abs(later - one - period_s) * 1000.0 for of in syncs for one, later in itertools.pairwise(of)
-    )
-    yield Row(f"{title}: SYNC jitter p50", off_ms[len(off_ms) // 2], "ms")
-    yield Row(f"{title}: SYNC jitter p99", off_ms[int(0.99 * len(off_ms))], "ms", 1.0)
-    yield Row(f"{title}: SYNC jitter max", off_ms[-1], "ms")
+    yield from jitter(f"{title}: SYNC jitter", syncs, period_s, 1.0)
     yield Row(f"{title}: PDOs missing of {16 * len(syncs[0])}", sum(map(missing, frames)), "", 0.5)
+
+
+def jitter(title: str, stamps_s: list[list[float]], period_s: float, limit: float | None) -> Iterator[Row]:
+    off_ms = sorted(
+        abs(later - one - period_s) * 1000.0 for of in stamps_s for one, later in itertools.pairwise(of)
+    )
+    yield Row(f"{title} p50", off_ms[len(off_ms) // 2], "ms")
+    yield Row(f"{title} p99", off_ms[int(0.99 * len(off_ms))], "ms", limit)
+    yield Row(f"{title} max", off_ms[-1], "ms")
+
+
+def ticker(hz: int) -> Iterator[Row]:
+    """How evenly messages come here from a program that only sends them: what this computer can do."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        command = [sys.executable, "-m", "tests.bench._ticker", str(port), str(hz), str(SECONDS)]
+        with subprocess.Popen(command):
+            wire, _ = server.accept()
+            with wire:
+                stamps_s = [time.monotonic() for _ in iter(lambda: wire.recv(65536), b"")]
+    yield from jitter(f"a program that only sends, {hz} Hz: jitter", [stamps_s], 1.0 / hz, None)
 
 
 def missing(frames: list[tuple[float, int]]) -> int:
@@ -207,6 +223,7 @@ def overloaded() -> Iterator[Row]:
 def measure() -> Iterator[Row]:
     one_bus = list(in_real_time(1, 250))
     yield from one_bus
+    yield from ticker(250)
     yield from in_real_time(2, 500)
     yield from peer(250, one_bus[0].value)
     yield from fast()
