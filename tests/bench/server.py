@@ -30,7 +30,7 @@ ASKED = [*NAMES[:10], "utc"]
 GROUP_ROWS = 200  # of one commit
 ROUNDS = 5
 LEAST_ROWS_PER_S, MOST_UPLOAD_S = 40_000, 0.5
-FLEET, MOST_CORES, MOST_GROWTH = 50, 1.0, 1.3  # the store's libraries warm up for a minute
+FLEET, MOST_CORES, MOST_GROWTH = 50, 1.0, 1.2
 
 
 @dataclass(frozen=True, slots=True)

@@ -177,12 +177,14 @@ class ControlMachine(RuleBasedStateMachine):
 
     @rule()
     def right_knee_bends_too_far(self) -> None:
-        """Its rule stops the robot, and the stop is held."""
+        """Its rule stops the robot; the stop is held, and not reset as long as the knee is bent."""
         self.bends(self.bench.right, "stops")
         if not self.stopped:
             self.happened += ["stop", "stop answered"]
         self.stopped = True
         until(self.stop_held, "the guard's stop is held")
+        if self.lease is not None:
+            assert self.refused(self.lease, "robot.reset") == "stopped"
         self.straightens(self.bench.right, "stops")
 
     # What follows from it
@@ -265,12 +267,15 @@ class ControlMachine(RuleBasedStateMachine):
 
     def bends(self, joint: FakeDrive, rule: str) -> None:
         trips = self.rules_of_guard()[rule]["trips"]
-        joint.give(2.0, None)
+        joint.position = 2.0
+        joint.give(joint.position, None)
         until(lambda: self.rules_of_guard()[rule]["trips"] > trips, f"{rule} trips")
 
     def straightens(self, joint: FakeDrive, rule: str) -> None:
+        joint.position = 0.5
+
         def well() -> bool:
-            joint.give(0.5, None)
+            joint.give(joint.position, None)
             return bool(self.rules_of_guard()[rule]["state"] == "cleared")
 
         until(well, f"{rule} is cleared")

@@ -20,7 +20,7 @@ class NobodyCollects(Exception):
     """No collector answers on this spool."""
 
 
-class Request(msgspec.Struct, frozen=True):
+class Request(msgspec.Struct, frozen=True, omit_defaults=True):
     """What is asked for, and what is said with it."""
 
     ask: str

@@ -265,6 +265,7 @@ class FakeDrive(FakeComponent):
     def __init__(self, name: str, statusword: int = ENABLED) -> None:
         super().__init__(name, Kind.JOINT, ["position", "statusword"])
         self.reading: DriveReading | None = None
+        self.position = 0.5  # rad; stays where it is when the drive changes its state
         self.stops = 0
         self.stopping = StopOutcome.CONFIRMED
         self.hanging: Future[StopOutcome] | None = None
@@ -278,7 +279,7 @@ class FakeDrive(FakeComponent):
 
     def set_state(self, statusword: int) -> None:
         self.node.objects[0x6041, 0] = statusword.to_bytes(2, "little")
-        self.give(0.5, statusword)
+        self.give(self.position, statusword)
 
     def start(self) -> None:
         super().start()
