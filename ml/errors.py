@@ -1,5 +1,9 @@
-"""What can be wrong with data that is to be learned from."""
+"""What can be wrong with data that is to be learned from, and with a model as a file."""
 
 
 class UnusableData(Exception):
     """Nothing can be learned or judged from this; the message says what is wrong and what is expected."""
+
+
+class UnusableModel(ValueError):
+    """This model cannot be used here; the message says which, what is wrong with it, and what to do."""
