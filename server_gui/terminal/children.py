@@ -2,6 +2,7 @@
 
 import os
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -48,14 +49,17 @@ class Output:
 class Child:
     """A `gwrms` command in a process of its own, in a group of its own: our Ctrl-C is not its.
 
-    Use it as a context manager: leaving ends it (SIGTERM, after `END_S` SIGKILL) and waits for it.
+    Use it as a context manager: leaving ends it (SIGTERM, after `END_S` SIGKILL) and waits for it. Where we
+    are killed, it ends as well, if util-linux is here.
     """
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
         self.name = name
+        setpriv = shutil.which("setpriv")
+        ends_with_us = [setpriv, "--pdeathsig", "TERM"] if setpriv else []
         # -P: what lies in the current folder is not imported by accident.
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "gateway.main", *arguments],
+            [*ends_with_us, sys.executable, "-P", "-m", "gateway.main", *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

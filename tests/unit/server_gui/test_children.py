@@ -1,7 +1,10 @@
 """Child processes: ready, dead, deaf: each is noticed, and none is left behind."""
 
 import os
+import shutil
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -28,6 +31,13 @@ def until(condition: Callable[[], object]) -> None:
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.01)
+
+
+def has_ended(process: psutil.Process) -> bool:
+    try:
+        return process.status() == psutil.STATUS_ZOMBIE  # where nobody waits for orphans
+    except psutil.NoSuchProcess:
+        return True
 
 
 def test_first_words_are_found_and_the_child_is_ended() -> None:
@@ -85,3 +95,25 @@ def test_wrong_usage_is_2(arguments: list[str], capsys: pytest.CaptureFixture[st
         demo(arguments)
     assert ended.value.code == 2
     assert "usage: gwrms demo" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="util-linux's setpriv is not here")
+def test_child_ends_where_its_parent_is_killed(tmp_path: Path) -> None:
+    program = (
+        "from server_gui.terminal.children import Child\n"
+        f"print(Child('simulator', ['sim', '--dir', {str(tmp_path)!r}]).pid, flush=True)\n"
+        "input()"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert parent.stdin
+    assert parent.stdout
+    with parent.stdin, parent.stdout:
+        simulator = psutil.Process(int(parent.stdout.readline()))
+        until(lambda: (tmp_path / "robot.toml").exists())
+        parent.kill()
+        parent.wait()
+    until(lambda: has_ended(simulator))
