@@ -108,6 +108,11 @@ class Registry:
     def phases(self) -> dict[str, str]:
         return {name: slot.phase.value for name, slot in self._slots.items()}
 
+    @property
+    def ending(self) -> bool:
+        """Whether `close` has been called: nothing starts any more."""
+        return self._closing is not None
+
     def running(self, name: str) -> Module | None:
         """The module, where it is running now."""
         slot = self._slots[name]
@@ -116,7 +121,7 @@ class Registry:
     def use(self, name: str, user: Hashable | None) -> "Future[Module]":
         """The running module; `user` keeps it (and what it needs) until `leave`. No user: it lingers only."""
         slot = self._slots[name]
-        if self._closing is not None:
+        if self.ending:
             return failed(wire.refuse(wire.Kind.UNAVAILABLE, "the gateway is ending"))
         if user is None:
             slot.linger_until_ns = self._linger_from_now_ns()
@@ -191,7 +196,7 @@ class Registry:
         needs = {other: self._slots[other].module for other in slot.spec.needs}
 
         def keep(on: bool) -> None:
-            if on and self._closing is None:
+            if on and not self.ending:
                 slot.users.add(slot)
             else:
                 self.leave(slot)

@@ -82,13 +82,13 @@ class Service:
     def _control_began(self, control: "Future[Module]") -> None:
         """It keeps itself as long as a stop is held, or a write is to be taken back."""
         error = control.exception()
-        if error is not None:
+        if error is not None and not self.registry.ending:
             log.critical("what the last gateway left, a held stop or a write on trial, waits: %s", error)
             self._loop.call_later(AGAIN_S, self.resume)
 
     def _guard_began(self, guard: "Future[Module]") -> None:
         error = guard.exception()
-        if error is not None:
+        if error is not None and not self.registry.ending:
             self._guard_problem = str(error)
             log.critical("the guard does not run: %s", error)
             self._loop.call_later(AGAIN_S, self.resume)

@@ -1,5 +1,6 @@
 """The guard as it runs: without clients, stopping in the thread that sees, never flooding, open to all."""
 
+import logging
 import re
 import subprocess
 import sys
@@ -16,8 +17,10 @@ import pytest
 from drivers.bus.life import NodeLife
 from drivers.component import Kind
 from gateway.cli.describe import main as describe
+from gateway.daemon import Daemon
 from gateway.guard import alarms
 from gateway.guard.armings import Armings
+from gateway.listeners import listen
 from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving, until
 
 LIMIT = """
@@ -408,3 +411,12 @@ class TestOpen:
 
         until(well)
         assert client.call("robot.reset")["held"] is False
+
+
+def test_a_gateway_that_ends_as_its_guard_begins_raises_no_alarm_about_it(
+    bench: Bench, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    daemon = Daemon(config(tmp_path, ROBOT + FOOT), listen("127.0.0.1", 0))
+    daemon.end()
+    daemon.run()
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
