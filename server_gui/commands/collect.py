@@ -123,7 +123,7 @@ def status_text(report: CollectorReport) -> str:
     )
     lines = [
         f"collecting since {_instant(report.began_utc_s)} (process {report.pid}, gwrms {report.version})",
-        f"spool  {report.spool}: {rows}",
+        f"spool  {report.spool}: {rows}; {size(report.disk_free_bytes)} free on its disk",
         f"store  {report.store}: {batches}; backlog {size(uploader.backlog_bytes)}",
         *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
         *([f"ALARM  {uploader.problem}"] if uploader.problem else []),

@@ -78,13 +78,13 @@ def _memory(collector: Collector, robots: int) -> dict[str, float]:
 
 
 def _losses(collector: Collector) -> dict[str, float]:
-    report = collector.report()
+    report = collector.report().result()
     missing = sum(link.missed + link.dropped for link in report.robots.values())
     return {"lost": report.recorder.lost + missing}
 
 
 def _rows(collector: Collector) -> int:
-    return sum(link.rows for link in collector.report().robots.values())
+    return sum(link.rows for link in collector.report().result().robots.values())
 
 
 def _resident_mb() -> float:

@@ -4,16 +4,19 @@ import concurrent.futures
 import importlib.metadata
 import logging
 import os
+import shutil
 import time
-from typing import Final, Self
+from collections.abc import Callable
+from typing import Final, Self, TypeVar
 
 from msgspec import Struct
 
+from gateway.client import Address
 from gateway.messages import ResourceSnapshotParams
 from ml.store import Store
 from server_gui.core.feed import ONCE, Following
 from server_gui.core.fleet.door import door
-from server_gui.core.fleet.fleet import Fleet
+from server_gui.core.fleet.fleet import Fleet, Show
 from server_gui.core.fleet.statistics import LinkReport
 from server_gui.core.network import Network
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
@@ -22,6 +25,8 @@ from server_gui.core.recording.uploader import Uploader, UploaderState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload
 
 log = logging.getLogger(__name__)
+
+Result = TypeVar("Result")
 
 QUIET_S: Final = 10.0  # without a row of any robot: idle
 MOST_BACKLOG_BYTES: Final = 2 << 30  # more does not wait until the robots are quiet
@@ -39,6 +44,7 @@ class CollectorReport(Struct, frozen=True):
     spool: str
     store: str
     upload: Upload
+    disk_free_bytes: int  # of the spool's disk
     robots: dict[str, LinkReport]
     recorder: RecorderState
     uploader: UploaderState
@@ -49,30 +55,39 @@ class Collector:
 
     Leaving ends the sessions, and uploads what waits, for a while: what is not in the store then stays in the
     spool. Where an upload hangs even so, `hangs` is set, and only the end of the process ends its thread.
+    A window records with a `following` of its own, and is told of everything by `show`.
     """
 
-    def __init__(self, settings: ServerSettings, operator: str = "", notes: str = "") -> None:
+    def __init__(
+        self,
+        settings: ServerSettings,
+        operator: str = "",
+        notes: str = "",
+        following: Following | None = None,
+        show: Show | None = None,
+    ) -> None:
         self.hangs = False
         self._settings = settings
         self._began_s = time.time()
         recorder = settings.recorder
         self._spool = Spool(recorder.spool)
+        self.network = Network()
         self._uploader = Uploader(self._spool, lambda: connect(settings.store), self._wanted)
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
-        self._network = Network()
         robots = {name: robot.where for name, robot in settings.robots.items()}
-        self._fleet = Fleet(robots, following(recorder), self._recorder, operator, notes)
+        following = following or whole(recorder)
+        self._fleet = Fleet(robots, following, self._recorder, operator, notes, show)
         self._running: concurrent.futures.Future[None] | None = None
 
     def __enter__(self) -> Self:
         self._uploader.__enter__()
         self._recorder.__enter__()
-        self._network.__enter__()
-        self._running = self._network.run(self._run())
+        self.network.__enter__()
+        self._running = self.network.run(self._run())
         return self
 
     def __exit__(self, *exc: object) -> None:
-        self._network.__exit__()
+        self.network.__exit__()
         self._recorder.close()
         if self._settings.recorder.upload is not Upload.MANUAL and not self._uploader.drain(LAST_UPLOAD_S):
             log.warning("%d batches wait in the spool for the next start", len(self._spool.waiting()))
@@ -84,12 +99,29 @@ class Collector:
         if self._running is not None and concurrent.futures.wait([self._running], within_s).done:
             self._running.result()
 
-    def report(self) -> CollectorReport:
+    def report(self) -> "concurrent.futures.Future[CollectorReport]":
         """How everything goes now."""
-        return self._network.run(self._told()).result()
+        return self._do(lambda: self._report(""))
 
-    async def _told(self) -> CollectorReport:
-        return self._report("")
+    def follow(self, robot: str, address: Address) -> "concurrent.futures.Future[None]":
+        """Another robot, from now on."""
+        return self._do(lambda: self._fleet.follow(robot, address))
+
+    def mark(self, text: str) -> "concurrent.futures.Future[int]":
+        """Mark this instant in the recording of every robot; how many there are."""
+        return self._do(lambda: self._mark(text))
+
+    def upload(self) -> "concurrent.futures.Future[int]":
+        """Bring everything that was recorded until now into the store; how many batches waited."""
+        return self._do(lambda: self._upload(""))
+
+    def _do(self, what: Callable[[], Result]) -> "concurrent.futures.Future[Result]":
+        """In the network's thread."""
+
+        async def do() -> Result:
+            return what()
+
+        return self.network.run(do())
 
     async def _run(self) -> None:
         answers = {"status": self._report, "upload": self._upload, "mark": self._mark}
@@ -109,14 +141,14 @@ class Collector:
                 return quiet or self._uploader.state.backlog_bytes > MOST_BACKLOG_BYTES
 
     def _mark(self, text: str) -> int:
-        """Mark this instant in the recording of every robot; how many there are."""
-        for name in self._settings.robots:
+        robots = self._fleet.robots
+        for name in robots:
             self._recorder.mark(name, text)
-        return len(self._settings.robots)
+        return len(robots)
 
     def _upload(self, _text: str) -> int:
-        """Begin to upload; how many batches wait."""
-        self._uploader.now()
+        """Begin to upload everything until now; how many batches waited."""
+        self._recorder.cut(self._uploader.now)
         return len(self._spool.waiting())
 
     def _report(self, _text: str) -> CollectorReport:
@@ -128,13 +160,14 @@ class Collector:
             spool=str(self._spool.folder),
             store=settings.store.url,
             upload=settings.recorder.upload,
+            disk_free_bytes=shutil.disk_usage(self._spool.folder).free,
             robots=self._fleet.report(),
             recorder=self._recorder.state,
             uploader=self._uploader.state,
         )
 
 
-def following(recorder: RecordingSettings) -> Following:
+def whole(recorder: RecordingSettings) -> Following:
     """What is asked of each robot: everything that the store has a table for."""
     return Following(
         client="gwrms collect",

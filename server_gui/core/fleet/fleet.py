@@ -58,7 +58,7 @@ class Member:
 class Fleet:
     """The robots of a server; everything that they send goes to the recorder, before `show` is told of it.
 
-    For the network's thread, but for `newest_ns`.
+    For the network's thread, but for `robots` and `newest_ns`.
     """
 
     def __init__(
@@ -70,20 +70,36 @@ class Fleet:
         notes: str = "",
         show: Show | None = None,
     ) -> None:
-        self._members = {
-            robot: Member(robot, address, following, Keeping(robot, recorder, operator, notes), show)
-            for robot, address in robots.items()
-        }
+        self._members: dict[str, Member] = {}
+        self._joining: asyncio.Queue[Member] = asyncio.Queue()
+
+        def member(robot: str, address: Address) -> Member:
+            return Member(robot, address, following, Keeping(robot, recorder, operator, notes), show)
+
+        self._member = member
+        for robot, address in robots.items():
+            self.follow(robot, address)
 
     async def run(self) -> None:
-        """Follow all of them until cancelled."""
+        """Follow all of them, and who joins, until cancelled."""
         async with asyncio.TaskGroup() as group:
-            for member in self._members.values():
-                group.create_task(member.run())
+            while True:
+                group.create_task((await self._joining.get()).run())
+
+    def follow(self, robot: str, address: Address) -> None:
+        """Another robot, from now on."""
+        member = self._member(robot, address)
+        self._members = self._members | {robot: member}
+        self._joining.put_nowait(member)
 
     def report(self) -> dict[str, LinkReport]:
         """How each robot's link does now."""
         return {robot: member.report() for robot, member in self._members.items()}
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self._members)
 
     @property
     def newest_ns(self) -> int | None:

@@ -108,6 +108,7 @@ class Recorder:
         self._commit_s = 0.0
         self._looked_s = -AGAIN_S
         self._roomy = True
+        self._cuts: list[Callable[[], None]] = []
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -185,6 +186,15 @@ class Recorder:
             raise ValueError(f"there is no table {record.table}; there are {', '.join(TABLES)}")
         TABLES[record.table].rows([record.fields])
         return self._put(record.fields.get("robot", ""), 1, lambda: [record])
+
+    def cut(self, then: Callable[[], None]) -> int:
+        """End the batch with what was handed in until now; `then` is called when it waits for upload."""
+
+        def work() -> Iterable[Record]:
+            self._cuts.append(then)
+            return ()
+
+        return self._put("", 0, work)
 
     # --- how it goes
 
@@ -305,11 +315,14 @@ class Recorder:
 
     def _freeze(self, ending: bool) -> None:
         settings = self._settings
-        if ending or self._spool.age_s >= settings.batch_s or self._spool.rows >= settings.batch_rows:
+        cuts, self._cuts = self._cuts, []
+        if ending or cuts or self._spool.age_s >= settings.batch_s or self._spool.rows >= settings.batch_rows:
             try:
                 self._spool.freeze()
             except SpoolUnusable as error:
                 self._alarm(AlarmKind.SPOOL_FAILED, str(error))
+        for then in cuts:
+            then()
 
     def _alarm(self, kind: AlarmKind, text: str | None) -> None:
         """Begin an alarm, go on with it, or end it where there is nothing to say."""

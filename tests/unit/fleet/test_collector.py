@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gateway.client import Address
 from ml.store import Store
 from ml.store.tables import TELEMETRY
 from server_gui.core.fleet import collector as module
@@ -86,6 +87,28 @@ def test_a_mark_is_in_the_recording(settings: ServerSettings) -> None:
         Store(settings.store.url).dataset("events").to_table(columns=["robot", "kind", "text"]).to_pylist()
     )
     assert {"robot": "exo-fake", "kind": "marker", "text": "stairs"} in events
+
+
+def test_a_robot_that_joins_later_is_recorded_marked_and_shown(settings: ServerSettings) -> None:
+    shown: list[str] = []
+    with FakeRobot() as other, Collector(settings, show=lambda robot, _: shown.append(robot)) as collector:
+        collector.follow("exo-other", Address.parse(other.address)).result(WAIT_S)
+        until(collector, lambda: collector.report().result(WAIT_S).robots["exo-other"].rows > 5)
+        assert collector.mark("stairs").result(WAIT_S) == 2
+    assert set(shown) == {"exo-fake", "exo-other"}
+    events = Store(settings.store.url).dataset("events").to_table(columns=["robot", "text"]).to_pylist()
+    assert {"robot": "exo-other", "text": "stairs"} in events
+
+
+def test_uploading_now_takes_what_came_this_second(settings: ServerSettings) -> None:
+    recorder = msgspec.structs.replace(settings.recorder, batch_s=3600.0)
+    settings = upload(msgspec.structs.replace(settings, recorder=recorder), Upload.MANUAL)
+    with Collector(settings) as collector:
+        until(collector, lambda: collector.report().result(WAIT_S).robots["exo-fake"].rows > 20)
+        collector.upload().result(WAIT_S)
+        until(collector, lambda: collector.report().result(WAIT_S).uploader.uploaded == 1)
+        assert collector.report().result(WAIT_S).disk_free_bytes > 0
+    assert Store(settings.store.url).dataset(TELEMETRY.location("exo-fake", 1)).count_rows() > 20
 
 
 def test_a_second_collector_on_one_spool_is_refused(settings: ServerSettings) -> None:

@@ -81,6 +81,7 @@ def test_a_status_says_what_people_ask_first() -> None:
         spool="/spool",
         store="s3://bucket/prefix",
         upload=Upload.IDLE,
+        disk_free_bytes=3 << 30,
         robots={"exo-01": LinkStatistics(Address("192.0.2.7")).report("")},
         recorder=RecorderState(12, 3, 4, 0.01, (alarm,)),
         uploader=UploaderState(2, 7, 5 << 20, 0.5, "no network"),
