@@ -144,7 +144,7 @@ def _drives(station: Station) -> Words:
 
 
 def _status(station: Station) -> Words:
-    gait = station.components.shown().gait
+    gait = station.processing.derived().gait
     if station.robot.is_stale():
         return Mark("ring", "old"), "Status not known", "no live data"
     if not gait.walking:

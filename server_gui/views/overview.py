@@ -136,7 +136,7 @@ class Overview(QWidget):
         return card
 
     def _refresh_status(self, station: Station) -> None:
-        derived = station.components.shown()
+        derived = station.processing.derived()
         live = not station.robot.is_stale()
         now_ns = derived.stamp_ns
         phases = {leg: leg_phase(derived, leg, now_ns) for leg in Leg}

@@ -104,7 +104,7 @@ class Resources(QWidget):
         self._watched, self._taken = wanted, None
 
     def _refresh_plots(self, station: Station) -> None:
-        rows = station.computer.history.recent()
+        rows = station.processing.resource.history.recent()
         if not len(rows):
             return
         times = rows[:, 0] - rows[-1, 0]
@@ -147,7 +147,7 @@ def _facts(station: Station, seen: ResourceSnapshot) -> str:
     lines += _costs(station.cost)
     if seen.memory.swap_used:
         lines.append(f"Swapped out: {seen.memory.swap_used / MIB:.0f} MiB")
-    lines += [f"▲ {leak.text}" for leak in station.computer.leaks()]
+    lines += [f"▲ {leak.text}" for leak in station.processing.resource.leaks()]
     return "\n".join(lines)
 
 

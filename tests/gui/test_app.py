@@ -114,5 +114,5 @@ def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplica
         wait(lambda: app.desk.selected is not None, "started it")
         station = app.desk.stations[0]
         wait(lambda: station.title == "simulated-exo" and not station.robot.is_stale(), "was live")
-        wait(lambda: station.components.shown().gait.walking, "walked")
+        wait(lambda: station.processing.derived().gait.walking, "walked")
         app.window.hide()

@@ -41,7 +41,7 @@ def colours(image: QImage) -> set[int]:
 def test_a_walk_is_seen_as_a_walk(overview: Overview, bench: Bench) -> None:
     bench.station.take([walking(600)])
     overview.refresh()
-    derived = bench.station.components.shown()
+    derived = bench.station.processing.derived()
     assert derived.gait.walking
     for leg in Leg:
         phase = leg_phase(derived, leg, derived.stamp_ns)

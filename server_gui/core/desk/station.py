@@ -1,5 +1,6 @@
 """One robot at the desk: its state, its past, and what is asked of it. For the window's thread."""
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
@@ -8,7 +9,15 @@ from typing import Final
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
-from gateway.messages import GatewayCost, Lease, ParameterInfo, ResourceSnapshot, Stopped, Written
+from gateway.messages import (
+    Description,
+    GatewayCost,
+    Lease,
+    ParameterInfo,
+    ResourceSnapshot,
+    Stopped,
+    Written,
+)
 from server_gui.core.desk.answers import Deliver, Result, when_done
 from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.control import Control
@@ -20,8 +29,7 @@ from server_gui.core.desk.stopping import Stopping
 from server_gui.core.desk.watch import Watch
 from server_gui.core.desk.writing import WriteState, Writing
 from server_gui.core.events import Costs, Described, Event, LinkChanged, Resources, Telemetry
-from server_gui.core.processing.component import ComponentProcessing
-from server_gui.core.processing.resource import ResourceProcessing
+from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.processing.units import Units
 from server_gui.core.robot import Robot
 
@@ -37,8 +45,7 @@ class Station:
         self.address = address
         self.robot = Robot()
         self.rings = Rings()
-        self.components = ComponentProcessing()
-        self.computer = ResourceProcessing()
+        self.processing = RobotProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
@@ -51,7 +58,6 @@ class Station:
         self._news = news
         self._watch = Watch(self.tell)
         self._watched_ns = 0
-        self._boot_id: str | None = None
 
     @property
     def title(self) -> str:
@@ -81,35 +87,28 @@ class Station:
             if isinstance(event, Resources) and isinstance(event.snapshot.processes, list):
                 self._processes(event)
                 continue
+            before = self.robot.description
             self.robot.apply(event)
+            self.processing.apply(event)
             match event:
                 case Telemetry():
-                    self._telemetry(event)
+                    self.rings.take(event.batch.stamps_ns, event.batch.columns)
                 case Described():
-                    self._described(event)
+                    self._described(event.description, before)
                 case Costs():
                     self.cost = event.cost
                 case LinkChanged():
                     self.cost = None  # it was of the link that there was
-                case Resources():
-                    self.computer.take(event.snapshot)
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self.end_trial_if_over(now_ns)
 
-    def _telemetry(self, event: Telemetry) -> None:
-        self.rings.take(event.batch.stamps_ns, event.batch.columns)
-        self.components.take(event.batch.stamps_ns, event.batch.columns)
-
-    def _described(self, event: Described) -> None:
-        description = event.description
-        if self._boot_id not in (None, description.boot_id):
+    def _described(self, description: Description, before: Description | None) -> None:
+        if before is not None and before.boot_id != description.boot_id:
             self.rings.clear()
-            self.components.restart()
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
-        self._boot_id = description.boot_id
         self.stopping.held = description.stop.held
         gone = self.edits.vanished(self.known)
         if gone:
@@ -120,7 +119,8 @@ class Station:
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
         seen = self.robot.resources
         if seen is not None:
-            self.computer.take(replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway))
+            snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
+            self.processing.apply(dataclasses.replace(event, snapshot=snapshot))
 
     # --- STOP and reset
 

@@ -1,5 +1,6 @@
 """Units for people: inside everything is SI, and no digit is lost on the way out and back."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Context, Decimal
@@ -33,16 +34,18 @@ class Unit:
         """What was typed in this unit, as the nearest SI float.
 
         Raises:
-            ValueError: it is not a finite number.
+            ValueError: it is no number, or too large or too small for a float.
 
         """
         try:
             number = Decimal(typed)
         except ArithmeticError:
             number = Decimal("NaN")
-        if not number.is_finite():
-            raise ValueError(f"{typed!r} is not a number in {self.symbol or 'units'}: write one such as 12.5")
-        return float(_EXACT.divide(number, self.factor))
+        value = self._nearest(number) if number.is_finite() else math.nan
+        if not math.isfinite(value) or (value == 0.0) != (number == 0):
+            said = f"{typed!r} is not a number in {self.symbol or 'units'} that a robot could hold"
+            raise ValueError(f"{said}: write one such as 12.5")
+        return value
 
     def text(self, value: float | None) -> str:
         """For reading: rounded, without the unit; a dash where there is none."""
@@ -53,9 +56,12 @@ class Unit:
         exact = self.shown(value)
         for precision in range(1, 22):
             short = Context(prec=precision, rounding=ROUND_HALF_EVEN).plus(exact)
-            if self.si_value(short) == value:
+            if self._nearest(short) == value:
                 return f"{short.normalize():f}"
         return f"{exact:f}"
+
+    def _nearest(self, number: Decimal) -> float:
+        return float(_EXACT.divide(number, self.factor))
 
 
 _DEGREES = _EXACT.divide(Decimal(180), _PI)

@@ -1,5 +1,6 @@
 """Units for people: out and back without losing a digit."""
 
+import sys
 from decimal import Decimal
 
 import pytest
@@ -20,6 +21,11 @@ def test_there_and_back_is_the_very_same_value(unit: Unit, value: float) -> None
 @given(st.sampled_from(ALL), st.floats(-1e12, 1e12))
 def test_what_stands_in_an_edit_field_is_the_value_itself(unit: Unit, value: float) -> None:
     assert unit.si_value(unit.editable(value)) == value
+
+
+@pytest.mark.parametrize("value", [sys.float_info.max, -sys.float_info.max, 5e-324, 0.0])
+def test_the_largest_and_the_smallest_can_be_edited(value: float) -> None:
+    assert UNITS["m"][0].si_value(UNITS["m"][0].editable(value)) == value
 
 
 @given(st.sampled_from(ALL), st.decimals(-10000, 10000, allow_nan=False, places=3))
@@ -57,6 +63,6 @@ def test_what_cannot_be_is_refused_in_words() -> None:
         Units(by_si={"N": "% BW"}).unit("force", "N")
     with pytest.raises(ValueError, match="body mass of 0"):
         percent_body_weight(0)
-    for typed in ("", "1,5", "nan", "inf", "12 °"):
+    for typed in ("", "1,5", "nan", "inf", "12 °", "1e999", "-1e999", "1e-999", "1e9999999999999999999"):
         with pytest.raises(ValueError, match="is not a number in °"):
             UNITS["rad"][0].si_value(typed)
