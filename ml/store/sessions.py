@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 from ml.store import reading
 from ml.store.errors import StoreError, translated
 from ml.store.fragments import DataFile, Extent
+from ml.store.labels import holding
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
 
@@ -158,8 +159,8 @@ def happenings(store: Store, session: Session, table: Table = EVENTS) -> list[di
 
 
 def labels(store: Store, session: Session) -> list[dict[str, Any]]:
-    """What somebody says that robot and wearer did."""
-    return happenings(store, session, LABELS)
+    """What somebody says that robot and wearer did, as far as it has not been taken back."""
+    return holding(happenings(store, session, LABELS))
 
 
 def telemetry(

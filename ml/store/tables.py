@@ -162,13 +162,15 @@ JOURNAL: Final = Table(
 )
 LABELS: Final = Table(
     "labels",
-    "what robot and wearer did from `utc` to `ended`, as somebody or something says",
+    "what robot and wearer did from `utc` to `ended`, as somebody or something says; see labels.py",
     pa.schema(
         [
             *_WHOSE,
             field("ended", UTC),
             *(field(name, pa.string()) for name in ("label", "author", "source")),
             *_ORIGIN,
+            field("written", UTC),
+            field("removed", pa.bool_()),
         ]
     ),
     indexed=4,

@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from gateway.cli.reach import choose as choose_command
 from gateway.cli.text import NONE, say, say_json, size, table, warn
-from ml.store import NoSuchTable, StoreError, sessions
+from ml.store import StoreError, sessions
 from ml.store.sessions import Channel, Session
 from ml.store.store import Store
 from server_gui.commands.cloud_reach import Advance, add_url, instant, parser, progress, reach, spool, when
@@ -44,26 +44,13 @@ def ls(argv: list[str]) -> int:
     _add_times(made, instant, "as ISO 8601 writes it, UTC")
     add_url(made)
     arguments = made.parse_args(argv)
-    found = [session for session in _all(arguments) if _wanted(session, arguments)]
+    known = spooled.all_sessions(spool(arguments), lambda: reach(arguments))
+    found = [session for session in known if _wanted(session, arguments)]
     if arguments.json:
         say_json([_fields(session) for session in found])
     else:
         say(table(HEADER, map(_row, found), right=(3, 4, 5)))
     return 0
-
-
-def _all(arguments: argparse.Namespace) -> list[Session]:
-    """The store's sessions, and those that this computer's spool alone has."""
-    waiting = {(each.robot, each.session): each for each in spooled.sessions(spool(arguments))}
-    try:
-        stored = sessions.sessions(reach(arguments))
-    except NoSuchTable:
-        if not waiting:
-            raise
-        stored = []
-    for each in stored:
-        waiting.pop((each.robot, each.session), None)
-    return sessions.in_order([*stored, *waiting.values()])
 
 
 def _wanted(session: Session, arguments: argparse.Namespace) -> bool:

@@ -2,22 +2,25 @@
 
 import contextlib
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
+import ml.store.sessions
+from ml.store import NoSuchTable, Store, Table
 from ml.store.fragments import Extent
-from ml.store.sessions import Session, made, newest
+from ml.store.sessions import Session, in_order, made, newest
+from ml.store.tables import SESSIONS
+from ml.store.tables import UTC as UTC_TIME
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import Record
 
 _WAITING: Final = "????????.db"
 _UPLOADED: Final = "????????.uploaded.db"
-_TIMES: Final = ("utc", "began", "ended")
 _decoder = msgspec.msgpack.Decoder(Record)
 
 
@@ -33,11 +36,36 @@ class Batch:
 
 def sessions(spool: Path) -> list[Session]:
     """Those that are told of in what waits for upload; their telemetry is not counted."""
-    records = (record for segment in sorted(spool.glob(_WAITING)) for record in _records(segment))
-    rows = (record.fields for record in records if record.table == "sessions")
+    return [made(row, Extent(()), uploaded=False) for row in newest(rows(spool, SESSIONS))]
+
+
+def all_sessions(spool: Path, store: Callable[[], Store]) -> list[Session]:
+    """The store's sessions, and those that this computer's spool alone has, oldest first.
+
+    Raises:
+        StoreError: the store cannot be read; or there is none, and nothing in the spool either.
+
+    """
+    waiting = {(each.robot, each.session): each for each in sessions(spool)}
+    try:
+        stored = ml.store.sessions.sessions(store())
+    except NoSuchTable:
+        if not waiting:
+            raise
+        stored = []
+    for each in stored:
+        waiting.pop((each.robot, each.session), None)
+    return in_order([*stored, *waiting.values()])
+
+
+def rows(spool: Path, table: Table) -> list[dict[str, Any]]:
+    """A table's rows in what waits for upload, their times as the store has them."""
+    times = [column.name for column in table.schema if column.type == UTC_TIME]
     return [
-        made(row | {name: _time(row[name]) for name in _TIMES}, Extent(()), uploaded=False)
-        for row in newest(rows)
+        record.fields | {name: _time(record.fields.get(name)) for name in times}
+        for segment in sorted(spool.glob(_WAITING))
+        for record in _records(segment)
+        if record.table == table.name
     ]
 
 
@@ -71,4 +99,7 @@ def _read(segment: Path, sql: str) -> list[tuple[Any, ...]]:
 
 
 def _time(utc_ns: int | None) -> datetime | None:
-    return None if utc_ns is None else datetime.fromtimestamp(utc_ns / 1e9, UTC)
+    """To the microsecond, as the store keeps it."""
+    return (
+        None if utc_ns is None else datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=utc_ns // 1000)
+    )

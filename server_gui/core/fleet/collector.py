@@ -1,5 +1,6 @@
 """The server without a screen: fleet, recorder, spool, uploader, and the door where it is asked."""
 
+import asyncio
 import concurrent.futures
 import importlib.metadata
 import logging
@@ -9,17 +10,19 @@ import time
 from collections.abc import Callable
 from typing import Final, Self, TypeVar
 
+import msgspec
 from msgspec import Struct
 
 from gateway.client import Address
 from gateway.messages import ResourceSnapshotParams
 from ml.store import Store
 from server_gui.core.feed import ONCE, Following
-from server_gui.core.fleet.door import door
+from server_gui.core.fleet.door import Answers, door
 from server_gui.core.fleet.fleet import Fleet, Show
 from server_gui.core.fleet.statistics import LinkReport
 from server_gui.core.network import Network
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
+from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader, UploaderState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload
@@ -31,6 +34,7 @@ Result = TypeVar("Result")
 QUIET_S: Final = 10.0  # without a row of any robot: idle
 MOST_BACKLOG_BYTES: Final = 2 << 30  # more does not wait until the robots are quiet
 JOURNAL_S: Final = 5.0
+ON_DISK_S: Final = 4.0  # for what was asked to be kept
 LAST_UPLOAD_S: Final = 20.0  # what waits at the end may take so long; the spool keeps the rest
 BREAK_OFF_S: Final = 5.0  # for an upload under way
 
@@ -67,6 +71,7 @@ class Collector:
         show: Show | None = None,
     ) -> None:
         self.hangs = False
+        self._disk = concurrent.futures.ThreadPoolExecutor(1, "disk")
         self._settings = settings
         self._began_s = time.time()
         recorder = settings.recorder
@@ -88,6 +93,7 @@ class Collector:
 
     def __exit__(self, *exc: object) -> None:
         self.network.__exit__()
+        self._disk.shutdown()
         self._recorder.close()
         if self._settings.recorder.upload is not Upload.MANUAL and not self._uploader.drain(LAST_UPLOAD_S):
             log.warning("%d batches wait in the spool for the next start", len(self._spool.waiting()))
@@ -124,7 +130,12 @@ class Collector:
         return self.network.run(do())
 
     async def _run(self) -> None:
-        answers = {"status": self._report, "upload": self._upload, "mark": self._mark}
+        answers: Answers = {
+            "status": self._report,
+            "upload": self._upload,
+            "mark": self._mark,
+            "keep": self._keep,
+        }
         async with door(self._spool.folder, answers):
             await self._fleet.run()
 
@@ -145,6 +156,15 @@ class Collector:
         for name in robots:
             self._recorder.mark(name, text)
         return len(robots)
+
+    async def _keep(self, text: str) -> bool:
+        """Keep rows of other tables, such as labels; whether they are on the disk now."""
+        rows = msgspec.json.decode(text, type=list[Record])
+        lost = self._recorder.state.lost
+        for row in rows:
+            self._recorder.add(row)
+        flushed = self._disk.submit(self._recorder.flush, ON_DISK_S)
+        return await asyncio.wrap_future(flushed) and self._recorder.state.lost == lost
 
     def _upload(self, _text: str) -> int:
         """Begin to upload everything until now; how many batches waited."""

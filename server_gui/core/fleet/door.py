@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import inspect
 import os
 import socket
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
@@ -29,12 +30,12 @@ class Request(msgspec.Struct, frozen=True, omit_defaults=True):
 
 @contextlib.asynccontextmanager
 async def door(folder: Path, answers: Answers) -> AsyncIterator[None]:
-    """Answer who asks; the folder must be ours alone. `answers` are called in this event loop."""
+    """Answer who asks; the folder must be ours alone. `answers` are called in this loop, or awaited."""
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError, TimeoutError, ValueError):  # who asked has gone, or said nothing
             async with asyncio.timeout(ANSWER_S):
-                writer.write(_answer(await reader.readline(), answers))
+                writer.write(await _answer(await reader.readline(), answers))
                 await writer.drain()
         writer.close()
 
@@ -80,10 +81,13 @@ def ask(folder: Path, what: str, text: str = "") -> bytes:
     return answer
 
 
-def _answer(line: bytes, answers: Answers) -> bytes:
+async def _answer(line: bytes, answers: Answers) -> bytes:
     asked = msgspec.json.decode(line, type=Request)
     answer = answers.get(asked.ask)
-    return b"" if answer is None else msgspec.json.encode(answer(asked.text)) + b"\n"
+    if answer is None:
+        return b""
+    found = answer(asked.text)
+    return msgspec.json.encode(await found if inspect.isawaitable(found) else found) + b"\n"
 
 
 @contextlib.contextmanager

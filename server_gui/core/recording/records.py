@@ -9,6 +9,7 @@ from typing import Any, Final
 import msgspec
 
 from gateway.messages import ResourceSnapshot
+from ml.store.labels import Label
 from server_gui.core.recording.rows import Record
 
 MORE: Final = ("disk", "network", "thermal", "throttling", "kernel")  # of a snapshot, in one column
@@ -71,26 +72,9 @@ def begin(robot: str, facts: Facts) -> Session:
     return Session(robot, name, now_ns, facts)
 
 
-def label(
-    robot: str,
-    session: str,
-    text: str,
-    began_utc_ns: int,
-    ended_utc_ns: int,
-    author: str,
-    source: str = "person",
-) -> Record:
-    """A row of `labels`: what robot and wearer did from `began_utc_ns` to `ended_utc_ns`."""
-    fields = {
-        "robot": robot,
-        "session": session,
-        "utc": began_utc_ns,
-        "ended": ended_utc_ns,
-        "label": text,
-        "author": author,
-        "source": source,
-    }
-    return Record("labels", fields)
+def label(label: Label, *, removed: bool = False) -> Record:
+    """A row of `labels`: that the label holds, or holds no more."""
+    return Record("labels", label.row(time.time_ns(), removed=removed))
 
 
 def prediction(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ml.store import Store
+from ml.store.labels import Label
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts, label
 from server_gui.core.recording.spool import Spool
@@ -37,7 +38,7 @@ def record(
                 recorder.record(robot, 1, batch(seq + (seq >= 10), ROWS, channels=channels))
             recorder.mark(robot, "here")
             now_ns = time.time_ns()
-            recorder.add(label(robot, session, "walk", now_ns - 10**9, now_ns, "anna"))
+            recorder.add(label(Label(robot, session, now_ns - 10**9, now_ns, "walk", "anna")))
         store = Store(url)
         for number in opened.waiting() if sent else ():
             send(opened, number, store)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gateway.client import Batch
+from ml.store.labels import Label
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.recorder import AGAIN_S, Alarm, AlarmKind, Recorder, RecorderSettings
 from server_gui.core.recording.records import Facts, label
@@ -166,7 +167,7 @@ def test_journal_entries_are_kept_once(spool: Spool) -> None:
 def test_markers_and_labels_are_kept(spool: Spool) -> None:
     with Recorder(spool) as recorder:
         recorder.mark("exo-01", "stumbled", foot="left")
-        recorder.add(label("exo-01", "s", "walking", 1, 2, "ada"))
+        recorder.add(label(Label("exo-01", "s", 1, 2, "walking", "ada")))
     (marker,) = events(spool, "marker")
     assert (marker["text"], json.loads(str(marker["data"]))) == ("stumbled", {"foot": "left"})
     assert [record.fields["label"] for record in kept(spool)[1] if record.table == "labels"] == ["walking"]

@@ -11,6 +11,7 @@ import pytest
 
 from gateway.messages import ResourceSnapshot
 from ml.store import Store, StoreUnreachable
+from ml.store.labels import Label
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.recorder import Recorder
@@ -71,7 +72,7 @@ def test_every_table_gets_its_rows_once(spool: Spool, store_url: str, snapshot: 
         recorder.journal(
             "exo-01", [{"n": 1, "hash": "h", "utc_ns": 5_000, "who": "ada", "what": "write", "to": 3}]
         )
-        recorder.add(label("exo-01", session, "walking", 1_000, 2_000, "ada"))
+        recorder.add(label(Label("exo-01", session, 1_000, 2_000, "walking", "ada")))
         recorder.add(prediction("exo-01", session, 1_000, 7, "gait-3", {"walking": 0.75, "standing": 0.25}))
     for _ in range(2):
         upload_all(spool, store)

@@ -1,0 +1,104 @@
+"""Labels: what robot and wearer did, as somebody or something says; and which of a table's rows hold.
+
+A row says that a label holds, or (`removed`) that the same one holds no more. Of rows that say of the same
+robot, session, time, author and source the same label, the newest (`written`) counts, so that a label is one
+however often it was written.
+"""
+
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime, timedelta
+from enum import Enum
+from typing import Any, Final, Self
+
+from msgspec import Struct
+from msgspec.structs import force_setattr
+
+US_NS: Final = 1_000  # the store's times are microseconds
+
+# What a wearer does at a moment; two of them at once contradict each other.
+ACTIVITIES: Final = (
+    "stand", "walk", "sit", "sit_to_stand", "stand_to_sit", "stairs_up", "stairs_down", "ramp_up",
+    "ramp_down", "turn_left", "turn_right", "stumble", "fall", "lying", "get_up",
+)  # fmt: skip
+# What happens at one instant: the gait phase of a leg goes from one heel strike to the next.
+INSTANTS: Final = ("left_heel_strike", "right_heel_strike", "left_toe_off", "right_toe_off")
+
+
+class Source(Enum):
+    """Who says so, the most trusted first."""
+
+    PERSON = "person"
+    SIMULATOR = "simulator"  # its own truth
+    SENSORS = "sensors"  # gait events found in the recording itself
+    PSEUDO = "pseudo"  # a model that was sure enough: never more than that
+
+
+class Label(Struct, frozen=True, order=True):
+    """One label of a session, from `began_utc_ns` up to `ended_utc_ns`, which are the same for an instant."""
+
+    robot: str
+    session: str
+    began_utc_ns: int
+    ended_utc_ns: int
+    label: str
+    author: str
+    source: Source = Source.PERSON
+
+    def __post_init__(self) -> None:
+        """Times as the store keeps them."""
+        for name in ("began_utc_ns", "ended_utc_ns"):
+            force_setattr(self, name, getattr(self, name) // US_NS * US_NS)
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Self:
+        """The label that a row of the table tells of."""
+        return cls(
+            robot=row["robot"],
+            session=row["session"],
+            began_utc_ns=utc_ns(row["utc"]),
+            ended_utc_ns=utc_ns(row["ended"]),
+            label=row["label"],
+            author=row["author"] or "",
+            source=Source(row["source"]),
+        )
+
+    def row(self, written_utc_ns: int, *, removed: bool = False) -> dict[str, Any]:
+        """The fields of a row of the table `labels`."""
+        return {
+            "robot": self.robot,
+            "session": self.session,
+            "utc": self.began_utc_ns,
+            "ended": self.ended_utc_ns,
+            "label": self.label,
+            "author": self.author,
+            "source": self.source.value,
+            "written": written_utc_ns,
+            "removed": removed,
+        }
+
+
+def holding(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Of rows of the table `labels` those that hold, in time's order; each label once."""
+    newest: dict[tuple[Any, ...], Mapping[str, Any]] = {}
+    for row in sorted(rows, key=_written):
+        newest[_key(row)] = row
+    return sorted((dict(row) for row in newest.values() if not row.get("removed")), key=_order)
+
+
+def utc_ns(time: datetime) -> int:
+    """A time of the store in ns since 1970."""
+    return (time - datetime(1970, 1, 1, tzinfo=UTC)) // timedelta(microseconds=1) * US_NS
+
+
+def _key(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    return tuple(row[name] for name in ("robot", "session", "utc", "ended", "label", "author", "source"))
+
+
+def _written(row: Mapping[str, Any]) -> tuple[bool, Any]:
+    """Rows of stores from before there was such a column come first."""
+    written = row.get("written")
+    return (written is not None, written)
+
+
+def _order(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    return (row["utc"], row["ended"], row["label"], row["author"])
