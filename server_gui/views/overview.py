@@ -56,9 +56,9 @@ class KeyPlot(Card):
         """Draw the past of the channels."""
         unit = self._desk.shown.units.unit("", self._si)
         times = station.rings.times(SECONDS)
-        columns = [station.rings.values(name, len(times)) * unit.scale for name in self._channels]
+        columns = [station.rings.values(name, len(times)) for name in self._channels]
         live = not station.robot.is_stale()
-        self.plot.draw(times, columns, live=live)
+        self.plot.draw(station.rings.source, times, columns, live=live, scale=unit.scale)
         if slow:
             texts = [unit.text(station.robot.values.get(name)) for name in self._channels]
             self.set_note(f"{' / '.join(texts)} {unit.symbol}" if live else _old(station))

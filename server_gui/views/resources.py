@@ -4,6 +4,7 @@ import time
 from typing import Final
 
 import msgspec
+import numpy as np
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
@@ -107,15 +108,18 @@ class Resources(QWidget):
         rows = station.processing.resource.history.recent()
         if not len(rows):
             return
-        times = rows[:, 0] - rows[-1, 0]
+        restarts = np.flatnonzero(np.diff(rows[:, 0]) < 0)  # the robot's clock has begun anew
+        rows = rows[restarts[-1] + 1 :] if len(restarts) else rows
+        times = rows[:, 0]
         series = {name: rows[:, 1 + place] for place, name in enumerate(SERIES)}
-        span = next((seconds for seconds in SPANS_S if times[0] > -seconds), SPANS_S[-1])
+        span = next((seconds for seconds in SPANS_S if times[-1] - times[0] < seconds), SPANS_S[-1])
         for plot in (self._cpu, self._memory):
             if plot.seconds != span:
                 plot.set_seconds(span)
         live = not _is_old(station)
-        self._cpu.draw(times, [series["cpu_percent"], series["gateway_cpu_percent"]], live=live)
-        self._memory.draw(times, [series["memory_used"] / MIB], live=live)
+        source = station.processing.resource.history
+        self._cpu.draw(source, times, [series["cpu_percent"], series["gateway_cpu_percent"]], live=live)
+        self._memory.draw(source, times, [series["memory_used"]], live=live, scale=1 / MIB)
 
     def _refresh_facts(self, station: Station) -> None:
         seen = station.robot.resources

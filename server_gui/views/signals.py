@@ -43,12 +43,20 @@ OTHERS: Final = ("#009e73", "#cc79a7", "#d55e00", "#f0e442", "#8f8fd6", "#7fb36b
 NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Frozen:
     """What a paused view goes on showing."""
 
     times: Floats
     columns: dict[str, Floats]
+
+    def times_of(self, seconds: float) -> Floats:
+        """Those of the last `seconds`."""
+        return (
+            self.times[np.searchsorted(self.times, self.times[-1] - seconds) :]
+            if len(self.times)
+            else self.times
+        )
 
 
 class UnitPlot(Card):
@@ -133,7 +141,8 @@ class Signals(QWidget):
         self._list_channels(station)
         seconds = float(SPANS_S[self._span.currentIndex()])
         frozen = self._frozen
-        times = station.rings.times(seconds) if frozen is None else frozen.times[frozen.times >= -seconds]
+        times = station.rings.times(seconds) if frozen is None else frozen.times_of(seconds)
+        source = station.rings.source if frozen is None else frozen
         for plot in self.plots:
             found = [
                 station.rings.values(name, len(times))
@@ -141,8 +150,8 @@ class Signals(QWidget):
                 else frozen.columns[name][-len(times) :]
                 for name in plot.channels
             ]
-            columns = [values * plot.unit.scale for values in found] if plot.unit.scale != 1.0 else found
-            plot.plot.draw(times, columns, live=frozen is not None or not station.robot.is_stale())
+            live = frozen is not None or not station.robot.is_stale()
+            plot.plot.draw(source, times, found, live=live, scale=plot.unit.scale)
         self._frame += 1
         if self._frame % SLOW == 1:
             set_text(self.said, self._state(station))
@@ -175,7 +184,7 @@ class Signals(QWidget):
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["time s", *(f"{name} {si.get(name, '')}".rstrip() for name in columns)])
-            for row, time_s in enumerate(times):
+            for row, time_s in enumerate(times - times[-1:]):
                 values = (column[row] for column in columns.values())
                 writer.writerow([f"{time_s:.6f}", *("" if np.isnan(value) else value for value in values)])
 
@@ -302,11 +311,11 @@ class Signals(QWidget):
     def _data(self, station: Station, seconds: float) -> tuple[Floats, dict[str, Floats]]:
         if self._frozen is None:
             return self._live(station, seconds)
-        times = self._frozen.times[self._frozen.times >= -seconds]
+        times = self._frozen.times_of(seconds)
         return times, {name: column[-len(times) :] for name, column in self._frozen.columns.items()}
 
     def _live(self, station: Station, seconds: float) -> tuple[Floats, dict[str, Floats]]:
-        times = station.rings.times(seconds)
+        times = station.rings.times(seconds).copy()
         names = [name for plot in self.plots for name in plot.channels]
         return times, {name: station.rings.values(name, len(times)).copy() for name in names}
 

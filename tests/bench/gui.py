@@ -3,14 +3,13 @@
 CPU time of this process, not wall time. Drawn offscreen by Qt's raster engine, as on a screen without OpenGL.
 """
 
-import functools
+import math
 import os
 import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import count
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 from gateway.messages import StreamData
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.soles import cells_of
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
@@ -54,41 +54,74 @@ class Row:
         return f"{self.what:<72}{self.value:>10,.3g} {self.unit:<10}{asked}\n"
 
 
-Draw = Callable[[int], None]
+Draw = Callable[[int], None]  # a frame
+SPAN_S = 10.0
+SECOND_NS = 1_000_000_000
 
 
-def curves(frame: int, number: int, points: int) -> tuple[Floats, Floats]:
-    """What a curve shows in a frame: it has moved on by a thirtieth of its span's second."""
-    times = np.linspace(-10.0, 0.0, points)
-    return times, np.sin(2 * np.pi * (times + frame / FRAMES_PER_S) + number) + 0.01 * np.cos(37 * times)
+class Source:
+    """Rings that a robot fills: after every frame there are rows for another thirtieth of a second."""
+
+    def __init__(self, curves: int, points: int) -> None:
+        self._names = [f"curve {number}" for number in range(curves)]
+        self._rate_hz = points / SPAN_S
+        self._row = 0
+        self.rings = Rings()
+        self.feed(points)
+
+    def feed(self, rows: int) -> None:
+        """So many rows more."""
+        numbers = range(self._row, self._row + rows)
+        self._row += rows
+        stamps_ns = [round(number / self._rate_hz * SECOND_NS) for number in numbers]
+        self.rings.take(
+            stamps_ns,
+            {
+                name: [
+                    math.sin(2e-9 * math.pi * stamp_ns + place) + 0.01 * math.cos(37e-9 * stamp_ns)
+                    for stamp_ns in stamps_ns
+                ]
+                for place, name in enumerate(self._names)
+            },
+        )
+
+    def feed_until(self, frame: int) -> None:
+        """The rows that have come when a frame is drawn."""
+        self.feed(round((SPAN_S + frame / FRAMES_PER_S) * self._rate_hz) - self._row)
+
+    def curves(self, of: slice) -> tuple[Floats, list[Floats]]:
+        """Times, and the values of some curves."""
+        times = self.rings.times(SPAN_S)
+        return times, [self.rings.values(name, len(times)) for name in self._names[of]]
 
 
-def ours(theme: Theme, page: QVBoxLayout, plots: int, each: int, points: int) -> Draw:
+def ours(theme: Theme, page: QVBoxLayout, source: Source, plots: int, each: int) -> Draw:
     """Our plots."""
-    made = [Plot(theme, 10.0) for _ in range(plots)]
+    made = [Plot(theme, SPAN_S) for _ in range(plots)]
     for plot in made:
         plot.set_curves([Curve(f"curve {number}", COLOURS[number]) for number in range(each)])
         page.addWidget(plot)
 
-    def draw(frame: int) -> None:
+    def draw(_frame: int) -> None:
         for number, plot in enumerate(made):
-            found = [curves(frame, number * each + curve, points) for curve in range(each)]
-            plot.draw(found[0][0], [values for _, values in found], live=True)
+            times, values = source.curves(slice(number * each, (number + 1) * each))
+            plot.draw(source.rings.source, times, values, live=True)
 
     return draw
 
 
-def plain(theme: Theme, page: QVBoxLayout, plots: int, each: int, points: int) -> Draw:
+def plain(theme: Theme, page: QVBoxLayout, source: Source, plots: int, each: int) -> Draw:
     """The same with pyqtgraph's own defaults."""
     made = [pg.PlotWidget() for _ in range(plots)]
     lines = [[plot.plot(pen=theme.colour(COLOURS[number])) for number in range(each)] for plot in made]
     for plot in made:
         page.addWidget(plot)
 
-    def draw(frame: int) -> None:
+    def draw(_frame: int) -> None:
         for number, drawn in enumerate(lines):
-            for curve, line in enumerate(drawn):
-                line.setData(*curves(frame, number * each + curve, points))
+            times, values = source.curves(slice(number * each, (number + 1) * each))
+            for line, column in zip(drawn, values, strict=True):
+                line.setData(times - times[-1], column)
 
     return draw
 
@@ -114,8 +147,8 @@ def maps_and_figure(theme: Theme, page: QVBoxLayout) -> Draw:
     return draw
 
 
-def ms_a_frame(make: Callable[[QVBoxLayout], Draw]) -> float:
-    """The median CPU time of a frame; what it takes to make the curves' numbers is taken off before."""
+def ms_a_frame(make: Callable[[QVBoxLayout], Draw], before: Draw = lambda _frame: None) -> float:
+    """The median CPU time of a frame; what happens `before` it does not count."""
     window = QWidget()
     page = QVBoxLayout(window)
     draw = make(page)
@@ -124,6 +157,7 @@ def ms_a_frame(make: Callable[[QVBoxLayout], Draw]) -> float:
     QApplication.processEvents()
     took = []
     for frame in range(WARM_UP + FRAMES):
+        before(frame)
         began = time.process_time()
         draw(frame)
         QApplication.processEvents()
@@ -133,16 +167,11 @@ def ms_a_frame(make: Callable[[QVBoxLayout], Draw]) -> float:
     return statistics.median(took[WARM_UP:])
 
 
-def making(plots: int, each: int, points: int) -> float:
-    """What the numbers alone cost, ms a frame."""
-    frames = count()
-
-    def make() -> None:
-        frame = next(frames)
-        for number in range(plots * each):
-            curves(frame, number, points)
-
-    return _median_ms(make)
+def curves_ms(draws: Callable[..., Draw], theme: Theme, shape: tuple[int, int, int]) -> float:
+    """A frame of so many plots, with so many curves of so many points each."""
+    plots, each, points = shape
+    source = Source(plots * each, points)
+    return ms_a_frame(lambda page: draws(theme, page, source, plots, each), source.feed_until)
 
 
 def telemetry() -> Iterator[Row]:
@@ -153,7 +182,8 @@ def telemetry() -> Iterator[Row]:
     decode = msgspec.json.Decoder(StreamData).decode
     station = Bench(Desk()).add("robot")
     station.take([described()])
-    events = iter([walking(ROWS_A_FRAME, rate_hz=1000.0) for _ in range(FRAMES)])
+    ages_s = [-frame / FRAMES_PER_S for frame in range(FRAMES)]  # one after another
+    events = iter([walking(ROWS_A_FRAME, age_s, rate_hz=1000.0) for age_s in ages_s])
     channels = len(batch.columns)
     yield Row(f"telemetry, {channels} channels at 1 kHz: decode", _median_ms(lambda: decode(line)), "ms")
     taken = _median_ms(lambda: station.take([next(events)]))
@@ -174,11 +204,7 @@ def rows() -> Iterator[Row]:
     theme = Theme(QApplication.instance() or QApplication([]))  # type: ignore[arg-type]
     total = 0.0
     for plots, each, points in (FEW, MANY):
-        numbers = making(plots, each, points)
-        mine, theirs = (
-            ms_a_frame(functools.partial(make, theme, plots=plots, each=each, points=points)) - numbers
-            for make in (ours, plain)
-        )
+        mine, theirs = (curves_ms(draws, theme, (plots, each, points)) for draws in (ours, plain))
         name = f"{plots * each} curves × {points:,} points"
         yield Row(f"{name}, ours", mine, "ms")
         yield Row(f"{name}, pyqtgraph's defaults", theirs, "ms")

@@ -1,6 +1,7 @@
 """Curves as pixels: in their place, joined, without a spike lost, and not drawn where nothing is known."""
 
 import itertools
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -8,15 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server_gui.views.widgets.raster import DASH, Floats, Pixels, View, draw
+from server_gui.views.widgets.raster import DASH, Floats, Inks, Pixels, Strip, View
 
 INK = 0xFF112233
 
 
 def drawn(times: Floats, values: Floats, view: View, *, dashed: bool = False) -> Pixels:
-    pixels = np.zeros((view.height, view.width), np.uint32)
-    draw(pixels, view, times, [values], [(INK, dashed)])
-    return pixels
+    strip = Strip()
+    strip.draw("robot", view, times, [values], Inks((INK,), (dashed,)))
+    return unrolled(strip)
+
+
+def unrolled(strip: Strip) -> Pixels:
+    """The picture as it is shown: the newest column at the right."""
+    return np.roll(strip.pixels, -strip.seam, axis=1)
 
 
 def columns(pixels: Pixels) -> npt.NDArray[np.bool_]:
@@ -24,7 +30,7 @@ def columns(pixels: Pixels) -> npt.NDArray[np.bool_]:
     return np.array([column.any() for column in pixels.T], np.bool_)
 
 
-VIEW = View(-10.0, 0.0, -1.0, 1.0, 200, 101)
+VIEW = View(10.0, -1.0, 1.0, 200, 101)
 
 
 @pytest.mark.parametrize("points", [2, 50, 199, 1_000, 100_000])
@@ -79,8 +85,45 @@ def test_what_lies_outside_the_range_is_not_drawn_at_its_edge() -> None:
 
 def test_a_dashed_line_has_gaps() -> None:
     seen = columns(drawn(np.linspace(-10, 0, 500), np.zeros(500), VIEW, dashed=True))
-    assert seen[:DASH].all()
-    assert not seen[DASH : 2 * DASH].any()
+    assert seen[-1]
+    assert not seen[-1 - DASH : -1].any()
+    assert seen[-1 - 2 * DASH : -1 - DASH].all()
+
+
+rises = st.lists(st.floats(0.001, 0.4), min_size=2, max_size=200)
+heights = st.one_of(st.floats(-1.5, 1.5), st.just(math.nan))
+
+
+@given(rises, st.data(), st.sampled_from([7, 40, 300]))
+def test_what_is_drawn_bit_by_bit_is_what_is_drawn_at_once(
+    steps: list[float], data: st.DataObject, width: int
+) -> None:
+    times = np.cumsum(steps)
+    curves = [
+        np.array(data.draw(st.lists(heights, min_size=len(times), max_size=len(times)))) for _ in range(2)
+    ]
+    ends = sorted(data.draw(st.sets(st.integers(2, len(times)), min_size=1, max_size=6)))
+    view, inks = View(3.0, -1.0, 1.0, width, 50), Inks((INK, INK + 1), (False, True), 1)
+    bit_by_bit, at_once = Strip(), Strip()
+    for end in ends:
+        bit_by_bit.draw("robot", view, times[:end], [curve[:end] for curve in curves], inks)
+    at_once.draw("robot", view, times[: ends[-1]], [curve[: ends[-1]] for curve in curves], inks)
+    assert np.array_equal(unrolled(bit_by_bit), unrolled(at_once))
+
+
+def test_another_robot_leaves_nothing_of_the_one_before() -> None:
+    strip, times = Strip(), np.linspace(0, 10, 1_000)
+    strip.draw("one", VIEW, times, [np.full(1_000, 0.9)], Inks((INK,), (False,)))
+    strip.draw("other", VIEW, times + 0.1, [np.zeros(1_000)], Inks((INK,), (False,)))
+    assert np.flatnonzero(strip.pixels.any(axis=1)).tolist() == [50]
+
+
+def test_nothing_new_is_nothing_to_draw() -> None:
+    strip, times = Strip(), np.linspace(0, 10, 1_000)
+    inks = Inks((INK,), (False,))
+    assert strip.draw("robot", VIEW, times, [np.zeros(1_000)], inks)
+    assert not strip.draw("robot", VIEW, times, [np.zeros(1_000)], inks)
+    assert strip.draw("robot", VIEW, times + 0.01, [np.zeros(1_000)], inks)
 
 
 @given(
@@ -89,5 +132,5 @@ def test_a_dashed_line_has_gaps() -> None:
     st.integers(1, 90),
 )
 def test_nothing_that_a_robot_may_send_breaks_it(values: list[float], width: int, height: int) -> None:
-    view = View(-1.0, 0.0, -2.0, 2.0, width, height)
+    view = View(1.0, -2.0, 2.0, width, height)
     drawn(np.linspace(-1, 0, len(values)), np.array(values, np.float64), view)

@@ -51,8 +51,18 @@ def test_times_end_at_the_newest_and_begin_where_asked() -> None:
     rings = Rings(1000)
     rings.take([number * 10 * MS for number in range(500)], {"a": [0.0] * 500})
     times = rings.times(1.0)
-    assert times[-1] == 0.0
-    assert -1.0 <= times[0] <= -0.98
+    assert times[-1] == 4.99
+    assert 3.99 <= times[0] <= 4.01
+
+
+def test_what_comes_after_a_new_beginning_is_of_another_source() -> None:
+    rings = Rings(10)
+    rings.take([5_000 * MS], {"a": [1.0]})
+    first = rings.source
+    rings.take([5_010 * MS], {"a": [1.0]})
+    assert rings.source is first
+    rings.take([10 * MS], {"a": [2.0]})
+    assert rings.source is not first
 
 
 def test_memory_does_not_grow_with_time() -> None:

@@ -16,7 +16,8 @@ GAP_NS: Final = 500_000_000  # rows further apart are not joined by a line
 class Rings:
     """The newest `rows` rows: every row is written twice, half a buffer apart, so that any span is one piece.
 
-    A gap in time, and a channel that was missing, are NaN. Memory is bounded: channels × 2 rows.
+    A gap in time, and a channel that was missing, are NaN. Memory is bounded: channels × 2 rows. Rows of one
+    `source` are only ever added; it is another one after the past was forgotten.
     """
 
     def __init__(self, rows: int = ROWS) -> None:
@@ -25,6 +26,7 @@ class Rings:
 
     def clear(self) -> None:
         """Forget everything: the robot's clock has begun anew."""
+        self.source = object()
         self.newest_ns: int | None = None
         self._values: Floats = np.full((0, 2 * self.rows), np.nan)
         self._times: Floats = np.full(2 * self.rows, np.nan)
@@ -48,13 +50,11 @@ class Rings:
         self.newest_ns = stamps_ns[-1]
 
     def times(self, seconds: float) -> Floats:
-        """Times of the rows of the last `seconds`, in s: from −seconds to 0, which is the newest. A copy."""
+        """Times of the rows of the last `seconds`, s since the first row. The ring's own: do not keep it."""
         times = self._span(self._times)
         if not len(times):
             return times
-        first = int(np.searchsorted(times, times[-1] - seconds))
-        since: Floats = times[first:] - times[-1]
-        return since
+        return times[int(np.searchsorted(times, times[-1] - seconds)) :]
 
     def values(self, channel: str, count: int) -> Floats:
         """The newest `count` values of a channel, NaN where there is none. The ring's own: do not keep it."""
@@ -71,15 +71,17 @@ class Rings:
     def _write(self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[float | None]]) -> None:
         self._make_room(columns)
         count = len(stamps_ns)
-        seconds = np.array([stamp_ns - self._base_ns for stamp_ns in stamps_ns], np.float64) / 1e9
-        block = np.full((len(self._places), count), np.nan)
-        for name, column in columns.items():
-            block[self._places[name]] = np.array(column, np.float64)  # None becomes NaN
-        at = (self._next + np.arange(count)) % self.rows
-        for half in (at, at + self.rows):
-            self._times[half] = seconds
-            self._values[: len(block), half] = block
-        self._next = int(at[-1] + 1) % self.rows
+        block = np.full((1 + len(self._places), count), np.nan)
+        block[0] = (np.array(stamps_ns, np.int64) - self._base_ns) / 1e9
+        if columns:
+            places = [1 + self._places[name] for name in columns]
+            block[places] = np.array(list(columns.values()), np.float64)  # None becomes NaN
+        until_end = min(count, self.rows - self._next)
+        for at, part in ((self._next, block[:, :until_end]), (0, block[:, until_end:])):
+            for half in (at, at + self.rows):
+                self._times[half : half + part.shape[1]] = part[0]
+                self._values[: len(part) - 1, half : half + part.shape[1]] = part[1:]
+        self._next = (self._next + count) % self.rows
         self._count = min(self._count + count, self.rows)
 
     def _make_room(self, columns: Mapping[str, Sequence[float | None]]) -> None:

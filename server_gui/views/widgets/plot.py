@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from server_gui.views.theme import Theme
@@ -29,55 +29,39 @@ class Curve:
     dashed: bool = False
 
 
-class Curves(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
-    """All lines of one plot as one picture, made anew when data, range or size have changed."""
+class Curves(QWidget):
+    """All lines of one plot as a strip over its field: what is below is not drawn again for them."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._times: Floats = np.zeros(0)
-        self._values: Sequence[Floats] = ()
-        self._inks: Sequence[tuple[int, bool]] = ()
-        self._image: QImage | None = None
-        self._drawn: tuple[raster.View, float] | None = None
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.strip = raster.Strip()
+        self._image = QImage()
+        self._behind = QColor()
+        self._live = True
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
-    def set_inks(self, inks: Sequence[tuple[int, bool]]) -> None:
-        """Colours (0xAARRGGBB), and which lines are dashed."""
-        self._inks, self._times, self._values, self._drawn = inks, np.zeros(0), (), None
+    def show_strip(self, drawn: bool, behind: QColor, *, live: bool) -> None:
+        """Show the strip as it is now; `drawn`: it has become another."""
+        if not drawn and (behind, live) == (self._behind, self._live):
+            return
+        self._behind, self._live = behind, live
+        height, width = self.strip.pixels.shape
+        # The picture does not keep its memory itself; the strip does.
+        self._image = QImage(self.strip.pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32)
         self.update()
 
-    def show_data(self, times: Floats, values: Sequence[Floats]) -> None:
-        """Draw these from now on."""
-        self._times, self._values, self._drawn = times, values, None
-        self.update()
-
-    def boundingRect(self) -> QRectF:
-        found: QRectF = self.viewRect()
-        return found
-
-    def paint(self, painter: QPainter, *_rest: Any) -> None:
-        place: QRectF = self.getViewBox().sceneBoundingRect()
-        ratio = painter.device().devicePixelRatio()
-        (left, right), (low, high) = self.getViewBox().viewRange()
-        width, height = max(1, round(place.width() * ratio)), max(1, round(place.height() * ratio))
-        view = raster.View(left, right, low, high, width, height)
-        if self._drawn != (view, ratio):
-            self._drawn = (view, ratio)
-            self._image = self._picture(view)
-            self._image.setDevicePixelRatio(ratio)
-        to_scene, _ = self.sceneTransform().inverted()
-        painter.setTransform(to_scene, True)
-        if self._image is not None:
-            painter.drawImage(place.topLeft(), self._image)
-
-    def _picture(self, view: raster.View) -> QImage:
-        pixels = np.zeros((view.height, view.width), np.uint32)
-        raster.draw(pixels, view, self._times, self._values, self._inks)
-        data = pixels.data
-        image = QImage(
-            data, view.width, view.height, 4 * view.width, QImage.Format.Format_ARGB32_Premultiplied
-        )
-        self._pixels = pixels  # the picture does not keep its memory itself
-        return image
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        if not self._live:
+            painter.fillRect(self.rect(), self._behind)
+            painter.setOpacity(OLD)
+        ratio, seam, pixels = self.devicePixelRatioF(), self.strip.seam, self._image.width()
+        height = self._image.height()
+        for begin, end, at in ((seam, pixels, 0), (0, seam, pixels - seam)):
+            place = QRectF(at / ratio, 0, (end - begin) / ratio, height / ratio)
+            painter.drawImage(place, self._image, QRectF(begin, 0, end - begin, height))
+        painter.end()
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
@@ -93,16 +77,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._theme = theme
         self._least = least
         self._curves: Sequence[Curve] = ()
-        self._lines = Curves()
+        self._inks = raster.Inks()
         self._low, self._high, self._frames = 0.0, least, 0
+        self._followed: tuple[object, float] = (None, 0.0)  # whose rows set the range, and the newest
         self.follows = True  # the range follows the data; off once somebody has zoomed
         item = self.getPlotItem()
         item.hideButtons()
         item.setContentsMargins(0, 0, 0, 0)
-        item.addItem(self._lines, ignoreBounds=True)
         item.getViewBox().setDefaultPadding(0.0)
         item.getViewBox().setMouseEnabled(x=False, y=True)
         item.getViewBox().sigRangeChangedManually.connect(self._zoomed)
+        item.getViewBox().sigResized.connect(self._place)
+        self._lines = Curves(self.viewport())
         for name in ("left", "bottom"):
             item.getAxis(name).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -128,28 +114,56 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._frames = 0
         self._restyle()
 
-    def draw(self, times: Floats, columns: Sequence[Floats], *, live: bool) -> None:
-        """Draw a column a curve over the times; grey where not `live`."""
-        ends = [(np.fmin.reduce(values), np.fmax.reduce(values)) for values in columns if len(values)]
-        known = [end for end in ends if end[0] <= end[1]]  # not where all are missing
-        if self.follows and known:
-            self._follow(float(min(low for low, _ in known)), float(max(high for _, high in known)))
-        self._lines.setOpacity(1.0 if live else OLD)
-        self._lines.show_data(times, columns)
+    def draw(
+        self, source: object, times: Floats, columns: Sequence[Floats], *, live: bool, scale: float = 1.0
+    ) -> None:
+        """Draw a column a curve, times `scale`, over the times; grey where not `live`.
+
+        Times (s) rise, the last is now. Rows of one `source` are only ever added.
+        """
+        if self.follows and len(times):
+            self._follow_new(source, times, columns, scale)
+        _, (low, high) = self.getViewBox().viewRange()
+        ratio = self.devicePixelRatioF()
+        width, height = (max(1, round(side * ratio)) for side in (self._lines.width(), self._lines.height()))
+        view = raster.View(self.seconds, low / scale, high / scale, width, height)
+        drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
+        self._lines.show_strip(drawn, self._theme.colour("card"), live=live)
 
     def follow_again(self) -> None:
         """Let the range follow the data again."""
         self.follows, self._frames = True, 0
 
-    def _follow(self, low: float, high: float) -> None:
+    def _follow_new(self, source: object, times: Floats, columns: Sequence[Floats], scale: float) -> None:
+        """Widen the range for what is new; now and then make it as narrow as all of it allows."""
+        known, newest_s = self._followed
+        self._followed = source, float(times[-1])
+        if source is not known:
+            self._frames = 0
         self._frames -= 1
-        outside = low < self._low or high > self._high
-        if not outside and self._frames > 0:
+        since = 0 if self._frames <= 0 else int(np.searchsorted(times, newest_s, "right"))
+        ends = [
+            (np.fmin.reduce(new), np.fmax.reduce(new)) for new in (c[since:] for c in columns) if len(new)
+        ]
+        found = [end for end in ends if end[0] <= end[1]]  # not where all are missing
+        if not found:
             return
+        low, high = min(low for low, _ in found) * scale, max(high for _, high in found) * scale
+        if self._frames <= 0:
+            self._follow(float(low), float(high))
+        elif low < self._low or high > self._high:
+            self._follow(min(float(low), self._low), max(float(high), self._high))
+
+    def _follow(self, low: float, high: float) -> None:
         self._frames = SHRINK_FRAMES
         spare = max(self._least - (high - low), 0.0) / 2 + MARGIN * max(high - low, self._least)
         self._low, self._high = low - spare, high + spare
         self.setYRange(self._low, self._high, padding=0.0)
+
+    def _place(self) -> None:
+        """Over the plot's field, to the pixel."""
+        field = self.getViewBox().sceneBoundingRect()
+        self._lines.setGeometry(self.mapFromScene(field).boundingRect())
 
     def _zoomed(self, _axes: object) -> None:
         self.follows = False
@@ -165,7 +179,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setStyle(tickLength=-4)
             if width is not None:
                 axis.setWidth(theme.px(width))
-        self._lines.set_inks([(_colour(theme, curve.colour).rgba(), curve.dashed) for curve in self._curves])
+        self._inks = raster.Inks(
+            tuple(_colour(theme, curve.colour).rgba() for curve in self._curves),
+            tuple(curve.dashed for curve in self._curves),
+            theme.colour("card").rgba(),
+        )
 
 
 def _colour(theme: Theme, name: str) -> QColor:

@@ -1,9 +1,11 @@
 """Curves straight into pixels: for each column of the plot the span of rows that a curve covers.
 
-As thin and as sharp as Qt's own lines without antialiasing, for a fraction of their time: what a curve costs
-depends on the pixels that it covers, not on its points. No spike is lost, however many points a column has.
+As thin and as sharp as Qt's own lines without antialiasing, for a fraction of their time. A column of time
+keeps its column of pixels for good, as on a strip chart: only what is new is drawn. What a frame costs thus
+depends on the pixels that have come, not on the points that there are. No spike is lost.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -13,82 +15,122 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint32]
-Places = npt.NDArray[np.intp]
+Places = npt.NDArray[np.int64]
 SAMPLES_A_COLUMN: Final = 2  # where there are fewer points, the line between them is sampled so often
 DASH: Final = 5  # columns on, columns off
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What part of the plane the picture shows, and its size in pixels."""
+    """What the picture shows: `seconds` until the newest row, values from `low` to `high`; its pixels."""
 
-    left: float
-    right: float
+    seconds: float
     low: float
     high: float
     width: int
     height: int
 
+    @property
+    def scale(self) -> float:
+        """Columns a second."""
+        return self.width / self.seconds
+
 
 @dataclass(frozen=True, slots=True)
-class Columns:
-    """Which points fall into which columns; the same for all curves of one time axis."""
+class Inks:
+    """A colour (0xAARRGGBB) a curve, which of them are dashed, and what is behind them."""
 
-    times: Floats  # of the samples
-    starts: Places  # the first sample of each column that has one
-    places: Places  # the column's number
-    sampled: bool  # the samples lie between the points, not on them
+    colours: tuple[int, ...] = ()
+    dashed: tuple[bool, ...] = ()
+    behind: int = 0
 
-    @classmethod
-    def of(cls, times: Floats, view: View) -> "Columns":
-        """The columns of these times, which rise."""
-        scale = view.width / (view.right - view.left)
+
+class Strip:
+    """The picture of the curves of one plot; column `c` of time is at `c` modulo the width."""
+
+    def __init__(self) -> None:
+        self.pixels: Pixels = np.zeros((1, 1), np.uint32)
+        self.last = 0  # the newest column of time that was drawn
+        self._key: tuple[object, ...] = ()
+        self._newest_s = 0.0
+
+    @property
+    def seam(self) -> int:
+        """The column of pixels that holds the oldest: the picture goes from here around to here."""
+        return (self.last + 1) % len(self.pixels[0])
+
+    def draw(self, source: object, view: View, times: Floats, curves: Sequence[Floats], inks: Inks) -> bool:
+        """Draw curves over their times (s, rising); whether the picture has become another.
+
+        Rows of the same `source` are only ever added: what was drawn of it is not drawn again.
+        """
         sampled = len(times) < SAMPLES_A_COLUMN * view.width
-        if sampled and len(times):
-            first, last = max(times[0], view.left), min(times[-1], view.right)
-            count = max(2, round((last - first) * scale * SAMPLES_A_COLUMN))
-            times = np.linspace(first, last, count)
-        places = np.clip(((times - view.left) * scale).astype(np.intp), 0, view.width - 1)
-        starts = np.flatnonzero(np.diff(places, prepend=-1))
-        return cls(times, starts, places[starts], sampled)
+        key = (source, view, inks, sampled, len(curves))
+        newest_s = float(times[-1]) if len(times) else 0.0
+        if key == self._key and newest_s == self._newest_s:
+            return False
+        newest = math.floor(newest_s * view.scale)
+        first = newest - view.width + 1
+        if key == self._key and first <= self.last <= newest:
+            first = self.last
+        else:
+            self._begin(key, view, inks)
+        self.last, self._newest_s = newest, newest_s
+        self.pixels[:, np.arange(first, newest + 1) % view.width] = inks.behind
+        if len(times) >= 2 and curves and view.high > view.low:
+            self._draw_from(first, view, times, curves, inks, sampled=sampled)
+        return True
+
+    def _begin(self, key: tuple[object, ...], view: View, inks: Inks) -> None:
+        self._key = key
+        if self.pixels.shape != (view.height, view.width):
+            self.pixels = np.empty((view.height, view.width), np.uint32)
+        self.pixels[:] = inks.behind
+
+    def _draw_from(
+        self, first: int, view: View, times: Floats, curves: Sequence[Floats], inks: Inks, *, sampled: bool
+    ) -> None:
+        """Draw the columns from `first` on; the row before them joins them to what is there."""
+        row = max(0, int(np.searchsorted(times, first / view.scale)) - 1)
+        times, values = times[row:], np.array([curve[row:] for curve in curves])
+        if sampled:
+            times, values = samples(times, values, first, view.scale)
+        columns = np.floor(times * view.scale).astype(np.int64)
+        starts = np.flatnonzero(np.diff(columns, prepend=columns[0] - 1))
+        low, high = np.fmin.reduceat(values, starts, axis=1), np.fmax.reduceat(values, starts, axis=1)
+        before = values[:, starts - 1]  # the line comes from the last sample of the column before
+        before[:, 0] = np.nan
+        unknown = np.isnan(low)
+        low, high = np.fmin(low, before), np.fmax(high, before)
+        seen = ~unknown & (high >= view.low) & (low <= view.high) & (columns[starts] >= first)
+        if any(inks.dashed):
+            seen &= ~np.array(inks.dashed)[:, None] | (columns[starts] // DASH % 2 == 0)
+        curve, column = np.nonzero(seen)
+        top, bottom = _rows(high[seen], view), _rows(low[seen], view)
+        ink = np.array(inks.colours, np.uint32)[curve]
+        fill(self.pixels, columns[starts][column] % view.width, top, bottom, ink)
 
 
-def draw(
-    pixels: Pixels, view: View, times: Floats, curves: Sequence[Floats], inks: Sequence[tuple[int, bool]]
-) -> None:
-    """Draw curves over their times; an ink is a colour (0xAARRGGBB) and whether the line is dashed."""
-    if len(times) < 2 or view.high <= view.low:
-        return
-    columns = Columns.of(times, view)
-    for values, (colour, dashed) in zip(curves, inks, strict=True):
-        samples = np.interp(columns.times, times, values) if columns.sampled else values
-        places, top, bottom = spans(samples, columns, view)
-        if dashed:
-            seen = places // DASH % 2 == 0
-            places, top, bottom = places[seen], top[seen], bottom[seen]
-        fill(pixels, places, top, bottom, colour)
+def samples(times: Floats, values: Floats, first: int, scale: float) -> tuple[Floats, Floats]:
+    """The lines between the points, at places that are the same whenever they are drawn."""
+    begins, ends = max(times[0], (first - 1) / scale), times[-1]
+    step = 1 / (SAMPLES_A_COLUMN * scale)
+    inner = (np.arange(np.floor(begins / step), np.ceil(ends / step) + 1) + 0.5) * step
+    at = np.concatenate(([begins], inner[(inner > begins) & (inner < ends)], [ends]))
+    return at, np.array([np.interp(at, times, line) for line in values])
 
 
-def spans(samples: Floats, columns: Columns, view: View) -> tuple[Places, Places, Places]:
-    """Columns in which the curve is in sight; the first and last row that it covers there, from the top."""
-    low = np.fmin.reduceat(samples, columns.starts)
-    high = np.fmax.reduceat(samples, columns.starts)
-    before = samples[columns.starts - 1]  # the line comes from the last sample of the column before
-    before[0] = np.nan
-    joined = ~np.isnan(low)
-    low, high = np.fmin(low, before), np.fmax(high, before)
-    seen = joined & (high >= view.low) & (low <= view.high)
+def _rows(values: Floats, view: View) -> Places:
     scale = (view.height - 1) / (view.high - view.low)
-    top = np.clip((view.high - high[seen]) * scale + 0.5, 0, view.height - 1).astype(np.intp)
-    bottom = np.clip((view.high - low[seen]) * scale + 0.5, 0, view.height - 1).astype(np.intp)
-    return columns.places[seen], top, bottom
+    inside = np.clip(values, view.low, view.high)
+    return ((view.high - inside) * scale + 0.5).astype(np.int64)
 
 
-def fill(pixels: Pixels, places: Places, top: Places, bottom: Places, colour: int) -> None:
-    """Colour the rows from `top` to `bottom` in each of these columns."""
+def fill(pixels: Pixels, places: Places, top: Places, bottom: Places, inks: Pixels) -> None:
+    """Colour the rows from `top` to `bottom` in each of these columns; what comes later covers."""
     counts = bottom - top + 1
     ends = np.cumsum(counts)
     if not len(ends):
         return
     rows = np.arange(ends[-1]) - np.repeat(ends - counts - top, counts)
-    pixels[rows, np.repeat(places, counts)] = colour
+    pixels[rows, np.repeat(places, counts)] = np.repeat(inks, counts)
