@@ -1,0 +1,73 @@
+"""The code that makes a recipe's features, as one hash: a model is useless once that computes otherwise."""
+
+import ast
+import functools
+import hashlib
+import importlib
+import inspect
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from typing import Any, Final
+
+from ml.features.recipe import Recipe
+
+PACKAGES: Final = ("ml.features.", "ml.robot.")
+_LIBRARIES: Final = ("scikit-learn", "numpy", "skops")
+
+
+def features_hash(recipe: Recipe) -> str:
+    """Of the recipe's numbers and of every module of ours that computes its features.
+
+    Comments, docstrings and layout do not count.
+    """
+    compute: Any = recipe.compute
+    while isinstance(compute, functools.partial):
+        compute = compute.func
+    digest = hashlib.sha256(repr((recipe.name, recipe.rate_hz, recipe.look_back, recipe.channels)).encode())
+    for name in sorted(_modules(compute.__module__, set())):
+        digest.update("\n".join((name, *_said(_tree(name)))).encode())
+    return digest.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Of Python and the libraries that learn."""
+    return {"python": ".".join(map(str, sys.version_info[:3]))} | {name: version(name) for name in _LIBRARIES}
+
+
+def _modules(name: str, seen: set[str]) -> set[str]:
+    """A module, those of ours that it imports, and so on."""
+    seen.add(name)
+    for node in ast.walk(_tree(name)):
+        found = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+        if found.startswith(PACKAGES) and found not in seen:
+            _modules(found, seen)
+    return seen
+
+
+@functools.cache
+def _tree(name: str) -> ast.Module:
+    return ast.parse(inspect.getsource(importlib.import_module(name)))
+
+
+def _said(node: Any) -> Iterator[str]:
+    """What the code says, the same in every version of Python: without places, docstrings and what is not."""
+    if isinstance(node, ast.AST):
+        yield type(node).__name__
+        for field, value in ast.iter_fields(node):
+            if value is not None and value != []:
+                yield field
+                yield from _said(value)
+    elif isinstance(node, list):
+        yield from (word for each in node if not _is_text(each) for word in _said(each))
+    else:
+        yield repr(node)
+
+
+def _is_text(node: Any) -> bool:
+    """Whether it is a docstring, or another string that nothing is done with."""
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )

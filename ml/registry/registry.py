@@ -1,0 +1,240 @@
+"""The models of a store: published once and never altered, loaded only when everything about them is right.
+
+models/<id>/model.skops, model.json, maybe model.onnx
+models/serving/<task>/<robot, or _all>/<n>.json
+"""
+
+import hashlib
+from collections.abc import Iterator, Set
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from ml.errors import UnusableModel
+from ml.registry import archive
+from ml.registry.card import Card, checked_name, content_id, decoded, encoded
+from ml.registry.code import features_hash
+from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers
+from ml.registry.pointers import FOLDER as SERVING
+from ml.robot.learned import Learned
+from ml.store import Store, upkeep
+from ml.store.objects import Objects
+
+FOLDER: Final = "models"
+CARD: Final = "model.json"
+SKOPS: Final = "model.skops"
+ONNX: Final = "model.onnx"
+SHIPPED: Final = Path(__file__).parents[1] / "shipped"  # models that come with GWRMS, laid out as in a store
+
+
+class Registry:
+    """The models under a store's URL, and those that come with GWRMS; for one thread at a time."""
+
+    def __init__(self, store_url: str, shipped: Path = SHIPPED) -> None:
+        self.url = store_url
+        self._objects = Objects(store_url)
+        self._shipped = Objects(shipped.as_uri()) if shipped.is_dir() else None
+        self._known: dict[str, Card] = {}  # a card never changes
+
+    # --- models
+
+    def publish(self, state: dict[str, Any], card: Card, onnx: bytes | None = None) -> str:
+        """Put a model into the store, and keep the versions of tables that its card names; its id.
+
+        The same model again, by whomever, is one model, and the first card stays.
+
+        Raises:
+            UnusableModel: state and card do not fit together, or something else has this model's name.
+            StoreError: the store does not take it, or a table's version is not there.
+
+        """
+        files = {SKOPS: archive.dump(state)} | ({} if onnx is None else {ONNX: onnx})
+        sums = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
+        card = msgspec.structs.replace(card, id="", sha256=sums)
+        card = msgspec.structs.replace(card, id=content_id(card))
+        _check(card, state)
+        for named in card.tables:
+            upkeep.pin(Store.existing(named.store), named.location, named.version, card.id)
+        for name, data in (*files.items(), (CARD, encoded(card))):  # the card last: now it is there
+            self._create(card.id, name, data)
+        return card.id
+
+    def entries(self, task: str | None = None) -> list[Card]:
+        """The models that can be looked at, oldest first, those that come with GWRMS before them."""
+        cards = [card for card in map(self._card, self._ids()) if isinstance(card, Card)]
+        cards = [card for card in cards if task in (None, card.task)]
+        return sorted(cards, key=lambda card: (not self.is_shipped(card.id), card.made))
+
+    def damaged(self) -> dict[str, str]:
+        """Models whose card cannot be read, and why."""
+        return {
+            name: str(card) for name in self._ids() if isinstance(card := self._card(name), UnusableModel)
+        }
+
+    def card(self, model: str) -> Card:
+        """What is known of a model.
+
+        Raises:
+            UnusableModel: it is not there, or its card is damaged.
+
+        """
+        if model not in self._known:
+            self._known[model] = self._read_card(model)
+        return self._known[model]
+
+    def load(self, model: str) -> tuple[Card, dict[str, Any]]:
+        """A model, of which everything was verified: files, types, versions, the code of its features.
+
+        Raises:
+            UnusableModel: something is not as it must be; the message says what.
+
+        """
+        card = self._read_card(model)
+        data = self.file(model, SKOPS)
+        try:
+            if hashlib.sha256(data).hexdigest() != card.sha256.get(SKOPS):
+                raise UnusableModel(f"{SKOPS} is not the file that was published: its SHA-256 is another")
+            state = archive.load(data)
+            _check(card, state)
+        except UnusableModel as error:
+            raise UnusableModel(f"{model}: {error}") from None
+        return card, state
+
+    def file(self, model: str, name: str) -> bytes:
+        """One of a model's files; raises `UnusableModel` where it is not there."""
+        path = f"{FOLDER}/{checked_name(model, 'model')}/{name}"
+        for objects in self._places():
+            data = objects.read(path)
+            if data is not None:
+                return data
+        raise UnusableModel(f"{model}: there is no {name} of it in {self.url} (gwrms models ls lists models)")
+
+    def is_shipped(self, model: str) -> bool:
+        """Whether it comes with GWRMS and nobody has promoted it."""
+        return model in _ids(self._shipped) and model not in _ids(self._objects)
+
+    # --- which one serves
+
+    def serving(self, task: str, robot: str = "", channels: Set[str] | None = None) -> str | None:
+        """The model that serves a robot: promoted for it, else for all, else one that comes with GWRMS.
+
+        With `channels` only a model that needs no other; without them, none that comes with GWRMS.
+
+        Raises:
+            UnusableModel: the model that should serve is gone, or its card is damaged.
+
+        """
+        for whose in dict.fromkeys((robot, "")):
+            now = Pointers(self._objects, task, whose).newest()
+            if now and now.model and (channels is None or channels >= set(self.card(now.model).channels)):
+                return now.model
+        fitting = [
+            card
+            for card in map(self.card, _ids(self._shipped))
+            if card.task == task and channels is not None and channels >= set(card.channels)
+        ]
+        return max(fitting, key=lambda card: (len(card.channels), card.made)).id if fitting else None
+
+    def promote(self, model: str, robot: str = "", *, who: str, why: str) -> Pointer:
+        """Let a model serve one robot, or all that have no model of their own.
+
+        Raises:
+            UnusableModel: it cannot be loaded, or was adapted to another robot; what serves stays.
+
+        """
+        card, _ = self.load(model)
+        if card.robot not in ("", robot):
+            raise UnusableModel(f"{model} was adapted to {card.robot}: promote it for that robot alone")
+        if self.is_shipped(model):  # the next version of GWRMS may bring another in its place
+            for name in (*card.sha256, CARD):
+                self._create(model, name, self.file(model, name))
+        return Pointers(self._objects, card.task, robot).promote(model, who, why)
+
+    def rollback(self, task: str, robot: str = "", *, who: str, why: str = "") -> Pointer:
+        """Let that serve which did before; after another rollback, what did before that.
+
+        Raises:
+            UnusableModel: nothing was before, that model cannot be loaded any more, or somebody else changed
+                what serves at the same time; what serves stays.
+
+        """
+        pointers = Pointers(self._objects, task, robot)
+        target = pointers.target()
+        if target.model:
+            self.load(target.model)
+        return pointers.roll_back(target, who, why)
+
+    def history(self, task: str, robot: str = "") -> list[Pointer]:
+        """What has served, oldest first; raises `UnusableModel` where a part of that is damaged."""
+        return Pointers(self._objects, task, robot).history()
+
+    def served(self) -> Iterator[tuple[str, str, Pointer]]:
+        """What was promoted and serves now: tasks, robots ("" for all), pointers."""
+        folders = {name.rpartition("/")[0] for name in self._objects.names(SERVING)}
+        for folder in sorted(folders):
+            task, robot = folder.split("/")[-2:]
+            robot = "" if robot == EVERY_ROBOT else robot
+            now = Pointers(self._objects, task, robot).newest()
+            if now and now.model:
+                yield task, robot, now
+
+    # --- inside
+
+    def _places(self) -> Iterator[Objects]:
+        yield self._objects
+        if self._shipped is not None:
+            yield self._shipped
+
+    def _ids(self) -> list[str]:
+        return list(dict.fromkeys(name for place in self._places() for name in _ids(place)))
+
+    def _card(self, model: str) -> Card | UnusableModel:
+        try:
+            return self.card(model)
+        except UnusableModel as error:
+            return error
+
+    def _read_card(self, model: str) -> Card:
+        data = self.file(model, CARD)
+        try:
+            card = decoded(data)
+        except UnusableModel as error:
+            raise UnusableModel(f"{model}: {error}") from None
+        if card.id != model:
+            raise UnusableModel(f"{model}: its {CARD} is that of {card.id}")
+        return card
+
+    def _create(self, model: str, name: str, data: bytes) -> None:
+        """Write a file, unless it is there; then it must be the same."""
+        if self._objects.create(f"{FOLDER}/{model}/{name}", data):
+            return
+        same = self._read_card(model).id == model if name == CARD else self.file(model, name) == data
+        if not same:
+            raise UnusableModel(f"{model}: there is another {name} in {self.url} already")
+
+
+def _ids(objects: Objects | None) -> list[str]:
+    """Of the models that have a card."""
+    if objects is None:
+        return []
+    paths = [name.split("/") for name in objects.names(FOLDER)]
+    return [path[1] for path in paths if len(path) == 3 and path[2] == CARD]
+
+
+def _check(card: Card, state: dict[str, Any]) -> None:
+    """Refuse a state that is not what the card says, or that this GWRMS would feed other features."""
+    learned = Learned.restored(state)
+    for what, said, found in (
+        ("task", card.task, learned.task.name),
+        ("recipe", card.recipe, learned.recipe.name),
+        ("classes", card.classes, learned.classes),
+        ("channels", card.channels, learned.recipe.channels),
+        ("channels with a unit", sorted(card.units), sorted(card.channels)),
+    ):
+        if said != found:
+            raise UnusableModel(f"the card and the model disagree about its {what}: {said}, and {found}")
+    if card.features_hash != features_hash(learned.recipe):
+        raise UnusableModel(
+            f"the code that makes the features of {card.recipe} has changed since then: learn it again"
+        )
