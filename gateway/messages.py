@@ -179,6 +179,7 @@ class ParameterInfo(Struct, frozen=True):
     read_only: str | None = None
     type: str = ""
     scale: float = 1.0
+    default: Number | None = None  # where the EDS gives one
 
 
 class TrialInfo(Struct, frozen=True):

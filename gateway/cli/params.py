@@ -5,10 +5,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gateway.cli import params_dcf, params_toml
 from gateway.cli.parameters import say_written, trial_s
 from gateway.cli.params_diff import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
-from gateway.cli.params_file import FileProblem, Format, Scope
+from gateway.cli.params_file import FileProblem, Scope
+from gateway.cli.params_formats import format_of
 from gateway.cli.reach import ask, check_names, choose, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.trial import wait_for_decision
@@ -49,10 +49,6 @@ examples:
   gwrms params apply monday.toml --trial 60
   gwrms params apply left_knee.dcf --component right_knee --skip"""
 
-_FORMATS = {
-    ".toml": Format(params_toml.chosen, params_toml.write, params_toml.read),
-    ".dcf": Format(params_dcf.chosen, params_dcf.write, params_dcf.read),
-}
 _AT_ONCE = 16  # parameters asked in one request: a device that stops answering costs no more than these
 
 
@@ -69,7 +65,7 @@ def save(argv: list[str]) -> int:
     made.add_argument("--overwrite", action="store_true", help="where the file is there already")
     arguments = made.parse_args(argv)
     file: Path = arguments.file
-    kind = _format(file)
+    kind = format_of(file)
     if file.exists() and not arguments.overwrite:
         raise FileProblem(f"{file} is there already; say --overwrite, or give another name")
     with reach(arguments, "params") as robot:
@@ -132,13 +128,6 @@ def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
     return made
 
 
-def _format(file: Path) -> Format:
-    found = _FORMATS.get(file.suffix.lower())
-    if found is None:
-        raise FileProblem(f"{file}: give a name that ends in {' or '.join(_FORMATS)}")
-    return found
-
-
 def _read(robot: Robot, names: Sequence[str]) -> dict[str, ParameterValue]:
     """As the devices hold them now, a few at a time."""
     held: dict[str, ParameterValue] = {}
@@ -148,7 +137,7 @@ def _read(robot: Robot, names: Sequence[str]) -> dict[str, ParameterValue]:
 
 
 def _rows(robot: Robot, scope: Scope, file: Path) -> list[Row]:
-    saved = _format(file).read(file, scope)
+    saved = format_of(file).read(file, scope)
     for remark in saved.remarks:
         warn("params", f"{file}: {remark}")
     infos = {info.name: info for info in scope.robot.parameters}

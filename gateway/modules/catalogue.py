@@ -86,6 +86,7 @@ def described(
         max((limit for limit in (low, eds_low) if limit is not None), default=None),
         min((limit for limit in (high, eds_high) if limit is not None), default=None),
         description.has(STORE, 1),
+        default=None if variable.default is None else scaled(variable.default, settings.scale),
     )
 
 

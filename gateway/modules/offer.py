@@ -142,6 +142,7 @@ class _Offer:
             self._store,
             lock=self._lock(variable, name, address),
             table=self._where,
+            default=variable.default,
         )
 
     def _lock(self, variable: "ODVariable", name: str, address: str) -> Lock | None:

@@ -63,6 +63,7 @@ class Parameter:
     problem: str | None = None
     lock: Lock | None = None
     table: str = ""
+    default: Number | None = None  # that the EDS gives
 
     @property
     def object(self) -> str:
@@ -102,6 +103,7 @@ class Parameter:
             read_only=self.read_only,
             type="" if known is None else known.name,
             scale=settings.scale,
+            default=self.default,
         )
 
     def refusal(self, kind: Kind, text: str, limit: float | None = None) -> RpcError:

@@ -74,6 +74,20 @@ def test_every_writable_number_of_the_eds_is_there_once_by_name_and_by_address(t
             assert name.removeprefix("knee.").replace("_", "").replace(":", "").isalnum()
 
 
+def test_the_default_of_the_eds_is_told_in_the_parameters_own_unit(tmp_path: Path) -> None:
+    table = '[parameter."knee.torque"]\nobject = "0x6072:0"\nunit = "N·m"\nscale = 0.04\nmax = 50.0\n'
+    known = catalogue(tmp_path, more=table)
+    description = eds.load(eds.locate("joint_drive.eds", None), 2)
+    for one in known.values():
+        variable = description.variable(one.index, one.subindex)
+        assert variable is not None
+        if one.name == "knee.torque":
+            assert (variable.default, one.info.default) == (2000, 80.0)
+        else:
+            assert one.info.default == variable.default
+    assert any(one.info.default is None for one in catalogue(tmp_path, eds_file="elmo_gold.dcf").values())
+
+
 def test_a_sub_object_is_named_behind_its_object(tmp_path: Path) -> None:
     known = catalogue(tmp_path)
     assert known["knee.software_position_limit_min_position_limit"].object == "0x607D:1"

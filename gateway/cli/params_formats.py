@@ -1,0 +1,20 @@
+"""Which kind of file of parameters a file is: its name says so."""
+
+from pathlib import Path
+from typing import Final
+
+from gateway.cli import params_dcf, params_toml
+from gateway.cli.params_file import FileProblem, Format
+
+FORMATS: Final = {
+    ".toml": Format(params_toml.chosen, params_toml.write, params_toml.read),
+    ".dcf": Format(params_dcf.chosen, params_dcf.write, params_dcf.read),
+}
+
+
+def format_of(file: Path) -> Format:
+    """The format of a file of this name; raises `FileProblem` where there is none."""
+    found = FORMATS.get(file.suffix.lower())
+    if found is None:
+        raise FileProblem(f"{file}: give a name that ends in {' or '.join(FORMATS)}")
+    return found
