@@ -1,0 +1,14 @@
+"""What a robot's own models predict, from the channels that this robot has.
+
+task.py       the tasks: classes, what labels mean, which sensors support what; the recipe for a robot
+groups.py     groups of sensors, by the robot's names of channels
+blocks.py     a group's windows → feature columns
+learned.py    what has been learned, and what it judges
+familiar.py, network.py, checks.py   its parts: novelty, network, whether a file holds all of it
+learn.py      how it is learned, calibrated, and made to abstain
+"""
+
+from ml.robot.learned import Learned, Verdicts
+from ml.robot.task import TASKS, Task, recipe_named
+
+__all__ = ["TASKS", "Learned", "Task", "Verdicts", "recipe_named"]

@@ -1,0 +1,179 @@
+"""Learning: features and truth → a model that knows how far to trust itself.
+
+Probabilities, the threshold below which it abstains and the limit of what it knows come from people who were
+left out; then it learns from all.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.isotonic import IsotonicRegression
+from sklearn.model_selection import GroupKFold
+from sklearn.neural_network import MLPClassifier, MLPRegressor
+from sklearn.preprocessing import StandardScaler
+
+from ml.errors import UnusableData
+from ml.features.recipe import Features, Recipe
+from ml.models.scaling import fixed_epochs
+from ml.robot import familiar
+from ml.robot.learned import Floats, Learned, on_circle, scaled, scores, softmax
+from ml.robot.network import FAR, Rows, outputs
+from ml.robot.task import STRIDE, Task
+
+FOLDS: Final = 3
+LEAST_ROWS: Final = 20  # of each class
+HIDDEN: Final = (64,)
+BATCH: Final = 256
+PENALTY: Final = 1e-2
+EPOCHS: Final = 12
+TEMPERATURES: Final = np.geomspace(0.3, 6.0, 60)
+WITHIN: Final = 0.1  # of the cycle: what gait_phase's probability is about
+WANTED: Final = 0.97  # of what is said, that is right; the rest is why a model abstains
+MOST_ABSTAINED: Final = 0.1  # of what is decided
+
+Groups = npt.NDArray[Any]
+Network = Callable[[], Any]
+
+
+def learn(
+    task: Task, recipe: Recipe, features: Features, truth: npt.NDArray[Any], group: Groups, seed: int = 0
+) -> Learned:
+    """A model for `task` from rows of features.
+
+    `truth`: (n,) names of classes; for gait_phase (n, 2) phases of the left and the right leg, NaN where the
+    legs do not step. Rows of classes that the recipe's sensors cannot tell are left out. `group` (n,): whose
+    rows they are.
+
+    Raises:
+        UnusableData: too few people, classes or examples; numbers that are not finite.
+
+    """
+    if not np.isfinite(features).all():
+        raise UnusableData(f"{recipe.name}: features that are not finite cannot be learned from")
+    teach = _classes if task.fold else _phases
+    return teach(task, recipe, features, truth, np.asarray(group), seed)
+
+
+def _classes(
+    task: Task, recipe: Recipe, features: Features, truth: npt.NDArray[Any], group: Groups, seed: int
+) -> Learned:
+    can = task.classes(recipe)
+    rows = np.flatnonzero(np.isin(truth, can))
+    classes = tuple(name for name in can if (truth[rows] == name).any())
+    if len(classes) < 2:
+        raise UnusableData(
+            f"{recipe.name} needs examples of two classes, of {', '.join(can)}; there are those of"
+            f" {', '.join(classes) or 'none'}"
+        )
+    for name in classes:
+        _enough(name, int((truth == name).sum()))
+    targets = (truth[rows, None] == np.array(classes)).argmax(axis=1)
+    model, unseen, limits = _taught(
+        features[rows], targets, group[rows], lambda: _classifier(seed), len(classes), seed
+    )
+    temperature = _temperature(unseen, targets)
+    probabilities = softmax(unseen / temperature)
+    right = probabilities.argmax(axis=1) == targets
+    threshold = _threshold(probabilities.max(axis=1), right)
+    numbers = {"temperature": temperature, "threshold": threshold, **limits}
+    return Learned(task, recipe, classes, model, numbers)
+
+
+def _phases(
+    task: Task, recipe: Recipe, features: Features, truth: npt.NDArray[Any], group: Groups, seed: int
+) -> Learned:
+    rows = np.flatnonzero(np.isnan(truth).all(axis=1) | ~np.isnan(truth).any(axis=1))
+    truth = truth[rows].astype(np.float64)
+    steps = ~np.isnan(truth[:, 0])
+    _enough("steps", int(steps.sum()))
+    model, unseen, limits = _taught(
+        features[rows], pointers(truth), group[rows], lambda: _regressor(seed), 4, seed
+    )
+    phases, lengths = on_circle(unseen.astype(np.float32))
+    error = np.abs((phases - np.where(steps[:, None], truth, 0.0) + 0.5) % 1.0 - 0.5)
+    right = steps & (error <= WITHIN).all(axis=1)
+    trust = IsotonicRegression(y_min=0.0, y_max=1.0, out_of_bounds="clip").fit(lengths.min(axis=1), right)
+    model |= {"length": trust.X_thresholds_, "trust": trust.y_thresholds_}
+    sure = np.interp(lengths.min(axis=1), model["length"], model["trust"])
+    numbers = {"threshold": _threshold(sure[steps], right[steps]), **limits}
+    return Learned(task, recipe, (STRIDE,), model, numbers)
+
+
+def pointers(truth: Floats) -> Rows:
+    """(n, 2) phases → (n, 4): cosine and sine of the left, then of the right leg; 0 where none steps."""
+    angle = 2.0 * np.pi * truth
+    pairs = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    both: Rows = np.nan_to_num(pairs, nan=0.0).reshape(len(truth), 4).astype(np.float32)
+    return both
+
+
+def _taught(
+    features: Features, targets: npt.NDArray[Any], group: Groups, network: Network, columns: int, seed: int
+) -> tuple[dict[str, Any], Floats, dict[str, float]]:
+    """Parts that learned from all; what was said of left-out people (n, columns); the novelty's limits."""
+    people = len(np.unique(group))
+    if people < 2:
+        raise UnusableData(
+            "examples of one person or session alone cannot show how far to trust a model: give two at least"
+        )
+    unseen = np.zeros((len(features), columns))
+    far = np.zeros((2, len(features)))
+    for train, held_out in GroupKFold(min(FOLDS, people)).split(features, groups=group):
+        parts = _parts(features[train], targets[train], network, seed)
+        inputs = scaled(parts["scale"], features[held_out])
+        unseen[held_out] = _columns(parts["network"], outputs(parts["network"], inputs), columns)
+        far[:, held_out] = familiar.distances(parts, inputs)
+    return _parts(features, targets, network, seed), unseen, familiar.limits((far[0], far[1]))
+
+
+def _parts(features: Features, targets: npt.NDArray[Any], network: Network, seed: int) -> dict[str, Any]:
+    scale = StandardScaler().fit(features.astype(np.float64))
+    inputs = scaled(scale, features)
+    with fixed_epochs():
+        fitted = (
+            network().set_params(batch_size=min(BATCH, len(inputs))).fit(np.clip(inputs, -FAR, FAR), targets)
+        )
+    return {"scale": scale, "network": fitted, **familiar.fitted(inputs, seed)}
+
+
+def _columns(network: Any, found: Rows, columns: int) -> Floats:
+    """A classifier's scores in every class's column: those that it has not met are out of the question."""
+    if not hasattr(network, "classes_"):
+        return found.astype(np.float64)
+    every = np.full((len(found), columns), -30.0)
+    every[:, network.classes_] = scores(found)
+    return every
+
+
+def _classifier(seed: int) -> Any:
+    return MLPClassifier(HIDDEN, alpha=PENALTY, max_iter=EPOCHS, random_state=seed)
+
+
+def _regressor(seed: int) -> Any:
+    return MLPRegressor(hidden_layer_sizes=HIDDEN, alpha=PENALTY, max_iter=EPOCHS, random_state=seed)
+
+
+def _temperature(unseen: Floats, targets: npt.NDArray[np.int_]) -> float:
+    """That under which the truth of left-out people is the least surprising."""
+    rows = np.arange(len(targets))
+    surprise = [
+        -np.log(np.maximum(softmax(unseen / one)[rows, targets], 1e-12)).mean() for one in TEMPERATURES
+    ]
+    return float(TEMPERATURES[int(np.argmin(surprise))])
+
+
+def _threshold(probability: Floats, right: npt.NDArray[np.bool_]) -> float:
+    """The lowest from which on enough of what is said is right, but at most so much is left unsaid."""
+    order = np.argsort(-probability)
+    share = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
+    said = np.flatnonzero(share >= WANTED)
+    least = int(len(order) * (1.0 - MOST_ABSTAINED))
+    last = max(int(said[-1]) if len(said) else 0, least - 1)
+    return float(probability[order[min(last, len(order) - 1)]])
+
+
+def _enough(what: str, count: int) -> None:
+    if count < LEAST_ROWS:
+        raise UnusableData(f"there are {count} examples of {what}: {LEAST_ROWS} are needed at least")
