@@ -37,12 +37,14 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "server_gui.commands.sessions:main",
         "recordings: list, look into, export as CSV, Parquet, MCAP",
     ),
+    "label": ("server_gui.commands.label:main", "what robot and wearer did in a recorded session"),
     "cloud": ("server_gui.commands.cloud:main", "the store: browse, upload, download, verify, tidy"),
     "query": ("server_gui.commands.query:main", "SQL over everything recorded"),
     "gui": ("server_gui.commands.gui:main", "the window: robots live, parameters changed, STOP in sight"),
     "evaluate": ("server_gui.commands.evaluate:main", "how well predictions hold for people never seen"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),
     "sim": ("hil_sim.cli.sim:main", "the simulated robot, ready for a gateway; runs scenario files"),
+    "sim-record": ("hil_sim.cli.record:main", "simulated wearers' channels with the truth, to learn from"),
     "sim-fault": ("hil_sim.cli.fault:main", "break something in a simulated robot that runs"),
 }
 

@@ -16,6 +16,7 @@ from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import JOINTS, Exoskeleton
 from hil_sim.gait.activity import Label
 from hil_sim.gait.gaits import LEFT, RIGHT
+from hil_sim.gait.generator import Generator
 from hil_sim.gait.mishaps import FallState
 from hil_sim.gait.wearer import Foot
 from hil_sim.sensors.suite import PERIOD_NS
@@ -86,7 +87,7 @@ class TruthFile:
         feet, trunk = robot.wearer.feet(now_s), robot.wearer.trunk(now_s)
         joints = [None if name in robot.without else drive.joint for name, drive in robot.drives.items()]
         numbers = [
-            *self._phases(),
+            *phases(generator),
             generator.shape.step_length,
             generator.shape.cycle_time,
             *(None if joint is None else joint.position for joint in joints),
@@ -100,12 +101,6 @@ class TruthFile:
         rounded = (None if number is None else round(number, _DIGITS) for number in numbers)
         self._write([*head, self._events(feet), *rounded])
 
-    def _phases(self) -> tuple[float | None, float | None]:
-        generator = self._robot.controller.generator
-        if generator.walking == 0.0:
-            return None, None
-        return generator.leg_phase(LEFT), generator.leg_phase(RIGHT)
-
     def _events(self, feet: tuple[Foot, Foot]) -> list[str]:
         """What has happened since the last line."""
         generator = self._robot.controller.generator
@@ -118,6 +113,13 @@ class TruthFile:
                 events.append(f"{('left', 'right')[side]}_{'heel_strike' if contact else 'toe_off'}")
             self._contacts[side] = contact
         return events
+
+
+def phases(generator: Generator) -> tuple[float | None, float | None]:
+    """Of the left and the right stride; None where nobody steps."""
+    if generator.walking == 0.0:
+        return None, None
+    return generator.leg_phase(LEFT), generator.leg_phase(RIGHT)
 
 
 def _loaded(foot: Foot) -> tuple[float | None, ...]:

@@ -58,8 +58,12 @@ class TrunkSensor(Protocol):
 class SensorSuite:
     """Both insoles and the IMU; what is wrong with each is set in `faults`, by name.
 
-    `lines` are the serial ones by the sensors' names: an IMU on the CAN bus has none.
+    `lines` are the serial ones by the sensors' names: an IMU on the CAN bus has none. `pressures` (left,
+    right) and `motion` are what was measured last; there is nothing before the first cycle.
     """
+
+    pressures: tuple[Pressures, Pressures]
+    motion: Motion
 
     def __init__(self, choice: SensorChoice, clock: Clock, bus: CanBus, seed: int) -> None:
         self.choice = choice
@@ -83,10 +87,12 @@ class SensorSuite:
         """One cycle of every sensor, a time after the last one."""
         now_ns = self._clock.now_ns
         period_s, self._last_ns = (now_ns - self._last_ns) / SECOND_NS, now_ns
-        feet = ((left, right), (right, left))
-        for sole, sender, (own, other) in zip(self._soles, self._senders, feet, strict=True):
-            sender.tell(sole.measure(own, other, period_s), now_ns)
-        self._trunk.tell(self._imu.measure(trunk, period_s), now_ns)
+        left_sole, right_sole = self._soles
+        self.pressures = left_sole.measure(left, right, period_s), right_sole.measure(right, left, period_s)
+        for sender, pressures in zip(self._senders, self.pressures, strict=True):
+            sender.tell(pressures, now_ns)
+        self.motion = self._imu.measure(trunk, period_s)
+        self._trunk.tell(self.motion, now_ns)
 
     def _sole(self, language: str, name: str, seed: int) -> Sole:
         noise = random.Random(f"{seed} {name}")

@@ -16,7 +16,7 @@ QUATERNION = 0x59  # ÷ 32768, w x y z
 VERSION = 0x46CC
 
 _FULL_SCALE = 32768
-_SCALES = {
+SCALES = {  # counts a unit
     ACCELERATION: _FULL_SCALE / (16.0 * GRAVITY),
     ANGULAR_RATE: _FULL_SCALE / math.radians(2000.0),
     ANGLE: _FULL_SCALE / math.pi,
@@ -26,7 +26,7 @@ _SCALES = {
 def vectors(motion: Motion) -> dict[int, list[int]]:
     """The frames that the serial and the CAN variant share: type and three words."""
     measured = {ACCELERATION: motion.acceleration, ANGULAR_RATE: motion.rate, ANGLE: motion.angles}
-    return {kind: [_word(part * _SCALES[kind]) for part in vector] for kind, vector in measured.items()}
+    return {kind: [_word(part * SCALES[kind]) for part in vector] for kind, vector in measured.items()}
 
 
 def frame(kind: int, words: list[int]) -> bytes:

@@ -1,0 +1,73 @@
+"""What a gateway reports of the simulated robot: its channels, with the noise and resolution of the sensors.
+
+Joints as their drives count them, insoles as `insole-cobs` and the trunk as `witmotion` send them. An insole
+without load has no centre of pressure (None).
+"""
+
+import math
+
+from hil_sim.drive import objects
+from hil_sim.drive.drive import JointDrive
+from hil_sim.exoskeleton import JOINTS, Exoskeleton
+from hil_sim.sensors import insole_cobs, witmotion
+from hil_sim.sensors.sole import Pressures
+from hil_sim.sensors.suite import FEET, TRUNK
+from hil_sim.sensors.trunk_imu import Motion
+from hil_sim.truth import CONTACT_N
+
+UNITS = {
+    **{f"{joint}.position": "rad" for joint in JOINTS},
+    **{f"{joint}.velocity": "rad/s" for joint in JOINTS},
+    **{
+        f"{foot}.{name}": unit
+        for foot in FEET
+        for name, unit in (("force", "N"), ("cop_x", "m"), ("cop_y", "m"))
+    },
+    **{f"{TRUNK}.acceleration_{axis}": "m/s²" for axis in "xyz"},
+    **{f"{TRUNK}.angular_velocity_{axis}": "rad/s" for axis in "xyz"},
+    f"{TRUNK}.tilt_forward": "rad",
+    f"{TRUNK}.tilt_side": "rad",
+}
+
+Values = list[float | None]
+
+
+def reported(robot: Exoskeleton) -> Values:
+    """The values of all channels now, in the order of `UNITS`; after the sensors' first cycle."""
+    drives, sensors = robot.drives.values(), robot.sensors
+    return [
+        *(_counted(drive, objects.POSITION_ACTUAL) for drive in drives),
+        *(_counted(drive, objects.VELOCITY_ACTUAL) for drive in drives),
+        *(value for side, pressures in enumerate(sensors.pressures) for value in _load(side, pressures)),
+        *_trunk(sensors.motion),
+    ]
+
+
+def _counted(drive: JointDrive, key: tuple[int, int]) -> float:
+    return drive.dictionary[key].number() / drive.counts_per_radian
+
+
+def _load(side: int, pressures: Pressures) -> Values:
+    outward = 1.0 - 2.0 * side  # the layout is that of a left foot
+    newtons = [
+        round(pascal / insole_cobs.UNIT_PA) * insole_cobs.UNIT_PA * cell.area
+        for pascal, cell in zip(pressures.pascal, insole_cobs.CELLS, strict=True)
+    ]
+    force = sum(newtons)
+    if force < CONTACT_N:
+        return [force, None, None]
+    shares = [(newton / force, cell) for newton, cell in zip(newtons, insole_cobs.CELLS, strict=True)]
+    return [
+        force,
+        sum(share * cell.x for share, cell in shares),
+        outward * sum(share * cell.y for share, cell in shares),
+    ]
+
+
+def _trunk(motion: Motion) -> Values:
+    words = witmotion.vectors(motion)
+    acceleration, rate, (roll, pitch, _) = (
+        [word / witmotion.SCALES[kind] for word in words[kind]]
+        for kind in (witmotion.ACCELERATION, witmotion.ANGULAR_RATE, witmotion.ANGLE)
+    )
+    return [*acceleration, *rate, pitch, -math.asin(math.sin(roll) * math.cos(pitch))]

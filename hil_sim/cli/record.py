@@ -1,0 +1,164 @@
+"""`gwrms sim-record`: what a gateway would report of simulated wearers, with the truth, to learn from."""
+
+import argparse
+import gzip
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from hil_sim.channels import UNITS, reported
+from hil_sim.clock import SECOND_NS
+from hil_sim.controller.objects import ControllerState
+from hil_sim.errors import SimulatorError
+from hil_sim.exoskeleton import Exoskeleton, Scenario
+from hil_sim.practice import practice
+from hil_sim.sensors.suite import PERIOD_NS
+from hil_sim.truth import phases
+
+_DESCRIPTION = """\
+Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and
+resolution of drives, insoles and IMU), together with what is really so. It needs no gateway and runs several
+times as fast as real time. Models learn from it: see docs/prediction.md.
+"""
+
+_EPILOG = """\
+what is written
+  JSON lines. For each wearer an object: `session`, `subject`, `seed`, `scenario`, `period_s`, `columns`,
+  `units` and `wearer`; then an array for each cycle of the sensors, 100 a second, with what its `columns`
+  name: time since switching on, label, phase of each leg (null where it does not step), and the channels
+  (null: no centre of pressure while a foot is in the air). Files can be joined by putting one behind the
+  other. A FILE that ends in .gz is compressed.
+
+scenarios
+  practice         rounds of everything, each in another order, at every step length, cycle time, toe height
+                   and trunk angle that the controller allows; with stumbles and falls (default)
+  and those of `gwrms sim`.
+
+exit codes
+  0 written, 1 it cannot be written, 2 wrong usage
+
+example
+  gwrms sim-record --out sim.jsonl.gz --subjects 1-24 --minutes 6 --seed 1
+"""
+
+PRACTICE: Final = "practice"
+COLUMNS: Final = {"time": "ns", "label": "", "left_phase": "stride", "right_phase": "stride", **UNITS}
+_DIGITS: Final = {"N": 2, "m": 5, "rad": 6, "rad/s": 5, "m/s²": 5}  # finer than any sensor's resolution
+_ROUNDED: Final = tuple(_DIGITS[unit] for unit in UNITS.values())
+
+
+class Recording:
+    """One wearer's session: writes a line to `file` after each cycle of the sensors, once the robot moves."""
+
+    def __init__(self, file: BinaryIO, scenario: str, seed: int, person: int) -> None:
+        # Every wearer has strides, noise and an order of things of their own.
+        own = seed * 1000 + person
+        self._file = file
+        self._robot = Exoskeleton(
+            Scenario.STAND if scenario == PRACTICE else Scenario(scenario), own, person=person
+        )
+        if scenario == PRACTICE:
+            self._robot.follow(practice(self._robot, own))
+        self._write(
+            {
+                "session": f"sim-{seed}-{person}",
+                "subject": person,
+                "seed": seed,
+                "scenario": scenario,
+                "period_s": PERIOD_NS / SECOND_NS,
+                "columns": list(COLUMNS),
+                "units": list(COLUMNS.values()),
+                "wearer": asdict(self._robot.controller.generator.wearer),
+            }
+        )
+        self._robot.measured.append(self._record)
+
+    def run(self, seconds: float) -> None:
+        """Let so much simulated time pass from switching on."""
+        self._robot.power_on()
+        self._robot.clock.run_until(round(seconds * SECOND_NS))
+
+    def _record(self) -> None:
+        robot = self._robot
+        if robot.controller.controller_state is not ControllerState.RUNNING:
+            return
+        values = zip(reported(robot), _ROUNDED, strict=True)
+        rounded = (None if value is None else round(value, digits) for value, digits in values)
+        generator = robot.controller.generator
+        stepping = (None if phase is None else round(phase, 5) for phase in phases(generator))
+        self._write([robot.clock.now_ns, generator.label, *stepping, *rounded])
+
+    def _write(self, content: object) -> None:
+        self._file.write(json.dumps(content, separators=(",", ":"), ensure_ascii=False).encode() + b"\n")
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    try:
+        with path.open("wb") as file:
+            if path.suffix != ".gz":
+                yield file
+                return
+            with gzip.GzipFile("", "wb", 4, file, mtime=0) as compressed:
+                yield compressed  # type: ignore[misc]  # it writes bytes, whatever its type says
+    except OSError as error:
+        raise SimulatorError(f"the recording cannot be written to {path}: {error.strerror}") from error
+
+
+def _subjects(text: str) -> list[int]:
+    try:
+        first, _, last = text.partition("-")
+        subjects = list(range(int(first), int(last or first) + 1))
+    except ValueError:
+        subjects = []
+    if not subjects or len(subjects) > 1000:
+        raise argparse.ArgumentTypeError(f"{text} names no subjects: give a number, or a range as in 1-24")
+    return subjects
+
+
+def _minutes(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 600.0:
+        raise argparse.ArgumentTypeError(f"{text} is no time: give minutes up to 600")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms sim-record",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help="what is written; replaced")
+    parser.add_argument(
+        "--minutes", type=_minutes, default=6.0, metavar="M", help="of each wearer (default: %(default)g)"
+    )
+    parser.add_argument(
+        "--subjects", type=_subjects, default=[0], metavar="N[-N]", help="who wears the robot (default: 0)"
+    )
+    parser.add_argument(
+        "--scenario",
+        choices=[PRACTICE, *map(str, Scenario)],
+        default=PRACTICE,
+        help="default: %(default)s",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="same seed, same recording (default: 0)"
+    )
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """Record; returns the exit code."""
+    try:
+        arguments = _parser().parse_args(argv)
+    except SystemExit as leave:
+        return 2 if leave.code else 0
+    with _opened(arguments.out) as file:
+        for person in arguments.subjects:
+            Recording(file, arguments.scenario, arguments.seed, person).run(60.0 * arguments.minutes)
+    return 0
