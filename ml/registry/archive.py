@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy.lib.format
 import sklearn
 import skops.io
+from skops.io._protocol import PROTOCOL
 from skops.io.exceptions import UntrustedTypesFoundException
 
 from ml.errors import UnusableModel
@@ -157,9 +158,9 @@ class _Rewriting:
     def content(self) -> bytes:
         schema = json.loads(self._archive.read(SCHEMA))
         state = self._node(schema)
-        if schema["protocol"] != skops.io._protocol.PROTOCOL:  # noqa: SLF001 - named nowhere else
-            raise UnusableModel(f"it was written by another version of skops, {schema['_skops_version']}")
-        state["protocol"] = schema["protocol"]
+        if schema["protocol"] != PROTOCOL:
+            raise UnusableModel(f"it has format {schema['protocol']} of skops, and {PROTOCOL} is read here")
+        state["protocol"] = PROTOCOL
         packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w") as archive:
             for name, data in (*sorted(self._files.items()), (SCHEMA, json.dumps(state).encode())):
@@ -172,7 +173,7 @@ class _Rewriting:
             return dict(_NOTHING)
         if kind not in ALLOWED.get(how, ()):
             raise UnusableModel(
-                f"it holds {kind} (a {how}), which no model of ours needs; nothing was loaded"
+                f"it holds {kind} (made as {how}), which no model of ours needs; nothing was loaded"
             )
         known = {name: node[name] for name in ("__class__", "__module__", "__loader__")}
         return known | self._PARTS[how](self, node)

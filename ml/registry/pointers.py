@@ -19,7 +19,7 @@ ATTEMPTS: Final = 100
 
 
 class Pointer(Struct, frozen=True):
-    """From `utc` on this model serves, or none where `model` is empty; `before` is the number to go back to."""
+    """From `utc` on this model serves, or none where `model` is empty; a rollback goes to number `before`."""
 
     model: str
     utc: datetime
