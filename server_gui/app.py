@@ -1,13 +1,18 @@
-"""The window's wiring: one network thread, a mailbox a robot, one 30 Hz timer that drains them and draws."""
+"""The window's wiring: one network thread, a mailbox a robot, one 30 Hz timer that drains them and draws.
+
+Where the window records, each robot is followed by a collector, which keeps what comes before it is shown.
+"""
 
 import concurrent.futures
 import contextlib
+import os
 import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from msgspec.structs import replace
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
@@ -15,12 +20,17 @@ from gateway.client import Address
 from gateway.messages import ResourceSnapshotParams
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.link import Link
+from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
+from server_gui.core.events import Event, without_processes
 from server_gui.core.feed import Feed, Following
+from server_gui.core.fleet.collector import Collector, whole
+from server_gui.core.fleet.elsewhere import Elsewhere
 from server_gui.core.mailbox import Mailbox
 from server_gui.core.network import Network
 from server_gui.core.processing.units import Units
-from server_gui.core.settings import ServerSettings
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.settings import RecordingSettings, ServerSettings, name_of
 from server_gui.own_robot import OwnRobot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
@@ -36,6 +46,7 @@ FOLLOWING: Final = Following(
     look_s=1.0,
     resources=ResourceSnapshotParams(processes=False),
 )
+RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 
 
 class Poster(QObject):
@@ -64,18 +75,40 @@ class Followed:
     tasks: tuple["concurrent.futures.Future[None]", ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Record:
+    """That the window records what it shows; who does so, and why."""
+
+    operator: str = ""
+    notes: str = ""
+
+
 class App:
-    """Everything from the robots of the server's file to the window that shows them."""
+    """Everything from the robots of the server's file to the window that shows them.
+
+    Without `record` it only shows, and so it does where another program records into the same spool.
+    """
 
     def __init__(
-        self, qt: QApplication, settings: ServerSettings, kept: QSettings, following: Following
+        self,
+        qt: QApplication,
+        settings: ServerSettings,
+        kept: QSettings,
+        following: Following,
+        record: Record | None = None,
     ) -> None:
         self.desk = Desk()
-        self.network = Network()
         self._qt = qt
         self._following = following
         self._followed: list[Followed] = []
+        self._mailboxes: dict[str, Mailbox] = {}
         self._poster = Poster()
+        self._collector, self._elsewhere, why = None, None, "the window was started to show only"
+        if record is not None:
+            self._collector, why = self._collect(settings, record)
+            self._elsewhere = None if self._collector else Elsewhere(settings.recorder.spool)
+        self.desk.recording = self._recording(self._collector or self._elsewhere, why)
+        self.network = self._collector.network if self._collector else Network()
         self._own = OwnRobot(self._own_ready, self._own_failed)
         self._desk_units(kept)
         self.theme = Theme(
@@ -84,7 +117,7 @@ class App:
         self.window = MainWindow(self.desk, self.theme, kept)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
-        self.window.added.connect(lambda where: self.follow(where, Address.parse(where)))
+        self.window.added.connect(lambda where: self.follow(name_of(where), Address.parse(where)))
         self.window.simulator.connect(self._own.start)
         self.window.closed.connect(qt.quit)
         self._keys = StopKeys(qt)
@@ -94,7 +127,7 @@ class App:
         self._robots = settings.robots
 
     def __enter__(self) -> "App":
-        self.network.__enter__()
+        (self._collector or self.network).__enter__()
         for name, robot in self._robots.items():
             self.follow(name, robot.where)
         self._timer.start()
@@ -103,15 +136,22 @@ class App:
     def __exit__(self, *exc: object) -> None:
         self._timer.stop()
         self._own.close()
-        self.network.__exit__(*exc)
+        if self._elsewhere is not None:
+            self._elsewhere.close()
+        (self._collector or self.network).__exit__(*exc)
+
+    @property
+    def hangs(self) -> bool:
+        """Whether something still runs after all was ended, which only the end of the process ends."""
+        return self._collector is not None and self._collector.hangs
 
     def follow(self, name: str, address: Address) -> Station:
         """Another robot, from now on."""
         mailbox = Mailbox()
         link = Link(self.network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
-        feed = Feed(address, mailbox.put, self._following)
-        tasks = (self.network.run(link.run()), self.network.run(feed.run()))
+        self._mailboxes[name] = mailbox
+        tasks = (self.network.run(link.run()), self._follow_feed(name, address))
         self._followed.append(Followed(station, mailbox, tasks))
         self.desk.add(station)
         return station
@@ -130,7 +170,36 @@ class App:
             for task in followed.tasks:
                 if task.done() and not task.cancelled():
                     task.result()  # it ends only by a mistake of ours, which must not stay unseen
+        if self._collector is not None:
+            self._collector.wait(0.0)
+        self.desk.recording.look()
         self.window.refresh()
+
+    # --- recording
+
+    def _collect(self, settings: ServerSettings, record: Record) -> tuple[Collector | None, str]:
+        """A collector, or why there can be none."""
+        following = shown_and_recorded(settings.recorder)
+        nobody = replace(settings, robots={})  # each is told when the window follows it
+        try:
+            return Collector(nobody, record.operator, record.notes, following, self._show), ""
+        except SpoolUnusable as error:
+            return None, str(error)
+
+    def _recording(self, keeper: Collector | Elsewhere | None, why: str) -> Recording:
+        by = {Collector: By.WINDOW, Elsewhere: By.OTHER}.get(type(keeper), By.NOBODY)
+        return Recording(by, keeper, self._poster.deliver, self.desk.news, why)
+
+    def _follow_feed(self, name: str, address: Address) -> "concurrent.futures.Future[None]":
+        if self._collector is not None:
+            return self._collector.follow(name, address)
+        return self.network.run(Feed(address, self._mailboxes[name].put, self._following).run())
+
+    def _show(self, robot: str, event: Event) -> None:
+        """What was kept is shown; in the network's thread. The table of processes has a look of its own."""
+        self._mailboxes[robot].put(without_processes(event))
+
+    # --- the simulated robot
 
     def _own_ready(self, address: Address) -> None:
         self._poster.deliver(lambda: self._follow_own(address))
@@ -148,18 +217,25 @@ class App:
             self.desk.shown.units = Units(by_si=by_si)
 
 
+def shown_and_recorded(recorder: RecordingSettings) -> Following:
+    """What is asked of a robot that this window shows and records: by one link, once."""
+    resources_s = min(recorder.resources_s, RESOURCES_S)
+    return replace(whole(recorder), client="gwrms gui", look_s=FOLLOWING.look_s, resources_s=resources_s)
+
+
 def run(
     settings: ServerSettings,
     look: Look | None = None,
     scale: float | None = None,
     seconds: float | None = None,
+    record: Record | None = None,
 ) -> int:
     """Open the window until it is closed, or for so many seconds; the exit status."""
     sys.setswitchinterval(SWITCH_S)
     qt = QApplication(sys.argv[:1])
     qt.setApplicationName("gwrms")
     qt.setStyle("Fusion")
-    with App(qt, settings, QSettings("gwrms", "gui"), FOLLOWING) as app:
+    with App(qt, settings, QSettings("gwrms", "gui"), FOLLOWING, record) as app:
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())
@@ -167,7 +243,11 @@ def run(
         if seconds is not None:
             QTimer.singleShot(round(seconds * 1000), qt.quit)
         with stop_keys(qt, app):
-            return qt.exec()
+            status = qt.exec()
+        app.window.hide()
+    if app.hangs:
+        os._exit(status)  # what an upload under way has done is found out at the next start
+    return status
 
 
 def stop_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[X11Keys | None]:

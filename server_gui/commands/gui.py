@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from server_gui.core.settings import add_robots, load
+from server_gui.core.settings import add_robots, load, name_of
 from server_gui.qt_needs import check
 
 EPILOG = """keys
@@ -11,6 +11,9 @@ EPILOG = """keys
                     network, not a safety-rated emergency stop
   Ctrl+F            find a parameter
   Alt+O, S, R       overview, signals, resources
+
+What comes is recorded as gwrms collect records it, into the same spool and store, as long as the window is
+open. Where a collector owns the spool already, the window only shows, and says who records.
 
 Without --robot the robots of the server's file are shown (~/.config/gwrms/server.toml, see gwrms collect
 --help); without any, the window offers a simulated one.
@@ -24,11 +27,13 @@ def main(argv: list[str]) -> int:
     arguments = _parser().parse_args(argv)
     settings = add_robots(load(arguments.config), dict(arguments.robot))
     check()
-    from server_gui.app import run
+    from server_gui.app import Record, run
     from server_gui.views.theme import Look
 
     look = None if arguments.look is None else Look(arguments.look)
-    return run(settings, look, None if arguments.scale is None else arguments.scale / 100)
+    scale = None if arguments.scale is None else arguments.scale / 100
+    record = None if arguments.no_record else Record(arguments.operator, arguments.notes)
+    return run(settings, look, scale, record=record)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -48,6 +53,9 @@ def _parser() -> argparse.ArgumentParser:
         help="a robot's gateway; may be given more than once",
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="the server's file")
+    parser.add_argument("--no-record", action="store_true", help="only show what comes, keep nothing")
+    parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
+    parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
     parser.add_argument("--look", choices=("dark", "light"), help="colours; kept for the next time")
     parser.add_argument(
         "--scale", type=int, choices=range(80, 201), metavar="80…200", help="size of all text, %%"
@@ -57,4 +65,4 @@ def _parser() -> argparse.ArgumentParser:
 
 def _robot(text: str) -> tuple[str, str]:
     name, equals, address = text.partition("=")
-    return (name, address) if equals else (text.replace(":", "-").strip("[]-"), text)
+    return (name, address) if equals else (name_of(text), text)

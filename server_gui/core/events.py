@@ -1,6 +1,9 @@
 """What a robot's feed tells: small frozen facts, handed from the network's thread to whoever shows them."""
 
+import dataclasses
 from dataclasses import dataclass
+
+import msgspec
 
 from gateway.client import Batch, ClockOffset, ConnectionState
 from gateway.messages import (
@@ -115,3 +118,12 @@ Event = (
     | StopAnswered
     | Failed
 )
+
+
+def without_processes(event: Event) -> Event:
+    """The same, without the table of processes."""
+    if not isinstance(event, Resources):
+        return event
+    return dataclasses.replace(
+        event, snapshot=msgspec.structs.replace(event.snapshot, processes=msgspec.UNSET)
+    )

@@ -123,6 +123,11 @@ def add_robots(settings: ServerSettings, robots: dict[str, str]) -> ServerSettin
     return msgspec.structs.replace(settings, robots=_robots(known | robots))
 
 
+def name_of(address: str) -> str:
+    """A name in the store for a robot of which only the address is known."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", address).strip("-.")
+
+
 def _settings(document: dict[str, Any], folder: Path) -> ServerSettings:
     _check_keys("the file", document, ServerSettings)
     store = _convert("[store]", document.get("store", {}), StoreSettings)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from server_gui.core.settings import ServerSettings, add_robots
+from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
 from server_gui.simulated import simulated_robot
 from server_gui.terminal import headless
 from server_gui.terminal.controls import Controls
@@ -18,6 +18,7 @@ from server_gui.terminal.session import Session
 WHOLE_S = 60.0  # for every component to be there
 TICK_S = 0.05
 LINE_S = 1.0
+DEMO_BATCH_S = 10.0  # of recording that go to the store together: soon enough to be looked at
 
 
 class DemoFailed(Exception):
@@ -48,7 +49,7 @@ def run(options: Options) -> int:
         try:
             with simulated_robot(folder, options.scenario, ending.check) as (address, check):
                 if options.window:
-                    return _window(str(address), options.seconds)
+                    return _window(str(address), options.seconds, folder)
                 with Session(address) as session:
                     _view(session, options, str(address), check)
         except Ended as ended:
@@ -56,10 +57,14 @@ def run(options: Options) -> int:
     return 0
 
 
-def _window(address: str, seconds: float | None) -> int:
-    from server_gui.app import run  # Qt is only here when it is wanted
+def _window(address: str, seconds: float | None, folder: Path) -> int:
+    """What it records stays in the demo's folder: nothing simulated comes among real recordings."""
+    from server_gui.app import Record, run  # Qt is only here when it is wanted
 
-    return run(add_robots(ServerSettings(), {"simulated": address}), seconds=seconds)
+    store = StoreSettings((folder / "store").absolute().as_uri())
+    recorder = RecordingSettings(spool=folder / "spool", batch_s=DEMO_BATCH_S)
+    settings = ServerSettings({"simulated": RobotSettings(address)}, store, recorder)
+    return run(settings, seconds=seconds, record=Record("demo", "gwrms demo"))
 
 
 @contextlib.contextmanager

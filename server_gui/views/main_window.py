@@ -70,7 +70,7 @@ class MainWindow(QMainWindow):
         self._views = (self.overview, self.signals, self.resources)
         for title, view in zip(("&Overview", "&Signals", "&Resources"), self._views, strict=True):
             self.tabs.addTab(_scrolled(view), title)
-        self._bar = StatusBar(desk)
+        self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
         self._pages.addWidget(self.empty)

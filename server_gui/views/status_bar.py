@@ -1,31 +1,44 @@
-"""The status bar: where data come from and how well, what the window costs, and what STOP is not."""
+"""The status bar: where data come from and how well, what is recorded, what STOP is not."""
 
 import collections
 import time
+from typing import Final
 
 from PySide6.QtWidgets import QLabel, QStatusBar
 
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
-from server_gui.views.marks import age_text
+from server_gui.views.marks import Mark, age_text
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.mark import MarkIcon
 
-FRAMES = 60
+FRAMES: Final = 60
+TONES: Final = {
+    Tone.GOOD: Mark("disc", "good", "recording"),
+    Tone.WARNING: Mark("triangle", "warn", "recording, with a warning"),
+    Tone.BAD: Mark("square", "bad", "not recording"),
+    Tone.OFF: Mark("ring", "dim", "not recording"),
+}
 
 
 class StatusBar(QStatusBar):
     """One line."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._desk = desk
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
-        self._link, self._window = ElidedLabel(), QLabel()
+        self._link, self.recording, self._window = ElidedLabel(), ElidedLabel(), QLabel()
+        self._icon = MarkIcon(theme, 11)
         stop = ElidedLabel()
         stop.setText("STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop")
-        self.addWidget(self._link, 3)
-        self.addWidget(stop, 2)
+        self.addWidget(self._link, 5)
+        self.addWidget(self._icon)
+        self.addWidget(self.recording, 5)
+        self.addWidget(stop, 4)
         self.addPermanentWidget(self._window)
         self.setSizeGripEnabled(False)
 
@@ -37,7 +50,17 @@ class StatusBar(QStatusBar):
         """Show how it is now."""
         station = self._desk.selected
         set_text(self._link, "no robot" if station is None else _line(station))
+        self._refresh_recording(None if station is None else station.address)
         set_text(self._window, f"{self._rate():.0f} frames/s")
+
+    def _refresh_recording(self, address: str | None) -> None:
+        said = self._desk.recording.said(address)
+        self._icon.show_mark(TONES[said.tone])
+        first = said.detail.partition("\n")[0]
+        wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
+        set_text(self.recording, f"{said.text}: {first}" if wrong else said.text)
+        if self.recording.toolTip() != said.detail:
+            self.recording.setToolTip(said.detail)
 
     def _rate(self) -> float:
         if len(self._frames) < 2:

@@ -1,0 +1,219 @@
+"""What the window says of recording, and that it records: once, in one store, and not where another does."""
+
+import concurrent.futures
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+
+from gateway.client import Address
+from ml.store import Store
+from ml.store.tables import TELEMETRY
+from server_gui.app import FOLLOWING, App, Record
+from server_gui.core.desk.news import News
+from server_gui.core.desk.recording import By, Recording, Tone
+from server_gui.core.fleet.collector import Collector, CollectorReport
+from server_gui.core.fleet.statistics import LinkStatistics
+from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
+from server_gui.core.recording.uploader import UploaderState
+from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload, add_robots
+from tests.fake_robot import FakeRobot
+from tests.gui.test_app import wait
+
+ADDRESS = "192.0.2.7:7420"
+FULL = Alarm(AlarmKind.DISK_FULL, "recording has stopped: the disk of /spool is nearly full; make room there")
+AWAY = "the store s3://lab/exo cannot be reached: Connection refused"
+
+
+def report(alarms: tuple[Alarm, ...] = (), problem: str | None = None, waiting: int = 0) -> CollectorReport:
+    return CollectorReport(
+        version="1.0",
+        pid=77,
+        began_utc_s=1.0,
+        spool="/spool",
+        store="s3://lab/exo",
+        upload=Upload.ALWAYS,
+        disk_free_bytes=31 << 30,
+        robots={"exo-01": LinkStatistics(Address.parse(ADDRESS)).report("")},
+        recorder=RecorderState(12, 3, 0, 0.01, alarms),
+        uploader=UploaderState(2, waiting, 5 << 20, 0.5, problem),
+    )
+
+
+class FakeKeeper:
+    """Answers at once with what the test says."""
+
+    def __init__(self, answer: CollectorReport | Exception) -> None:
+        self.answer = answer
+        self.asked: list[str] = []
+
+    def report(self) -> "Future[CollectorReport]":
+        return settled(self.answer)
+
+    def mark(self, text: str) -> "Future[int]":
+        self.asked.append(f"mark {text}")
+        return settled(2)
+
+    def upload(self) -> "Future[int]":
+        self.asked.append("upload")
+        return settled(0)
+
+
+def settled(answer: Any) -> "Future[Any]":
+    future: Future[Any] = concurrent.futures.Future()
+    if isinstance(answer, Exception):
+        future.set_exception(answer)
+    else:
+        future.set_result(answer)
+    return future
+
+
+def looked(keeper: FakeKeeper, by: By = By.WINDOW, why: str = "") -> tuple[Recording, News]:
+    news = News()
+    recording = Recording(by, keeper, lambda call: call(), news, why)
+    recording.look()
+    return recording, news
+
+
+def test_all_is_well() -> None:
+    recording, news = looked(FakeKeeper(report()))
+    said = recording.said(ADDRESS)
+    assert said.tone is Tone.GOOD
+    assert said.text == "Recording · 0 rows/s · spool 5.0 MiB · all uploaded · 31.00 GiB free"
+    assert not news.items
+
+
+def test_a_disk_that_is_full_is_said_with_what_to_do_and_once_in_the_news() -> None:
+    keeper = FakeKeeper(report((FULL,)))
+    recording, news = looked(keeper)
+    said = recording.said(ADDRESS)
+    assert (said.tone, said.text) == (Tone.BAD, "RECORDING HAS STOPPED")
+    assert "make room there" in said.detail
+    for answer in (report((FULL,)), report()):
+        keeper.answer = answer
+        recording._asked_ns = None
+        recording.look()
+    assert [item.text for item in news.items] == [f"over: {FULL.text}", FULL.text]
+    assert recording.said(ADDRESS).tone is Tone.GOOD
+
+
+def test_a_store_that_is_away_is_a_warning_and_recording_goes_on() -> None:
+    recording, news = looked(FakeKeeper(report(problem=AWAY, waiting=3)))
+    said = recording.said(ADDRESS)
+    assert said.tone is Tone.WARNING
+    assert "store not reached, 3 to upload" in said.text
+    assert said.detail.startswith(AWAY)
+    assert news.items[0].text == AWAY
+
+
+def test_a_robot_that_the_other_program_does_not_follow_is_said_not_to_be_recorded() -> None:
+    recording, _ = looked(FakeKeeper(report()), By.OTHER, "another server records into /spool")
+    assert recording.said(ADDRESS).text.startswith("Recording by process 77")
+    said = recording.said("192.0.2.9:7420")
+    assert (said.tone, said.text) == (Tone.WARNING, "This robot is NOT recorded")
+    assert "add it to [robots]" in said.detail
+
+
+def test_nobody_who_answers_is_bad_and_nobody_at_all_is_said() -> None:
+    recording, _ = looked(FakeKeeper(ConnectionError("gone")), By.OTHER, "the folder cannot be used")
+    said = recording.said(ADDRESS)
+    assert (said.tone, said.detail) == (Tone.BAD, "the folder cannot be used")
+    nobody = Recording(By.NOBODY, None, lambda call: call(), News(), "to show only")
+    assert (nobody.said(None).tone, nobody.said(None).text) == (Tone.OFF, "Not recording")
+
+
+def test_marks_and_uploads_are_asked_for_and_told() -> None:
+    keeper = FakeKeeper(report())
+    recording, news = looked(keeper)
+    recording.mark("stairs")
+    recording.upload()
+    assert keeper.asked == ["mark stairs", "upload"]
+    assert "marked in the recordings of 2 robots: stairs" in [item.text for item in news.items]
+
+
+# --- the whole window
+
+
+@pytest.fixture
+def robot() -> Iterator[FakeRobot]:
+    with FakeRobot() as made:
+        yield made
+
+
+@pytest.fixture
+def settings(robot: FakeRobot, tmp_path: Path, folder_url: str) -> ServerSettings:
+    recorder = RecordingSettings(spool=tmp_path / "spool", batch_s=1.0)
+    return add_robots(ServerSettings({}, StoreSettings(folder_url), recorder), {"exo-01": robot.address})
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> QSettings:
+    return QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
+
+
+def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
+    qt: QApplication, settings: ServerSettings, kept: QSettings, robot: FakeRobot
+) -> None:
+    with App(qt, settings, kept, FOLLOWING, Record("Ada", "first")) as app:
+        app.window.show()
+        station = app.desk.stations[0]
+        wait(lambda: not station.robot.is_stale() and bool(station.robot.parameters), "was live")
+        wait(lambda: app.desk.recording.report is not None, "told how recording goes")
+        wait(lambda: app.desk.recording.said(station.address).tone is Tone.GOOD, "recorded")
+        app.desk.recording.mark("stairs")
+        wait(lambda: station.robot.resources is not None, "saw the robot's computer")
+        wait(lambda: rows(app, "exo-01") > 20, "recorded rows")
+        assert len(robot.called("stream.start")) == 1
+        app.window.hide()
+    store = Store(settings.store.url)
+    assert store.dataset(TELEMETRY.location("exo-01", 1)).count_rows() > 10
+    assert store.dataset("sessions").to_table()["operator"].to_pylist()[-1] == "Ada"
+    assert "stairs" in store.dataset("events").to_table()["text"].to_pylist()
+
+
+def rows(app: App, robot: str) -> int:
+    report = app.desk.recording.report
+    return 0 if report is None or robot not in report.robots else report.robots[robot].rows
+
+
+def test_a_robot_added_while_it_runs_is_recorded_too(
+    qt: QApplication, settings: ServerSettings, kept: QSettings
+) -> None:
+    with FakeRobot() as other, App(qt, settings, kept, FOLLOWING, Record()) as app:
+        app.window.added.emit(other.address)
+        wait(lambda: not app.desk.stations[1].robot.is_stale(), "saw the other")
+        name = app.desk.stations[1].name
+        wait(lambda: rows(app, name) > 5, "recorded it")
+    assert Store(settings.store.url).dataset(TELEMETRY.location(name, 1)).count_rows() > 0
+
+
+def test_where_a_collector_records_the_window_shows_and_says_who_records(
+    qt: QApplication, settings: ServerSettings, kept: QSettings
+) -> None:
+    with Collector(settings) as collector, App(qt, settings, kept, FOLLOWING, Record()) as app:
+        station = app.desk.stations[0]
+        wait(lambda: not station.robot.is_stale(), "was live")
+        wait(lambda: app.desk.recording.report is not None, "asked the collector")
+        assert app.desk.recording.by is By.OTHER
+        assert app.desk.recording.said(station.address).text.startswith("Recording by process")
+        app.desk.recording.mark("here")
+        wait(lambda: any("marked" in item.text for item in app.desk.news.items), "marked")
+        collector.wait(0.0)
+    assert "here" in Store(settings.store.url).dataset("events").to_table()["text"].to_pylist()
+
+
+def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
+    qt: QApplication, settings: ServerSettings, kept: QSettings, tmp_path: Path
+) -> None:
+    (tmp_path / "spool").write_text("no folder")
+    with App(qt, settings, kept, FOLLOWING, Record()) as app:
+        station = app.desk.stations[0]
+        wait(lambda: not station.robot.is_stale(), "was live")
+        wait(lambda: app.desk.recording.problem is not None, "found nobody")
+        said = app.desk.recording.said(station.address)
+        assert (said.tone, said.text) == (Tone.BAD, "NOT RECORDING")
+        assert "cannot be used" in said.detail
