@@ -9,6 +9,12 @@ url = "s3://bucket/prefix"
 [recorder]
 spool = "/var/lib/gwrms/spool"
 upload = "idle"
+
+[[rules]]
+task = "falling"
+label = "near_fall"
+at_least = 0.9
+for_ms = 60
 """
 
 import difflib
@@ -25,6 +31,7 @@ from msgspec import Meta, Struct, field
 from gateway.client import Address, BadAddress
 from ml.store import StoreError, default_url
 from ml.store.store import checked_url
+from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
 
 Table = TypeVar("Table", bound=Struct)
 _ROBOT: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -91,6 +98,8 @@ class ServerSettings(Struct, frozen=True):
     robots: dict[str, RobotSettings] = {}
     store: StoreSettings = field(default_factory=StoreSettings)
     recorder: RecordingSettings = field(default_factory=RecordingSettings)
+    prediction: PredictionSettings = field(default_factory=PredictionSettings)
+    rules: tuple[RuleSettings, ...] = ()
 
 
 def load(path: Path | None = None) -> ServerSettings:
@@ -138,8 +147,21 @@ def _settings(document: dict[str, Any], folder: Path) -> ServerSettings:
     recorder = _convert("[recorder]", document.get("recorder", {}), RecordingSettings)
     spool = folder / recorder.spool.expanduser()
     return ServerSettings(
-        _robots(document.get("robots", {})), store, msgspec.structs.replace(recorder, spool=spool)
+        _robots(document.get("robots", {})),
+        store,
+        msgspec.structs.replace(recorder, spool=spool),
+        _convert("[prediction]", document.get("prediction", {}), PredictionSettings),
+        _rules(document.get("rules", [])),
     )
+
+
+def _rules(entries: Any) -> tuple[RuleSettings, ...]:
+    if not isinstance(entries, list):
+        raise SettingsError(
+            "[[rules]] is a list of tables: write it with double brackets, once for each rule"
+        )
+    numbered = enumerate(entries, 1)
+    return tuple(_convert(f"[[rules]] number {number}", entry, RuleSettings) for number, entry in numbered)
 
 
 def _robots(table: Any) -> dict[str, RobotSettings]:
@@ -181,7 +203,8 @@ def _convert(where: str, table: Any, kind: type[Table]) -> Table:
     except msgspec.ValidationError as error:
         what, _, at = str(error).partition(" - at ")
         key = at.strip("`").removeprefix("$").removeprefix(".")
-        raise SettingsError(f"{where} {key}: {what[:1].lower()}{what[1:]}{_choices(kind, key)}") from error
+        place = f"{where} {key}".rstrip()
+        raise SettingsError(f"{place}: {what[:1].lower()}{what[1:]}{_choices(kind, key)}") from error
 
 
 def _path(_kind: type, value: Any) -> Path:

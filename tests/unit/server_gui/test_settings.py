@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.client import Address
+from server_gui.core.prediction.settings import Action, RuleSettings
 from server_gui.core.settings import RecordingSettings, SettingsError, Upload, add_robots, load
 
 WHOLE = """
@@ -21,7 +22,18 @@ rate_hz = 200
 channels = ["*_knee.*", "trunk.*"]
 resources_s = 2
 batch_s = 30
+[prediction]
+every_ms = { falling = 20 }
+poll_s = 5
+[[rules]]
+task = "falling"
+label = "near_fall"
+at_least = 0.9
+for_ms = 60
+robot = "exo-*"
+action = "stop"
 """
+RULE = "[[rules]]\ntask = 'falling'\nlabel = 'near_fall'\nat_least = 0.9\n"
 
 
 def written(folder: Path, text: str) -> Path:
@@ -40,6 +52,16 @@ def test_the_whole_file_is_read(tmp_path: Path) -> None:
     assert settings.recorder == RecordingSettings(
         tmp_path / "spool", Upload.IDLE, 200.0, ("*_knee.*", "trunk.*"), 2.0, 30.0
     )
+    assert settings.prediction.every_ns("falling") == 20_000_000
+    assert settings.prediction.every_ns("activity") == 100_000_000
+    (rule,) = settings.rules
+    assert rule == RuleSettings("falling", "near_fall", 0.9, 60, None, "exo-*", Action.STOP)
+    assert rule.concerns("exo-01")
+    assert not rule.concerns("other")
+
+
+def test_no_rule_is_there_unless_somebody_writes_one(tmp_path: Path) -> None:
+    assert load(written(tmp_path, "")).rules == ()
 
 
 def test_without_a_file_everything_has_its_usual_place(
@@ -79,6 +101,22 @@ def test_an_empty_file_is_as_none(tmp_path: Path) -> None:
         ("[robots]\na = 'h'\nb = 'h:7420'", r"\[robots\] b: h:7420 is a already; remove one"),
         ("[store]\nurl = 'ftp://h'", r"\[store\] url: 'ftp://h' is no store: use file:///folder or s3://"),
         ("[store]\nurl = 's3://k:s@b/p'", r"\[store\] url: a store's URL has no keys in it"),
+        (
+            "[prediction]\nevery_ms = {walking = 20}",
+            r"\[prediction\]: there is no task in every_ms 'walking'",
+        ),
+        ("[prediction]\nevery_ms = {activity = 30}", r"\[prediction\] every_ms.*multiple of 20"),
+        ("[prediction]\nenabled = 1", r"\[prediction\] enabled: expected `bool`"),
+        ("[rules]\ntask = 'falling'", r"\[\[rules\]\] is a list of tables: write it with double brackets"),
+        (RULE.replace("at_least = 0.9", ""), r"\[\[rules\]\] number 1 lacks the key 'at_least'"),
+        (RULE + RULE.replace("0.9", "2"), r"\[\[rules\]\] number 2 at_least: expected `float` <= 1"),
+        (RULE.replace("'falling'", "'fall'"), r"number 1: there is no task 'fall': did you mean 'falling'\?"),
+        (
+            RULE.replace("near_fall", "nearfall"),
+            r"there is no label of falling 'nearfall': did you mean 'near_",
+        ),
+        (RULE + "release = 0.95", r"number 1: release = 0\.95 is above at_least = 0\.9"),
+        (RULE + "action = 'halt'", r"number 1 action: .*'halt'; allowed are alarm, stop"),
         ("a = ", "is no TOML"),
     ],
 )

@@ -1,0 +1,46 @@
+"""What robots' feeds tell, on its way to the thread that predicts: in order, and bounded."""
+
+import collections
+import threading
+from typing import Final
+
+from server_gui.core.events import Event, Telemetry
+
+MOST_NS: Final = 10_000_000_000  # of rows that may wait, robot by robot
+
+
+class Inbox:
+    """`put` from any thread; where nobody takes, a robot's oldest rows go, and are counted in `lost`."""
+
+    def __init__(self) -> None:
+        self.lost = 0
+        self._changed = threading.Condition()
+        self._waiting: dict[str, collections.deque[Event]] = {}
+        self._closed = False
+
+    def put(self, robot: str, event: Event) -> None:
+        """Hand an event over; returns at once."""
+        with self._changed:
+            waiting = self._waiting.setdefault(robot, collections.deque())
+            waiting.append(event)
+            if isinstance(event, Telemetry):
+                self._forget(waiting, event.batch.received_ns - MOST_NS)
+            self._changed.notify()
+
+    def take(self) -> dict[str, "collections.deque[Event]"] | None:
+        """Wait for events, then everything that has come, robot by robot; None where `close` was called."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._closed)
+            taken, self._waiting = self._waiting, {}
+        return None if self._closed else taken
+
+    def close(self) -> None:
+        """End the waiting."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+
+    def _forget(self, waiting: "collections.deque[Event]", before_ns: int) -> None:
+        while isinstance(oldest := waiting[0], Telemetry) and oldest.batch.received_ns < before_ns:
+            waiting.popleft()
+            self.lost += len(oldest.batch.stamps_ns)

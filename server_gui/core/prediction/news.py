@@ -1,0 +1,46 @@
+"""What prediction tells of a robot: small frozen facts, handed to whoever shows or keeps them."""
+
+from dataclasses import dataclass
+
+from ml.registry.card import Card
+from ml.serving.predictor import Prediction
+from ml.serving.trust import Trust
+from server_gui.core.prediction.settings import RuleSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """What a model says of a robot now.
+
+    `utc_ns` is when the window ended; `took_ns` how long after that the prediction was there, None where the
+    robot's clock is not known.
+    """
+
+    robot: str
+    prediction: Prediction
+    card: Card
+    trust: Trust
+    utc_ns: int
+    took_ns: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Ruled:
+    """A rule begins (or ends) to hold with this prediction."""
+
+    robot: str
+    rule: RuleSettings
+    began: bool
+    cause: Predicted
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        took_ns = self.cause.took_ns
+        after = "" if took_ns is None else f", {took_ns / 1e6:.0f} ms after the sample"
+        said = f"{self.cause.prediction.label} {self.cause.prediction.probability:.2f}"
+        what = f"rule {self.rule.name} ({self.rule.action.value})"
+        return f"{what} holds: {said}{after}" if self.began else f"{what} is over: {said}"
+
+
+News = Predicted | Ruled

@@ -1,0 +1,187 @@
+"""A thread that predicts the status of every robot, of all together; nobody ever waits for it."""
+
+import collections
+import logging
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
+from typing import Final, Self
+
+from msgspec import Struct
+from threadpoolctl import threadpool_limits
+
+from ml.serving.predictor import judged
+from server_gui.core.events import Event
+from server_gui.core.prediction.following import Following, Watched
+from server_gui.core.prediction.inbox import Inbox
+from server_gui.core.prediction.news import News, Predicted, Ruled
+from server_gui.core.prediction.serving import Model, Serving
+from server_gui.core.prediction.settings import Action
+from server_gui.core.settings import ServerSettings
+
+log = logging.getLogger(__name__)
+
+BROKEN: Final = "it cannot be used: internal error, "
+
+
+class TaskReport(Struct, frozen=True):
+    """What is predicted of one task of a robot now; seconds, UTC. `took_s` is from sample to prediction."""
+
+    model: str
+    made: datetime
+    label: str
+    probability: float
+    utc_s: float
+    took_s: float | None
+    trust: str
+    novelty: float
+    abnormal: float  # of the last minute's decisions
+    unknown: float
+    drifted: tuple[str, ...]  # channels
+
+
+class PredictingState(Struct, frozen=True):
+    """How prediction goes; `problems` are of models, in words, by robot and task."""
+
+    enabled: bool = True
+    robots: dict[str, dict[str, TaskReport]] = {}
+    problems: tuple[str, ...] = ()
+    judged: int = 0  # decisions since the start
+    skipped: int = 0  # decisions that were due while too much was to do
+
+
+class Predicting:
+    """Predicts from entering to leaving; use it as a context manager, which joins its threads.
+
+    `take` gets everything that the robots' feeds tell. `tell` gets the news and `stop` a robot's name and a
+    reason where a rule asks for it: both are called in the thread that predicts, and must return at once.
+    """
+
+    def __init__(
+        self, settings: ServerSettings, tell: Callable[[News], None], stop: Callable[[str, str], None]
+    ) -> None:
+        self._settings = settings
+        self._tell = tell
+        self._stop = stop
+        self._serving = Serving(settings.store.url, settings.prediction.poll_s)
+        self._inbox = Inbox()
+        self._robots: dict[str, Following] = {}
+        self._broken: dict[str, str] = {}  # models, and why
+        self._judged = 0
+        self._skipped = 0
+        self._thread = threading.Thread(target=self._run, name="prediction")
+
+    def __enter__(self) -> Self:
+        if self._settings.prediction.enabled:
+            self._serving.__enter__()
+            self._thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if self._settings.prediction.enabled:
+            self._inbox.close()
+            self._thread.join()
+            self._serving.__exit__(*exc)
+
+    def take(self, robot: str, event: Event) -> None:
+        """Take what a robot's feed tells; from any thread, returns at once."""
+        if self._settings.prediction.enabled:
+            self._inbox.put(robot, event)
+
+    @property
+    def state(self) -> PredictingState:
+        """How it goes now; from any thread."""
+        problems = [] if self._serving.problem is None else [self._serving.problem]
+        problems += [f"{robot}: {task}: {why}" for (robot, task), why in self._serving.problems.items()]
+        robots = {robot: _reports(known) for robot, known in self._robots.copy().items()}
+        return PredictingState(
+            self._settings.prediction.enabled,
+            robots,
+            (*problems, *self._broken.copy().values()),
+            self._judged,
+            self._skipped + self._inbox.lost,
+        )
+
+    # --- the thread that predicts
+
+    def _run(self) -> None:
+        with threadpool_limits(
+            limits=1
+        ):  # small batches are slower on several cores, and the cores are others'
+            while (taken := self._inbox.take()) is not None:
+                for robot, events in taken.items():
+                    self._follow(robot, events)
+                for model, watched in self._due():
+                    self._judge(model, watched)
+
+    def _follow(self, robot: str, events: "collections.deque[Event]") -> None:
+        known = self._robots.get(robot)
+        if known is None:
+            known = Following(robot, self._settings.prediction, self._settings.rules)
+            self._robots[robot] = known
+        known.serve(self._models(robot))
+        try:
+            known.take(events)
+        except Exception:  # what a robot sends wrongly disturbs no other
+            log.exception("%s sent what nothing can be predicted from; begun anew", robot)
+            known.tasks.clear()
+        if known.units:
+            self._serving.robot(robot, known.units)
+
+    def _models(self, robot: str) -> Mapping[str, Model]:
+        return {
+            task: model
+            for (of, task), model in self._serving.models.items()
+            if of == robot and model.card.id not in self._broken
+        }
+
+    def _due(self) -> Iterator[tuple[Model, list[tuple[Following, Watched]]]]:
+        """What is due, by model: robots that have the same one are judged together."""
+        found: dict[str, tuple[Model, list[tuple[Following, Watched]]]] = {}
+        for robot in self._robots.values():
+            for watched in robot.tasks.values():
+                if watched.due:
+                    self._skipped += watched.skip_late()
+                    model = watched.model
+                    found.setdefault(model.card.id, (model, []))[1].append((robot, watched))
+        yield from found.values()
+
+    def _judge(self, model: Model, due: list[tuple[Following, Watched]]) -> None:
+        try:
+            windows = [window for _, watched in due for window in watched.due]
+            predictions = iter(judged(model.card.id, model.learned, windows))
+            for robot, watched in due:
+                own = [next(predictions) for _ in watched.due]
+                for news in watched.predicted(robot.robot, robot.clock, own):
+                    self._act(news)
+            self._judged += len(windows)
+        except Exception as error:  # a model that breaks ends nothing but itself
+            log.exception("the model %s breaks; it serves no more", model.card.id)
+            self._broken[model.card.id] = f"{model.card.id}: {BROKEN}{type(error).__name__}"
+
+    def _act(self, news: News) -> None:
+        if isinstance(news, Ruled) and news.began and news.rule.action is Action.STOP:
+            self._stop(news.robot, news.text)
+        self._tell(news)
+
+
+def _reports(robot: Following) -> dict[str, TaskReport]:
+    newest = {task: watched.newest for task, watched in robot.tasks.copy().items()}
+    return {task: _report(known) for task, known in newest.items() if known is not None}
+
+
+def _report(known: Predicted) -> TaskReport:
+    prediction, trust = known.prediction, known.trust
+    return TaskReport(
+        prediction.model,
+        known.card.made,
+        prediction.label,
+        prediction.probability,
+        known.utc_ns / 1e9,
+        None if known.took_ns is None else known.took_ns / 1e9,
+        trust.level.value,
+        trust.novelty,
+        trust.abnormal,
+        trust.unknown,
+        trust.drifted,
+    )

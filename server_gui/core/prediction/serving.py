@@ -1,0 +1,130 @@
+"""Which models serve: a thread that looks into the registry again and again, and loads what is new there.
+
+It waits for the store, so that nobody else does. A model that cannot be loaded changes nothing: the one that
+serves stays, and `problems` says why.
+"""
+
+import logging
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+from ml.errors import UnusableModel
+from ml.registry.card import Card, check_robot
+from ml.registry.registry import Registry
+from ml.robot.learned import Learned
+from ml.robot.task import TASKS
+from ml.store import StoreError
+
+log = logging.getLogger(__name__)
+
+Key = tuple[str, str]  # robot and task
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """A model in use."""
+
+    card: Card
+    learned: Learned
+
+
+class Serving:
+    """The models of every robot that `robot` named; use it as a context manager, which joins its thread."""
+
+    def __init__(self, store_url: str, poll_s: float) -> None:
+        self.models: Mapping[Key, Model] = {}  # replaced as a whole, for any thread
+        self.problems: Mapping[Key, str] = {}  # why no model, or not the newest, serves a robot; likewise
+        self.problem: str | None = None  # why nobody knows what serves
+        self._url = store_url
+        self._poll_s = poll_s
+        self._registry: Registry | None = None
+        self._robots: dict[str, dict[str, str]] = {}  # units by channel
+        self._loaded: dict[str, Model | UnusableModel] = {}
+        self._seen: Any = None  # what served and which robots there were, at the newest look
+        self._wake = threading.Event()
+        self._ending = False
+        self._thread = threading.Thread(target=self._run, name="models")
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._ending = True
+        self._wake.set()
+        self._thread.join()
+
+    def robot(self, name: str, units: dict[str, str]) -> None:
+        """A robot has these channels, by their units; from any thread."""
+        if self._robots.get(name) != units:
+            self._robots = self._robots | {name: units}
+            self._wake.set()
+
+    # --- its thread
+
+    def _run(self) -> None:
+        while not self._ending:
+            self._wake.clear()
+            if self._robots:
+                self._look()
+            self._wake.wait(self._poll_s)
+
+    def _look(self) -> None:
+        try:
+            self._registry = self._registry or Registry(self._url)
+            self._update(self._registry)
+        except Exception as error:  # noqa: BLE001 - whatever a library raises, what serves stays
+            self._registry = None
+            known = isinstance(error, StoreError | UnusableModel)
+            problem = str(error) if known else f"internal error, {type(error).__name__}"  # it may quote keys
+            if problem != self.problem:
+                log.warning("it is not known which models serve: %s", problem)
+            self.problem = problem
+        else:
+            self.problem = None
+
+    def _update(self, registry: Registry) -> None:
+        robots = self._robots
+        served = [(task, robot, pointer.model) for task, robot, pointer in registry.served()]
+        if (served, robots) == self._seen:
+            return
+        models, problems = dict(self.models), {}
+        for robot, units in robots.items():
+            for task in TASKS:
+                try:
+                    self._choose(registry, (robot, task), units, models)
+                except UnusableModel as error:
+                    problems[robot, task] = str(error)
+                    if self.problems.get((robot, task)) != str(error):
+                        log.warning("%s: %s: %s", robot, task, error)
+        self.models, self.problems = models, problems
+        self._seen = (served, robots)
+
+    def _choose(
+        self, registry: Registry, key: Key, units: Mapping[str, str], models: dict[Key, Model]
+    ) -> None:
+        robot, task = key
+        found = registry.serving(task, robot, set(units))
+        if found is None:
+            models.pop(key, None)
+            return
+        model = self._load(registry, found)
+        if key in models and models[key].card.id != found:
+            log.info("%s: %s is served by %s from now on", robot, task, found)
+        check_robot(model.card, robot, units)
+        models[key] = model
+
+    def _load(self, registry: Registry, name: str) -> Model:
+        """A model, loaded once; one that was refused is not asked for again."""
+        if name not in self._loaded:
+            try:
+                card, state = registry.load(name)
+                self._loaded[name] = Model(card, Learned.restored(state))
+            except UnusableModel as error:
+                self._loaded[name] = error
+        found = self._loaded[name]
+        if isinstance(found, UnusableModel):
+            raise found
+        return found

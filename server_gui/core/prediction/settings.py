@@ -1,0 +1,84 @@
+"""`[prediction]` and `[[rules]]` of the server's file; what cannot work is said in words."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from fnmatch import fnmatchcase
+from types import MappingProxyType
+from typing import Annotated, Final
+
+from msgspec import Meta, Struct
+
+EVERY_MS: Final[Mapping[str, int]] = MappingProxyType({"activity": 100, "gait_phase": 40, "falling": 40})
+STEP_MS: Final = 20  # decisions are made at points of the models' grid
+RELEASE: Final = 0.8  # of `at_least`, where a rule does not say it
+
+
+class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
+    """`[prediction]`: whether robots' status is predicted live, and how often."""
+
+    enabled: bool = True
+    every_ms: dict[str, Annotated[int, Meta(ge=STEP_MS, le=10_000, multiple_of=STEP_MS)]] = {}
+    poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # between looks which models serve
+
+    def __post_init__(self) -> None:
+        if self.every_ms:
+            _among(self.every_ms, EVERY_MS, "task in every_ms")
+
+    def every_ns(self, task: str) -> int:
+        """Between two decisions of a task."""
+        return self.every_ms.get(task, EVERY_MS[task]) * 1_000_000
+
+
+class Action(Enum):
+    """What a rule does."""
+
+    ALARM = "alarm"  # says so, and records it
+    STOP = "stop"  # also asks the robot's gateway to stop every drive
+
+
+class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
+    """One of `[[rules]]`: it holds once `label` was as probable as `at_least` for `for_ms`.
+
+    It holds until that falls below `release` (default: four fifths of `at_least`), and acts once each time.
+    The label "abnormal" has the probability 1 where it is said.
+    """
+
+    task: str
+    label: str
+    at_least: Annotated[float, Meta(gt=0, le=1)]
+    for_ms: Annotated[int, Meta(ge=0, le=60_000)] = 0
+    release: Annotated[float, Meta(ge=0, le=1)] | None = None
+    robot: str = "*"  # a name or glob
+    action: Action = Action.ALARM
+
+    def __post_init__(self) -> None:
+        from ml.robot.task import ABNORMAL, TASKS
+
+        _among([self.task], TASKS, "task")
+        _among([self.label], [*TASKS[self.task].support, ABNORMAL], f"label of {self.task}")
+        if self.release is not None and self.release > self.at_least:
+            raise ValueError(f"release = {self.release:g} is above at_least = {self.at_least:g}")
+
+    @property
+    def name(self) -> str:
+        """What it is called where it acts."""
+        return f"{self.task} {self.label} ≥ {self.at_least:g} for {self.for_ms} ms"
+
+    @property
+    def ends_below(self) -> float:
+        """How probable the label still is while it holds."""
+        return RELEASE * self.at_least if self.release is None else self.release
+
+    def concerns(self, robot: str) -> bool:
+        """Whether it is about this robot."""
+        return fnmatchcase(robot, self.robot)
+
+
+def _among(found: Iterable[str], allowed: Iterable[str], what: str) -> None:
+    names = list(allowed)
+    for name in found:
+        if name not in names:
+            close = difflib.get_close_matches(name, names, n=1)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            raise ValueError(f"there is no {what} {name!r}: {hint}allowed are {', '.join(names)}")
