@@ -22,6 +22,7 @@ ACTIVITIES: Final = (
 )  # fmt: skip
 # What happens at one instant: the gait phase of a leg goes from one heel strike to the next.
 INSTANTS: Final = ("left_heel_strike", "right_heel_strike", "left_toe_off", "right_toe_off")
+WEARER: Final = "wearer "  # before a name: who wore the robot
 
 
 class Source(Enum):
@@ -75,6 +76,11 @@ class Label(Struct, frozen=True, order=True):
             "written": written_utc_ns,
             "removed": removed,
         }
+
+
+def wearer(label: str) -> str | None:
+    """Whom the label names as the wearer, if it does."""
+    return label.removeprefix(WEARER) if label.startswith(WEARER) else None
 
 
 def holding(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

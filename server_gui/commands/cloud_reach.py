@@ -4,9 +4,11 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from ml.store import StoreError
+from ml.store.sessions import Session
 from ml.store.store import Store
 from server_gui.core.settings import load
 
@@ -61,6 +63,25 @@ def instant(text: str) -> datetime:
             f"{text!r} is no time: write 2026-11-21 or 2026-11-21T15:30:00"
         ) from error
     return found if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def instant_or_seconds(text: str) -> datetime | float:
+    """The same, or seconds since a session's first sample."""
+    try:
+        return float(text)
+    except ValueError:
+        return instant(text)
+
+
+def absolute(session: Session, time: datetime | float | None) -> datetime | None:
+    """A time; raises `StoreError` where there is no first sample to count seconds from."""
+    if not isinstance(time, float):
+        return time
+    if session.first is None:
+        raise StoreError(
+            f"the session {session.session} has no telemetry in the store: there is nothing to count from"
+        )
+    return session.first + timedelta(seconds=time)
 
 
 def when(time: datetime | None) -> str:

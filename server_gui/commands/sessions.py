@@ -13,10 +13,21 @@ import pyarrow as pa
 
 from gateway.cli.reach import choose as choose_command
 from gateway.cli.text import NONE, say, say_json, size, table, warn
-from ml.store import StoreError, sessions
+from ml.store import sessions
 from ml.store.sessions import Channel, Session
 from ml.store.store import Store
-from server_gui.commands.cloud_reach import Advance, add_url, instant, parser, progress, reach, spool, when
+from server_gui.commands.cloud_reach import (
+    Advance,
+    absolute,
+    add_url,
+    instant,
+    instant_or_seconds,
+    parser,
+    progress,
+    reach,
+    spool,
+    when,
+)
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.chosen import Choice, choose
 from server_gui.core.cloud.mcap import write_mcap
@@ -183,7 +194,7 @@ def export(argv: list[str]) -> int:
     made.add_argument(
         "--channels", action="append", metavar="GLOB", help="these only; again for more (default: all)"
     )
-    _add_times(made, _instant_or_seconds, "a time (UTC), or seconds since the session's first sample")
+    _add_times(made, instant_or_seconds, "a time (UTC), or seconds since the session's first sample")
     arguments = made.parse_args(argv)
     kind = arguments.format or arguments.out.suffix.removeprefix(".")
     if kind not in FORMATS:
@@ -199,7 +210,7 @@ def export(argv: list[str]) -> int:
 
 def _export(store: Store, session: Session, kind: str, arguments: argparse.Namespace) -> int:
     choice = Choice(
-        arguments.channels or ("*",), _absolute(session, arguments.begin), _absolute(session, arguments.end)
+        arguments.channels or ("*",), absolute(session, arguments.begin), absolute(session, arguments.end)
     )
     chosen = choose(store, session, choice)
     with progress("rows", session.rows) as advance:
@@ -212,21 +223,6 @@ def _counted(tables: Iterable[pa.Table], advance: Advance) -> Iterator[pa.Table]
     for each in tables:
         yield each
         advance(each.num_rows)
-
-
-def _absolute(session: Session, time: datetime | float | None) -> datetime | None:
-    if not isinstance(time, float):
-        return time
-    if session.first is None:
-        raise StoreError(f"the session {session.session} has no telemetry: there is nothing to count from")
-    return session.first + timedelta(seconds=time)
-
-
-def _instant_or_seconds(text: str) -> datetime | float:
-    try:
-        return float(text)
-    except ValueError:
-        return instant(text)
 
 
 def _add_session(made: argparse.ArgumentParser) -> None:
