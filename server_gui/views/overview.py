@@ -25,7 +25,7 @@ from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
 
 SECONDS: Final = 10.0
-READ_S: Final = 0.15  # between changes of what is read rather than seen
+READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLAIN: Final = ("good", "#cc79a7")  # of what belongs to no side
 # title, channels, SI unit, smallest range shown (SI)
@@ -178,10 +178,11 @@ class Overview(QWidget):
             x, y = values.get(f"{side}_insole.cop_x"), values.get(f"{side}_insole.cop_y")
             cop = None if x is None or y is None else (x, y)
             self._maps[side].show_pressures(pressures, cop, live=live)
-            force = self._desk.shown.units.unit("force", "N")
-            text = f"{side.upper()}  {force.text(values.get(f'{side}_insole.force'))} {force.symbol}"
-            set_text(self._loads[side], text)
         if slow:
+            force = self._desk.shown.units.unit("force", "N")
+            for side in SIDES:
+                text = f"{side.upper()}  {force.text(values.get(f'{side}_insole.force'))} {force.symbol}"
+                set_text(self._loads[side], text)
             self._pressure.set_note(_layout_note(counts) if live else _old(station))
 
 

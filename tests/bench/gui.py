@@ -7,6 +7,7 @@ import math
 import os
 import statistics
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,17 +18,20 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
+from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 from gateway.messages import StreamData
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.soles import cells_of
+from server_gui.core.desk.station import Station
+from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
-from tests.gui.fakes import Bench, described, walking
+from tests.gui.fakes import Bench, described, looked, resources, walking
 
 Floats = npt.NDArray[np.float64]
 FRAMES, WARM_UP = 45, 8
@@ -199,6 +203,35 @@ def _median_ms(do: Callable[[], object]) -> float:
     return statistics.median(took)
 
 
+def whole_window(theme: Theme, tab: int) -> float:
+    """A frame of the window itself, 30 a second, with telemetry at 1 kHz and a tab in sight: the mean, ms."""
+    bench = Bench(Desk())
+    station = bench.add("robot")
+    station.take([described(), looked(), resources()])
+    with tempfile.TemporaryDirectory() as folder:
+        window = MainWindow(bench.desk, theme, QSettings(f"{folder}/kept.ini", QSettings.Format.IniFormat))
+        window.tabs.setCurrentIndex(tab)
+        window.show()
+        bench.draw(window)
+        window.signals.choose([info.name for info in described().description.channels][:24])
+        took = [_frame_ms(window, station, frame) for frame in range(WARM_UP + FRAMES)]
+        window.close()
+        window.deleteLater()
+    return statistics.mean(took[WARM_UP:])
+
+
+def _frame_ms(window: MainWindow, station: Station, frame: int) -> float:
+    """Rows are stamped ahead of time, so that none is old; a frame begins when it would."""
+    event = walking(ROWS_A_FRAME, -(frame + 1) / FRAMES_PER_S, rate_hz=1000.0)
+    began, began_s = time.process_time(), time.monotonic()
+    station.take([event])
+    window.refresh()
+    QApplication.processEvents()
+    took = time.process_time() - began
+    time.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - time.monotonic()))
+    return took * 1e3
+
+
 def rows() -> Iterator[Row]:
     """Everything that is measured."""
     theme = Theme(QApplication.instance() or QApplication([]))  # type: ignore[arg-type]
@@ -217,6 +250,9 @@ def rows() -> Iterator[Row]:
     everything = total + drawings + sum(row.value for row in incoming)
     yield Row("all of it together, a frame", everything, "ms")
     yield Row("share of one core at 30 frames a second", everything * FRAMES_PER_S / 1e3, "", MOST_OF_A_CORE)
+    for tab, name in enumerate(("Overview", "Signals, 24 curves")):
+        share = whole_window(theme, tab) * FRAMES_PER_S / 1e3
+        yield Row(f"the whole window with {name}, telemetry at 1 kHz", share, "of a core", MOST_OF_A_CORE)
 
 
 def main() -> int:

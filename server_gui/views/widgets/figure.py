@@ -38,6 +38,7 @@ class StickFigure(QWidget):
         self._wrong: frozenset[str] = frozenset()
         self._texts: Mapping[str, Sequence[str]] = {}
         self._live = False
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(130, 150)
         self.setAccessibleName("Posture from the right side")
@@ -61,6 +62,7 @@ class StickFigure(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
+        painter.fillRect(self.rect(), self._theme.colour("card"))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         unit = min(self.height() * 0.94 / REACH, self.width() * 1.25)
         lean = self._tilt or 0.0

@@ -1,10 +1,11 @@
 """The gait-phase ring: where each leg is in its stride; left is the outer ring, right the inner."""
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.core.desk.walk import PHASES, LegPhase
@@ -23,6 +24,9 @@ class GaitRing(QWidget):
         self._theme = theme
         self._phases: dict[Leg, LegPhase | None] = dict.fromkeys(Leg)
         self._word, self._below, self._live = "", "", False
+        self._key: tuple[object, ...] = ()
+        self._drawn = QPixmap()
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(150, 150)
         self.setAccessibleName("Gait phase")
@@ -44,13 +48,33 @@ class GaitRing(QWidget):
         outer = box.adjusted(band / 2, band / 2, -band / 2, -band / 2)
         inset = band * 1.35
         inner = outer.adjusted(inset, inset, -inset, -inset)
-        for leg, ring in ((Leg.LEFT, outer), (Leg.RIGHT, inner)):
-            self._draw_ring(painter, leg, ring, band)
+        rings = {Leg.LEFT: outer, Leg.RIGHT: inner}
+        painter.drawPixmap(0, 0, self._picture(rings, band))
+        for leg, ring in rings.items():
+            now = self._phases[leg]
+            if now is not None:
+                self._draw_needle(painter, ring, band, now.percent)
         self._draw_words(painter, inner.adjusted(band, band, -band, -band))
         painter.end()
 
     def _colour(self, leg: Leg) -> QColor:
         return self._theme.colour(leg.value if self._live else "old")
+
+    def _picture(self, rings: Mapping[Leg, QRectF], band: float) -> QPixmap:
+        """Both rings, the phases that are now bright; drawn when they become others."""
+        ratio, names = self.devicePixelRatioF(), [now.phase if now else "" for now in self._phases.values()]
+        key = (self.size(), ratio, self._theme.colours, self._live, *names)
+        if key != self._key:
+            self._key = key
+            self._drawn = QPixmap(self.size() * ratio)
+            self._drawn.setDevicePixelRatio(ratio)
+            self._drawn.fill(self._theme.colour("card"))
+            painter = QPainter(self._drawn)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            for leg, ring in rings.items():
+                self._draw_ring(painter, leg, ring, band)
+            painter.end()
+        return self._drawn
 
     def _draw_ring(self, painter: QPainter, leg: Leg, ring: QRectF, band: float) -> None:
         now = self._phases[leg]
@@ -65,8 +89,6 @@ class GaitRing(QWidget):
             first, last = 3.6 * begin + GAP_DEG / 2, 3.6 * end - GAP_DEG / 2
             painter.drawArc(ring, round((90 - first) * 16), round((first - last) * 16))
             begin = end
-        if now is not None:
-            self._draw_needle(painter, ring, band, now.percent)
 
     def _draw_needle(self, painter: QPainter, ring: QRectF, band: float, percent: float) -> None:
         angle = math.radians(3.6 * percent)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRect, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
@@ -49,6 +49,7 @@ class Curves(QWidget):
         height, width = self.strip.pixels.shape
         # The picture does not keep its memory itself; the strip does.
         self._image = QImage(self.strip.pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32)
+        self._image.setDevicePixelRatio(self.devicePixelRatioF())
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -56,11 +57,9 @@ class Curves(QWidget):
         if not self._live:
             painter.fillRect(self.rect(), self._behind)
             painter.setOpacity(OLD)
-        ratio, seam, pixels = self.devicePixelRatioF(), self.strip.seam, self._image.width()
-        height = self._image.height()
-        for begin, end, at in ((seam, pixels, 0), (0, seam, pixels - seam)):
-            place = QRectF(at / ratio, 0, (end - begin) / ratio, height / ratio)
-            painter.drawImage(place, self._image, QRectF(begin, 0, end - begin, height))
+        ratio, seam, (height, width) = self.devicePixelRatioF(), self.strip.seam, self.strip.pixels.shape
+        for begin, end, at in ((seam, width, 0), (0, seam, width - seam)):
+            painter.drawImage(QPointF(at / ratio, 0), self._image, QRect(begin, 0, end - begin, height))
         painter.end()
 
 

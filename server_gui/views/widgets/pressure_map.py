@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.core.desk.soles import Cell
@@ -48,6 +48,9 @@ class PressureMap(QWidget):
         self._trail: collections.deque[Cell | None] = collections.deque(maxlen=TRAIL)
         self._live = False
         self._path = outline(self._sign)
+        self._template_key: tuple[object, ...] = ()
+        self._template_made = QPixmap()
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(70, 150)
         self.setAccessibleName(f"Pressure under the {side} foot")
@@ -77,33 +80,54 @@ class PressureMap(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
+        painter.fillRect(self.rect(), self._theme.colour("card"))
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        scale = self._to_metres(painter)
+        if self._weights is None:
+            self._draw_bars(painter)
+        else:
+            painter.setOpacity(1.0 if self._live else 0.35)
+            painter.drawImage(QRectF(-WIDTH_M / 2, BEHIND_M - LENGTH_M, WIDTH_M, LENGTH_M), self._image)
+            painter.setOpacity(1.0)
+        painter.resetTransform()
+        painter.drawPixmap(0, 0, self._template())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._to_metres(painter)
+        self._draw_trail(painter, 4.0 / scale)
+        painter.end()
+
+    def _to_metres(self, painter: QPainter) -> float:
+        """From now on x is to the right and y down in m, the heel at the origin; pixels a metre."""
         scale = min(self.height() / LENGTH_M, self.width() / WIDTH_M) * 0.98
         box = QRectF(0, 0, WIDTH_M * scale, LENGTH_M * scale)
         box.moveCenter(QRectF(self.rect()).center())
         painter.translate(box.center().x(), box.bottom() - BEHIND_M * scale)
         painter.scale(scale, scale)
-        self._draw(painter, scale)
-        painter.end()
+        return scale
 
-    def _draw(self, painter: QPainter, scale: float) -> None:
-        """In metres: x to the right, y down, the heel at the origin."""
-        painter.save()
-        painter.setClipPath(self._path)
-        if self._weights is None:
-            self._draw_bars(painter)
-        else:
-            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-            painter.setOpacity(1.0 if self._live else 0.35)
-            area = QRectF(-WIDTH_M / 2, BEHIND_M - LENGTH_M, WIDTH_M, LENGTH_M)
-            painter.drawImage(area, self._image)
-        painter.restore()
+    def _template(self) -> QPixmap:
+        """All but the pressure: what is around the sole, its edge, the cells; made when one changes."""
+        ratio = self.devicePixelRatioF()
+        key = (self.size(), ratio, self._theme.colours, self._live, self._cells)
+        if key != self._template_key:
+            self._template_key = key
+            self._template_made = QPixmap(self.size() * ratio)
+            self._template_made.setDevicePixelRatio(ratio)
+            self._template_made.fill(self._theme.colour("card"))
+            self._draw_template(QPainter(self._template_made))
+        return self._template_made
+
+    def _draw_template(self, painter: QPainter) -> None:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        scale = self._to_metres(painter)
+        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Clear)
+        painter.fillPath(self._path, QColor("black"))
+        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_SourceOver)
         painter.setPen(self._cosmetic("dim" if self._live else "old", 1.4))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawPath(self._path)
         if self._cells is not None:
             self._draw_dots(painter, self._cells, 1.6 / scale)
-        self._draw_trail(painter, 4.0 / scale)
+        painter.end()
 
     def _draw_bars(self, painter: QPainter) -> None:
         count = max(1, len(self._pressures))
