@@ -4,11 +4,7 @@ task.py       the tasks: classes, what labels mean, which sensors support what; 
 groups.py     groups of sensors, by the robot's names of channels
 blocks.py     a group's windows → feature columns
 learned.py    what has been learned, and what it judges
-familiar.py, network.py, checks.py   its parts: novelty, network, whether a file holds all of it
+familiar.py, network.py, checks.py    of it: novelty, the network's outputs, whether a file holds all
 learn.py      how it is learned, calibrated, and made to abstain
+simulated.py  what the simulator recorded, as examples
 """
-
-from ml.robot.learned import Learned, Verdicts
-from ml.robot.task import TASKS, Task, recipe_named
-
-__all__ = ["TASKS", "Learned", "Task", "Verdicts", "recipe_named"]

@@ -28,6 +28,7 @@ HIDDEN: Final = (64,)
 BATCH: Final = 256
 PENALTY: Final = 1e-2
 EPOCHS: Final = 12
+ONLY_TO_LEARN: Final = ("_optimizer", "_random_state")  # of a network: no part of what it says
 TEMPERATURES: Final = np.geomspace(0.3, 6.0, 60)
 WITHIN: Final = 0.1  # of the cycle: what gait_phase's probability is about
 WANTED: Final = 0.97  # of what is said, that is right; the rest is why a model abstains
@@ -135,6 +136,8 @@ def _parts(features: Features, targets: npt.NDArray[Any], network: Network, seed
         fitted = (
             network().set_params(batch_size=min(BATCH, len(inputs))).fit(np.clip(inputs, -FAR, FAR), targets)
         )
+    for name in ONLY_TO_LEARN:
+        del vars(fitted)[name]
     return {"scale": scale, "network": fitted, **familiar.fitted(inputs, seed)}
 
 
