@@ -11,6 +11,7 @@ from msgspec import Struct
 
 from ml.errors import UnusableModel
 from ml.registry.card import checked_name
+from ml.registry.lasting import create
 from ml.store.objects import Objects
 
 FOLDER: Final = "models/serving"
@@ -110,7 +111,7 @@ class Pointers:
         return max((int(name.rpartition("/")[2].partition(".")[0]) for name in names), default=0)
 
     def _create(self, number: int, pointer: Pointer) -> bool:
-        return self._objects.create(self._path(number), msgspec.json.encode(pointer))
+        return create(self._objects, self._path(number), msgspec.json.encode(pointer))
 
     def _read(self, number: int) -> Pointer:
         data = self._objects.read(self._path(number))

@@ -1,6 +1,6 @@
 """The models of a store: published once and never altered, loaded only when everything about them is right.
 
-models/<id>/model.skops, model.json, maybe model.onnx
+models/<id>/model.skops, model.json
 models/serving/<task>/<robot, or _all>/<n>.json
 """
 
@@ -15,6 +15,7 @@ from ml.errors import UnusableModel
 from ml.registry import archive
 from ml.registry.card import Card, checked_name, content_id, decoded, encoded
 from ml.registry.code import features_hash
+from ml.registry.lasting import create
 from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
@@ -24,7 +25,6 @@ from ml.store.objects import Objects
 FOLDER: Final = "models"
 CARD: Final = "model.json"
 SKOPS: Final = "model.skops"
-ONNX: Final = "model.onnx"
 SHIPPED: Final = Path(__file__).parents[1] / "shipped"  # models that come with GWRMS, laid out as in a store
 
 
@@ -39,7 +39,7 @@ class Registry:
 
     # --- models
 
-    def publish(self, state: dict[str, Any], card: Card, onnx: bytes | None = None) -> str:
+    def publish(self, state: dict[str, Any], card: Card) -> str:
         """Put a model into the store, and keep the versions of tables that its card names; its id.
 
         The same model again, by whomever, is one model, and the first card stays.
@@ -49,15 +49,14 @@ class Registry:
             StoreError: the store does not take it, or a table's version is not there.
 
         """
-        files = {SKOPS: archive.dump(state)} | ({} if onnx is None else {ONNX: onnx})
-        sums = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
-        card = msgspec.structs.replace(card, id="", sha256=sums)
+        data = archive.dump(state)
+        card = msgspec.structs.replace(card, id="", sha256={SKOPS: hashlib.sha256(data).hexdigest()})
         card = msgspec.structs.replace(card, id=content_id(card))
         _check(card, state)
         for named in card.tables:
             upkeep.pin(Store.existing(named.store), named.location, named.version, card.id)
-        for name, data in (*files.items(), (CARD, encoded(card))):  # the card last: now it is there
-            self._create(card.id, name, data)
+        self._create(card.id, SKOPS, data)
+        self._create(card.id, CARD, encoded(card))  # last: now it is there
         return card.id
 
     def entries(self, task: str | None = None) -> list[Card]:
@@ -207,7 +206,7 @@ class Registry:
 
     def _create(self, model: str, name: str, data: bytes) -> None:
         """Write a file, unless it is there; then it must be the same."""
-        if self._objects.create(f"{FOLDER}/{model}/{name}", data):
+        if create(self._objects, f"{FOLDER}/{model}/{name}", data):
             return
         same = self._read_card(model).id == model if name == CARD else self.file(model, name) == data
         if not same:
