@@ -45,6 +45,7 @@ FOLLOWING: Final = Following(
     rate_hz=100.0,
     look_s=1.0,
     resources=ResourceSnapshotParams(processes=False),
+    journal_s=2.0,
 )
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 
@@ -220,7 +221,8 @@ class App:
 def shown_and_recorded(recorder: RecordingSettings) -> Following:
     """What is asked of a robot that this window shows and records: by one link, once."""
     resources_s = min(recorder.resources_s, RESOURCES_S)
-    return replace(whole(recorder), client="gwrms gui", look_s=FOLLOWING.look_s, resources_s=resources_s)
+    shown = replace(whole(recorder), client="gwrms gui", look_s=FOLLOWING.look_s)
+    return replace(shown, resources_s=resources_s, journal_s=FOLLOWING.journal_s)
 
 
 def run(

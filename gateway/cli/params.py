@@ -8,7 +8,7 @@ from pathlib import Path
 from gateway.cli.parameters import say_written, trial_s
 from gateway.cli.params_diff import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
 from gateway.cli.params_file import FileProblem, Scope
-from gateway.cli.params_formats import format_of
+from gateway.cli.params_formats import format_of, read_file
 from gateway.cli.reach import ask, check_names, choose, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.trial import wait_for_decision
@@ -137,7 +137,7 @@ def _read(robot: Robot, names: Sequence[str]) -> dict[str, ParameterValue]:
 
 
 def _rows(robot: Robot, scope: Scope, file: Path) -> list[Row]:
-    saved = format_of(file).read(file, scope)
+    saved = read_file(file, scope)
     for remark in saved.remarks:
         warn("params", f"{file}: {remark}")
     infos = {info.name: info for info in scope.robot.parameters}

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Final
 
+from eds import EdsError
 from gateway.cli import params_dcf, params_toml
-from gateway.cli.params_file import FileProblem, Format
+from gateway.cli.params_file import FileProblem, Format, Saved, Scope
 
 FORMATS: Final = {
     ".toml": Format(params_toml.chosen, params_toml.write, params_toml.read),
@@ -18,3 +19,11 @@ def format_of(file: Path) -> Format:
     if found is None:
         raise FileProblem(f"{file}: give a name that ends in {' or '.join(FORMATS)}")
     return found
+
+
+def read_file(file: Path, scope: Scope) -> Saved:
+    """What a file says; raises `FileProblem` where it cannot be read, or is another device's."""
+    try:
+        return format_of(file).read(file, scope)
+    except EdsError as error:
+        raise FileProblem(str(error)) from error

@@ -82,6 +82,9 @@ class FakeCommands:
     def revert(self, write: int) -> "Future[Any]":
         return self._ask("revert", write)
 
+    def store(self, component: str) -> "Future[Any]":
+        return self._ask("store", component)
+
     def reset(self) -> "Future[Any]":
         return self._ask("reset")
 

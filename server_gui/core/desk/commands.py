@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Protocol
 
-from gateway.messages import Confirmed, Lease, Reset, Reverted, Stopped, Written
+from gateway.messages import Confirmed, Lease, Reset, Reverted, Stopped, Stored, Written
 
 
 class Commands(Protocol):
@@ -32,6 +32,10 @@ class Commands(Protocol):
 
     def revert(self, write: int) -> "Future[Reverted]":
         """Take back what is on trial."""
+        ...
+
+    def store(self, component: str) -> "Future[Stored]":
+        """Make a device keep its parameters over a reset; takes control first."""
         ...
 
     def reset(self) -> "Future[Reset]":

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from server_gui.core.desk.news import News
+from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.units import Units
@@ -31,6 +32,7 @@ class Desk:
         self.news = News()
         self.shown = Shown()
         self.recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
+        self.pins = Pins()
         self.on_select: list[Callable[[Station | None], None]] = []
 
     def __iter__(self) -> Iterator[Station]:

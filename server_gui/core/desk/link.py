@@ -15,6 +15,7 @@ from gateway.messages import (
     ResourceSnapshotParams,
     Reverted,
     Stopped,
+    Stored,
     Written,
 )
 from server_gui.core.events import Costs, Failed, Resources
@@ -71,6 +72,9 @@ class Link:
     def revert(self, write: int) -> "Future[Reverted]":
         return self._network.run(self._client.revert(write))
 
+    def store(self, component: str) -> "Future[Stored]":
+        return self._network.run(self._store(component))
+
     def reset(self) -> "Future[Reset]":
         return self._network.run(self._reset())
 
@@ -82,6 +86,10 @@ class Link:
     async def _write(self, changes: Mapping[str, float], trial_s: float | None) -> Written:
         await self._client.acquire(LEASE_S)
         return await self._client.write(changes, trial_s)
+
+    async def _store(self, component: str) -> Stored:
+        await self._client.acquire(LEASE_S)
+        return await self._client.store(component)
 
     async def _reset(self) -> Reset:
         await self._client.acquire(LEASE_S)

@@ -16,19 +16,32 @@ from gateway.messages import (
     ParameterInfo,
     ResourceSnapshot,
     Stopped,
+    Stored,
     Written,
 )
 from server_gui.core.desk.answers import Deliver, Result, when_done
+from server_gui.core.desk.audit import Audit
 from server_gui.core.desk.commands import Commands
+from server_gui.core.desk.comparison import Comparison
 from server_gui.core.desk.control import Control
 from server_gui.core.desk.edits import Change, Edits
 from server_gui.core.desk.link import LEASE_S
 from server_gui.core.desk.news import News, NewsKind
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.stopping import Stopping
+from server_gui.core.desk.stored import Flash
 from server_gui.core.desk.watch import Watch
 from server_gui.core.desk.writing import WriteState, Writing
-from server_gui.core.events import Costs, Described, Event, LinkChanged, Resources, Telemetry
+from server_gui.core.events import (
+    Costs,
+    Described,
+    Event,
+    Journalled,
+    LinkChanged,
+    Looked,
+    Resources,
+    Telemetry,
+)
 from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.processing.units import Units
 from server_gui.core.robot import Robot
@@ -53,6 +66,9 @@ class Station:
         self.control = Control()
         self.edits = Edits()
         self.writing = Writing()
+        self.file: Comparison | None = None  # what its parameters are compared with
+        self.audit = Audit()
+        self.flash = Flash(self.audit)
         self._commands = commands
         self._deliver = deliver
         self._news = news
@@ -93,12 +109,18 @@ class Station:
             match event:
                 case Telemetry():
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
+                    self.flash.clock = event.clock
+                case Looked():
+                    self.flash.look(event.quality.quality, event.at_ns)
+                case Journalled():
+                    self.audit.take(event.journal.entries)
                 case Described():
                     self._described(event.description, before)
                 case Costs():
                     self.cost = event.cost
                 case LinkChanged():
                     self.cost = None  # it was of the link that there was
+                    self.flash.forget()
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
@@ -260,6 +282,28 @@ class Station:
                 WriteState.UNKNOWN, "the trial's time is over, but other values are held: look at them"
             )
             self.tell(NewsKind.WARNING, self.writing.text)
+
+    def store(self, component: str) -> None:
+        """Make a device keep its parameters over a reset."""
+        self.writing.storing(component)
+        when_done(
+            self._commands.store(component),
+            self._deliver,
+            self._stored,
+            lambda error: self._write_failed((), error),
+        )
+
+    def _stored(self, stored: Stored) -> None:
+        self.control.renewed(LEASE_S)
+        self.writing.say(WriteState.DONE, f"{stored.component}: {stored.result}")
+        self.tell(NewsKind.PARAMETER, self.writing.text)
+
+    def is_stored(self, name: str) -> bool:
+        """Whether the value that is held is in flash, as far as the journal shows it; else nobody knows."""
+        description, held = self.robot.description, self.robot.parameters.get(name)
+        if description is None or held is None or held.value is None:
+            return False
+        return self.flash.holds(name, held.value, description)
 
     # --- the rest
 

@@ -12,6 +12,11 @@ from gateway.messages import Number, Written
 from server_gui.core.desk.edits import Change
 
 UNDO: Final = 100  # writes that can be taken back one after another
+UNSURE: Final = (
+    "device_timeout",
+    "mismatch",
+    "rollback_failed",
+)  # refusals after which a device may hold anything
 OUTCOMES: Final = "outcome"  # what a refusal says became of each parameter
 
 
@@ -21,7 +26,7 @@ class WriteState(Enum):
     IDLE = "nothing was written"
     WRITING = "writing"
     DONE = "written and read back"
-    FAILED = "not written"
+    FAILED = "not done"
     UNKNOWN = "NOT KNOWN"  # the link or the answer was lost: it may have been written
 
 
@@ -68,9 +73,14 @@ class Writing:
             self.trial = Trial(written.write, written.after, written.before, until_ns)
             self._set(WriteState.DONE, "on trial: read back, and in force until it is taken back")
 
+    def storing(self, component: str) -> None:
+        """A device was asked to store."""
+        self._set(WriteState.WRITING, f"{component} is storing to its flash …")
+
     def failed(self, changes: tuple[Change, ...], error: Exception) -> None:
         """It was refused or rolled back, or nobody knows; what is known of a row stands on it."""
-        nothing_done = isinstance(error, RemoteError | NotConnected)
+        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
+        nothing_done = refused or isinstance(error, NotConnected)
         self._set(WriteState.FAILED if nothing_done else WriteState.UNKNOWN, str(error))
         said = error.data.get(OUTCOMES) if isinstance(error, RemoteError) else None
         for change in changes:
