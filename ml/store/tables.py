@@ -182,10 +182,12 @@ PREDICTIONS: Final = Table(
         [
             *_WHOSE,
             field("stamp_ns", pa.int64(), "ns"),
+            field("task", pa.string()),
             field("model", pa.string()),
             field("label", pa.string()),
             field("probability", pa.float64()),
-            field("probabilities", pa.string()),  # JSON
+            field("novelty", pa.float64()),
+            *(field(name, pa.string()) for name in ("probabilities", "values")),  # JSON
             *_ORIGIN,
         ]
     ),

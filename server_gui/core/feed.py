@@ -113,12 +113,15 @@ class Feed:
         except ClientError as error:
             self._tell(Failed(f"write of {', '.join(changes)}", str(error)))
 
-    async def stop(self, reason: str) -> None:
-        """Quick stop on every drive."""
+    async def stop(self, reason: str) -> StopAnswered | Failed:
+        """Quick stop on every drive; what was told of it."""
+        told: StopAnswered | Failed
         try:
-            self._tell(StopAnswered(await self._client.stop(reason)))
+            told = StopAnswered(await self._client.stop(reason))
         except ClientError as error:
-            self._tell(Failed(STOP, str(error)))
+            told = Failed(STOP, str(error))
+        self._tell(told)
+        return told
 
     # --- what goes on by itself
 

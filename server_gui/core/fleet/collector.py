@@ -16,11 +16,14 @@ from msgspec import Struct
 from gateway.client import Address
 from gateway.messages import ResourceSnapshotParams
 from ml.store import Store
+from server_gui.core.events import Event
 from server_gui.core.feed import ONCE, Following
 from server_gui.core.fleet.door import Answers, door
 from server_gui.core.fleet.fleet import Fleet, Show
+from server_gui.core.fleet.foreseeing import Foresee, Foreseeing
 from server_gui.core.fleet.statistics import LinkReport
 from server_gui.core.network import Network
+from server_gui.core.prediction.state import PredictingState
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
@@ -52,6 +55,7 @@ class CollectorReport(Struct, frozen=True):
     robots: dict[str, LinkReport]
     recorder: RecorderState
     uploader: UploaderState
+    prediction: PredictingState | None = None  # None: it is off
 
 
 class Collector:
@@ -59,7 +63,8 @@ class Collector:
 
     Leaving ends the sessions, and uploads what waits, for a while: what is not in the store then stays in the
     spool. Where an upload hangs even so, `hangs` is set, and only the end of the process ends its thread.
-    A window records with a `following` of its own, and is told of everything by `show`.
+    A window records with a `following` of its own, and is told of everything by `show` and, in another
+    thread, of what is predicted by `foresee`.
     """
 
     def __init__(
@@ -69,6 +74,7 @@ class Collector:
         notes: str = "",
         following: Following | None = None,
         show: Show | None = None,
+        foresee: Foresee | None = None,
     ) -> None:
         self.hangs = False
         self._disk = concurrent.futures.ThreadPoolExecutor(1, "disk")
@@ -81,17 +87,27 @@ class Collector:
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
         robots = {name: robot.where for name, robot in settings.robots.items()}
         following = following or whole(recorder)
-        self._fleet = Fleet(robots, following, self._recorder, operator, notes, show)
+        self._show = show
+        self._fleet = Fleet(robots, following, self._recorder, operator, notes, self._take)
+        self._foreseeing = (
+            Foreseeing(settings, self._recorder, self._fleet, self.network, foresee)
+            if settings.prediction.enabled
+            else None
+        )
         self._running: concurrent.futures.Future[None] | None = None
 
     def __enter__(self) -> Self:
         self._uploader.__enter__()
         self._recorder.__enter__()
         self.network.__enter__()
+        if self._foreseeing is not None:
+            self._foreseeing.__enter__()
         self._running = self.network.run(self._run())
         return self
 
     def __exit__(self, *exc: object) -> None:
+        if self._foreseeing is not None:
+            self._foreseeing.__exit__()
         self.network.__exit__()
         self._disk.shutdown()
         self._recorder.close()
@@ -128,6 +144,12 @@ class Collector:
             return what()
 
         return self.network.run(do())
+
+    def _take(self, robot: str, event: Event) -> None:
+        if self._foreseeing is not None:
+            self._foreseeing.take(robot, event)
+        if self._show is not None:
+            self._show(robot, event)
 
     async def _run(self) -> None:
         answers: Answers = {
@@ -184,6 +206,7 @@ class Collector:
             robots=self._fleet.report(),
             recorder=self._recorder.state,
             uploader=self._uploader.state,
+            prediction=None if self._foreseeing is None else self._foreseeing.state,
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from gateway.client import Address
-from server_gui.core.events import Event
+from server_gui.core.events import Event, Failed, StopAnswered
 from server_gui.core.feed import Feed, Following
 from server_gui.core.fleet.keeping import Keeping
 from server_gui.core.fleet.saying import Saying
@@ -33,15 +33,26 @@ class Member:
         self._keeping = keeping
         self._saying = Saying(robot, address)
         self._show = show
+        self._feed = Feed(address, self._tell, following)
 
     async def run(self) -> None:
         """Follow the robot until cancelled; a mistake of ours about it ends no other's recording."""
         while True:
             try:
-                await Feed(self._address, self._tell, self._following).run()
+                await self._feed.run()
             except Exception:
                 log.exception("%s: internal error; it is followed anew in %g s", self._robot, AGAIN_S)
             await asyncio.sleep(AGAIN_S)
+            self._feed = Feed(self._address, self._tell, self._following)
+
+    async def stop(self, reason: str) -> StopAnswered | Failed:
+        """Quick stop on every drive, over the link that there is."""
+        return await self._feed.stop(reason)
+
+    @property
+    def session(self) -> str:
+        """What the recording that goes on is called; for any thread."""
+        return self._keeping.session
 
     def report(self) -> LinkReport:
         """How its link does now."""
@@ -58,7 +69,7 @@ class Member:
 class Fleet:
     """The robots of a server; everything that they send goes to the recorder, before `show` is told of it.
 
-    For the network's thread, but for `robots` and `newest_ns`.
+    For the network's thread, but for `robots`, `session` and `newest_ns`.
     """
 
     def __init__(
@@ -91,6 +102,14 @@ class Fleet:
         member = self._member(robot, address)
         self._members = self._members | {robot: member}
         self._joining.put_nowait(member)
+
+    async def stop(self, robot: str, reason: str) -> StopAnswered | Failed:
+        """Quick stop on every drive of a robot."""
+        return await self._members[robot].stop(reason)
+
+    def session(self, robot: str) -> str:
+        """What a robot's recording that goes on is called."""
+        return self._members[robot].session
 
     def report(self) -> dict[str, LinkReport]:
         """How each robot's link does now."""

@@ -6,5 +6,5 @@ following    one robot: its rows, windows, trust and rules
 predicting   a thread that judges all robots together, and tells
 rules        when a rule on predictions begins and ends to hold
 news         what is told
-replay       the same over a recording
+state        how it goes
 """

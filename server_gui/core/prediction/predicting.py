@@ -3,11 +3,9 @@
 import collections
 import logging
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from datetime import datetime
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final, Self
 
-from msgspec import Struct
 from threadpoolctl import threadpool_limits
 
 from ml.serving.predictor import judged
@@ -17,6 +15,7 @@ from server_gui.core.prediction.inbox import Inbox
 from server_gui.core.prediction.news import News, Predicted, Ruled
 from server_gui.core.prediction.serving import Model, Serving
 from server_gui.core.prediction.settings import Action
+from server_gui.core.prediction.state import PredictingState, TaskReport
 from server_gui.core.settings import ServerSettings
 
 log = logging.getLogger(__name__)
@@ -24,41 +23,18 @@ log = logging.getLogger(__name__)
 BROKEN: Final = "it cannot be used: internal error, "
 
 
-class TaskReport(Struct, frozen=True):
-    """What is predicted of one task of a robot now; seconds, UTC. `took_s` is from sample to prediction."""
-
-    model: str
-    made: datetime
-    label: str
-    probability: float
-    utc_s: float
-    took_s: float | None
-    trust: str
-    novelty: float
-    abnormal: float  # of the last minute's decisions
-    unknown: float
-    drifted: tuple[str, ...]  # channels
-
-
-class PredictingState(Struct, frozen=True):
-    """How prediction goes; `problems` are of models, in words, by robot and task."""
-
-    enabled: bool = True
-    robots: dict[str, dict[str, TaskReport]] = {}
-    problems: tuple[str, ...] = ()
-    judged: int = 0  # decisions since the start
-    skipped: int = 0  # decisions that were due while too much was to do
-
-
 class Predicting:
     """Predicts from entering to leaving; use it as a context manager, which joins its threads.
 
-    `take` gets everything that the robots' feeds tell. `tell` gets the news and `stop` a robot's name and a
-    reason where a rule asks for it: both are called in the thread that predicts, and must return at once.
+    `take` gets everything that the robots' feeds tell. `tell` gets the news, and before that `stop` what asks
+    for a stop: both are called in the thread that predicts, and must return at once.
     """
 
     def __init__(
-        self, settings: ServerSettings, tell: Callable[[News], None], stop: Callable[[str, str], None]
+        self,
+        settings: ServerSettings,
+        tell: Callable[[Sequence[News]], None],
+        stop: Callable[[Ruled], None],
     ) -> None:
         self._settings = settings
         self._tell = tell
@@ -72,21 +48,18 @@ class Predicting:
         self._thread = threading.Thread(target=self._run, name="prediction")
 
     def __enter__(self) -> Self:
-        if self._settings.prediction.enabled:
-            self._serving.__enter__()
-            self._thread.start()
+        self._serving.__enter__()
+        self._thread.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
-        if self._settings.prediction.enabled:
-            self._inbox.close()
-            self._thread.join()
-            self._serving.__exit__(*exc)
+        self._inbox.close()
+        self._thread.join()
+        self._serving.__exit__(*exc)
 
     def take(self, robot: str, event: Event) -> None:
         """Take what a robot's feed tells; from any thread, returns at once."""
-        if self._settings.prediction.enabled:
-            self._inbox.put(robot, event)
+        self._inbox.put(robot, event)
 
     @property
     def state(self) -> PredictingState:
@@ -95,7 +68,6 @@ class Predicting:
         problems += [f"{robot}: {task}: {why}" for (robot, task), why in self._serving.problems.items()]
         robots = {robot: _reports(known) for robot, known in self._robots.copy().items()}
         return PredictingState(
-            self._settings.prediction.enabled,
             robots,
             (*problems, *self._broken.copy().values()),
             self._judged,
@@ -105,14 +77,23 @@ class Predicting:
     # --- the thread that predicts
 
     def _run(self) -> None:
-        with threadpool_limits(
-            limits=1
-        ):  # small batches are slower on several cores, and the cores are others'
+        with threadpool_limits(limits=1):  # small batches gain nothing from more, and the cores are others'
             while (taken := self._inbox.take()) is not None:
-                for robot, events in taken.items():
-                    self._follow(robot, events)
-                for model, watched in self._due():
-                    self._judge(model, watched)
+                try:
+                    self._turn(taken)
+                except Exception:
+                    log.exception("internal error; prediction goes on")
+
+    def _turn(self, taken: "Mapping[str, collections.deque[Event]]") -> None:
+        for robot, events in taken.items():
+            self._follow(robot, events)
+        for model, due in self._due():
+            news = self._judge(model, due)
+            for one in news:
+                if isinstance(one, Ruled) and one.began and one.rule.action is Action.STOP:
+                    self._stop(one)
+            if news:
+                self._tell(news)
 
     def _follow(self, robot: str, events: "collections.deque[Event]") -> None:
         known = self._robots.get(robot)
@@ -146,23 +127,21 @@ class Predicting:
                     found.setdefault(model.card.id, (model, []))[1].append((robot, watched))
         yield from found.values()
 
-    def _judge(self, model: Model, due: list[tuple[Following, Watched]]) -> None:
+    def _judge(self, model: Model, due: Sequence[tuple[Following, Watched]]) -> list[News]:
+        """What a model says of everything that is due; a model that breaks ends nothing but itself."""
+        windows = [window for _, watched in due for window in watched.due]
         try:
-            windows = [window for _, watched in due for window in watched.due]
             predictions = iter(judged(model.card.id, model.learned, windows))
-            for robot, watched in due:
-                own = [next(predictions) for _ in watched.due]
-                for news in watched.predicted(robot.robot, robot.clock, own):
-                    self._act(news)
-            self._judged += len(windows)
-        except Exception as error:  # a model that breaks ends nothing but itself
+        except Exception as error:
             log.exception("the model %s breaks; it serves no more", model.card.id)
             self._broken[model.card.id] = f"{model.card.id}: {BROKEN}{type(error).__name__}"
-
-    def _act(self, news: News) -> None:
-        if isinstance(news, Ruled) and news.began and news.rule.action is Action.STOP:
-            self._stop(news.robot, news.text)
-        self._tell(news)
+            return []
+        news: list[News] = []
+        for robot, watched in due:
+            own = [next(predictions) for _ in watched.due]
+            news += watched.predicted(robot.robot, robot.clock, own)
+        self._judged += len(windows)
+        return news
 
 
 def _reports(robot: Following) -> dict[str, TaskReport]:

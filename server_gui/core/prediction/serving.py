@@ -8,14 +8,16 @@ import logging
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from ml.errors import UnusableModel
 from ml.registry.card import Card, check_robot
-from ml.registry.registry import Registry
 from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
+
+if TYPE_CHECKING:
+    from ml.registry.registry import Registry
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +74,8 @@ class Serving:
             self._wake.wait(self._poll_s)
 
     def _look(self) -> None:
+        from ml.registry.registry import Registry  # brings scikit-learn, which takes a second or more
+
         try:
             self._registry = self._registry or Registry(self._url)
             self._update(self._registry)
@@ -85,7 +89,7 @@ class Serving:
         else:
             self.problem = None
 
-    def _update(self, registry: Registry) -> None:
+    def _update(self, registry: "Registry") -> None:
         robots = self._robots
         served = [(task, robot, pointer.model) for task, robot, pointer in registry.served()]
         if (served, robots) == self._seen:
@@ -103,7 +107,7 @@ class Serving:
         self._seen = (served, robots)
 
     def _choose(
-        self, registry: Registry, key: Key, units: Mapping[str, str], models: dict[Key, Model]
+        self, registry: "Registry", key: Key, units: Mapping[str, str], models: dict[Key, Model]
     ) -> None:
         robot, task = key
         found = registry.serving(task, robot, set(units))
@@ -116,7 +120,7 @@ class Serving:
         check_robot(model.card, robot, units)
         models[key] = model
 
-    def _load(self, registry: Registry, name: str) -> Model:
+    def _load(self, registry: "Registry", name: str) -> Model:
         """A model, loaded once; one that was refused is not asked for again."""
         if name not in self._loaded:
             try:

@@ -9,6 +9,8 @@ from typing import Annotated, Final
 
 from msgspec import Meta, Struct
 
+from ml.robot.task import ABNORMAL, TASKS
+
 EVERY_MS: Final[Mapping[str, int]] = MappingProxyType({"activity": 100, "gait_phase": 40, "falling": 40})
 STEP_MS: Final = 20  # decisions are made at points of the models' grid
 RELEASE: Final = 0.8  # of `at_least`, where a rule does not say it
@@ -23,7 +25,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if self.every_ms:
-            _among(self.every_ms, EVERY_MS, "task in every_ms")
+            _among(self.every_ms, TASKS, "task in every_ms")
 
     def every_ns(self, task: str) -> int:
         """Between two decisions of a task."""
@@ -53,8 +55,6 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
     action: Action = Action.ALARM
 
     def __post_init__(self) -> None:
-        from ml.robot.task import ABNORMAL, TASKS
-
         _among([self.task], TASKS, "task")
         _among([self.label], [*TASKS[self.task].support, ABNORMAL], f"label of {self.task}")
         if self.release is not None and self.release > self.at_least:

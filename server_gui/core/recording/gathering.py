@@ -26,6 +26,7 @@ class EventKind(Enum):
     JOURNAL_GAP = "journal_gap"  # entries of the robot's journal were never seen
     REFUSED = "refused"  # a robot sent what cannot be kept
     MARKER = "marker"  # somebody marked this instant
+    RULE = "rule"  # a rule on predictions began or ceased to hold, or what came of the stop that it asked for
 
 
 Name = tuple[str, str, int, int]  # session, connection, stream, and which layout object

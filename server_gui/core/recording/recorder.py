@@ -4,7 +4,7 @@ import functools
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, NamedTuple, Self
@@ -175,17 +175,15 @@ class Recorder:
         utc_ns = time.time_ns()
         return self._put(robot, 1, lambda: [self._robots.known(robot).event(kind, text, utc_ns, **data)])
 
-    def add(self, record: Record) -> int:
-        """Keep a row of any table: a label, a prediction.
+    def add(self, *added: Record) -> int:
+        """Keep rows of any tables: labels, predictions.
 
         Raises:
-            ValueError: there is no such table, or this is no row of it.
+            ValueError: there is no such table, or one is no row of it; none is kept then.
 
         """
-        if record.table not in TABLES:
-            raise ValueError(f"there is no table {record.table}; there are {', '.join(TABLES)}")
-        TABLES[record.table].rows([record.fields])
-        return self._put(record.fields.get("robot", ""), 1, lambda: [record])
+        _check(added)
+        return self._put(added[0].fields.get("robot", ""), len(added), lambda: added)
 
     def cut(self, then: Callable[[], None]) -> int:
         """End the batch with what was handed in until now; `then` is called when it waits for upload."""
@@ -268,8 +266,7 @@ class Recorder:
         """The records that an item makes; what a robot sends wrongly disturbs no other robot."""
         try:
             found = list(item.work())
-            for record in found:
-                TABLES[record.table].rows([record.fields])  # what the store would not take
+            _check(found)
         except Exception as error:  # noqa: BLE001 - whatever it is, the others' recording goes on
             self._lost += item.rows
             return self._robots.refused(item.robot, f"{item.robot} sent what cannot be kept: {error}")
@@ -337,3 +334,14 @@ class Recorder:
             log.error("%s", text)
             if self._on_alarm is not None:
                 self._on_alarm(self._alarms[kind])
+
+
+def _check(found: Sequence[Record]) -> None:
+    """Refuse what the store would not take, with `ValueError`."""
+    by_table: dict[str, list[Mapping[str, Any]]] = {}
+    for record in found:
+        by_table.setdefault(record.table, []).append(record.fields)
+    for name, rows in by_table.items():
+        if name not in TABLES:
+            raise ValueError(f"there is no table {name}; there are {', '.join(TABLES)}")
+        TABLES[name].rows(rows)

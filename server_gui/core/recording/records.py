@@ -1,4 +1,4 @@
-"""Sessions, labels and predictions: what people and models say of a recording, as rows for the store."""
+"""Sessions, labels, resources and journals as rows for the store."""
 
 import time
 import uuid
@@ -75,24 +75,6 @@ def begin(robot: str, facts: Facts) -> Session:
 def label(label: Label, *, removed: bool = False) -> Record:
     """A row of `labels`: that the label holds, or holds no more."""
     return Record("labels", label.row(time.time_ns(), removed=removed))
-
-
-def prediction(
-    robot: str, session: str, utc_ns: int, stamp_ns: int, model: str, probabilities: Mapping[str, float]
-) -> Record:
-    """A row of `predictions`: what `model` (name and version) made of the window that ended at `stamp_ns`."""
-    best = max(probabilities, key=probabilities.__getitem__)
-    fields = {
-        "robot": robot,
-        "session": session,
-        "utc": utc_ns,
-        "stamp_ns": stamp_ns,
-        "model": model,
-        "label": best,
-        "probability": probabilities[best],
-        "probabilities": _json(dict(probabilities)),
-    }
-    return Record("predictions", fields)
 
 
 def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot) -> Record:

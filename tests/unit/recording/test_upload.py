@@ -15,8 +15,8 @@ from ml.store.labels import Label
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.recorder import Recorder
-from server_gui.core.recording.records import Facts, label, prediction
-from server_gui.core.recording.rows import Layout
+from server_gui.core.recording.records import Facts, label
+from server_gui.core.recording.rows import Layout, Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import upload
 from server_gui.core.recording.uploader import Uploader
@@ -73,7 +73,8 @@ def test_every_table_gets_its_rows_once(spool: Spool, store_url: str, snapshot: 
             "exo-01", [{"n": 1, "hash": "h", "utc_ns": 5_000, "who": "ada", "what": "write", "to": 3}]
         )
         recorder.add(label(Label("exo-01", session, 1_000, 2_000, "walking", "ada")))
-        recorder.add(prediction("exo-01", session, 1_000, 7, "gait-3", {"walking": 0.75, "standing": 0.25}))
+        said = {"robot": "exo-01", "session": session, "utc": 1_000, "model": "activity-3", "label": "walk"}
+        recorder.add(Record("predictions", said | {"probability": 0.75}))
     for _ in range(2):
         upload_all(spool, store)
     rows = {
@@ -86,7 +87,7 @@ def test_every_table_gets_its_rows_once(spool: Spool, store_url: str, snapshot: 
     assert rows["events"][0]["text"] == "stumbled"
     assert '"to":3' in rows["journal"][0]["entry"]
     assert rows["labels"][0]["ended"].microsecond == 2
-    assert (rows["predictions"][0]["label"], rows["predictions"][0]["probability"]) == ("walking", 0.75)
+    assert (rows["predictions"][0]["label"], rows["predictions"][0]["probability"]) == ("walk", 0.75)
     assert {row["spool"] for found in rows.values() for row in found} == {spool.id}
 
 
