@@ -137,6 +137,16 @@ class Clock(Struct, frozen=True):
     boot_id: str
 
 
+class LayoutInfo(Struct, frozen=True):
+    """Where an insole's cells are as it is worn: [x, y, area] of `cell_0`, `cell_1` …, in m and m².
+
+    x is forward from the rear edge of the heel, y to the left from the foot's centre line.
+    """
+
+    name: str
+    cells: list[tuple[float, float, float]]
+
+
 class ComponentInfo(Struct, frozen=True):
     """One component of `robot.describe`; `problem` says in words what is wrong."""
 
@@ -145,6 +155,7 @@ class ComponentInfo(Struct, frozen=True):
     state: str
     problem: str | None = None
     device: dict[str, str | int] | UnsetType = UNSET  # what its EDS says, where it is on which bus
+    layout: LayoutInfo | UnsetType = UNSET  # of an insole
 
 
 class ChannelInfo(Struct, frozen=True):

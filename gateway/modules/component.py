@@ -9,13 +9,21 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
 from drivers.component import Component
+from drivers.insole.device import Insole
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel, State
 from gateway.futures import done, then
-from gateway.messages import ChannelInfo, ComponentInfo, QualityInfo, Snapshot, SnapshotParams
+from gateway.messages import (
+    ChannelInfo,
+    ComponentInfo,
+    LayoutInfo,
+    QualityInfo,
+    Snapshot,
+    SnapshotParams,
+)
 from gateway.modules.assembly import Robot, assemble, facts
 from gateway.sources import Selection, Source, channel_info, check_globs, narrow, whole
 
@@ -140,12 +148,9 @@ class ComponentModule:
             quality = self.quality(name, now_ns)
             description = self.robot.descriptions.get(name)
             device = UNSET if description is None else dict(facts(self._context.config, name, description))
-            problem = quality["problem"]
-            found.append(
-                ComponentInfo(
-                    name, kind.value, str(quality["state"]), None if problem is None else str(problem), device
-                )
-            )
+            problem = None if quality["problem"] is None else str(quality["problem"])
+            layout = _layout(self.robot.components.get(name))
+            found.append(ComponentInfo(name, kind.value, str(quality["state"]), problem, device, layout))
         return found
 
     def channels(self) -> list[ChannelInfo]:
@@ -197,3 +202,10 @@ class ComponentModule:
 def _has_values(selection: Selection) -> bool:
     latest, now_ns = selection.source.latest, time.monotonic_ns()
     return all(latest.read(index, now_ns)[1] is not None for index in selection.indices)
+
+
+def _layout(component: Component | None) -> LayoutInfo | UnsetType:
+    """Where the cells are, of an insole."""
+    if not isinstance(component, Insole):
+        return UNSET
+    return LayoutInfo(component.layout.name, list(component.layout.cells))

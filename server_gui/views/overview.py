@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.soles import cells_of, layout_name
+from server_gui.core.desk.soles import Sole, sole
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.walk import leg_phase
 from server_gui.core.processing.gait_events import Leg
@@ -72,7 +72,7 @@ class Overview(QWidget):
         self._desk = desk
         self._theme = theme
         self._read_s = 0.0  # when what is read was last shown
-        self._cells: tuple[int, int] | None = None
+        self._soles = dict.fromkeys(SIDES, Sole())
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
         self._status, self._ring = Card("Status"), GaitRing(theme)
@@ -167,23 +167,26 @@ class Overview(QWidget):
             self._posture.set_note(text if live else _old(station))
 
     def _refresh_pressure(self, station: Station, *, slow: bool) -> None:
-        counts = tuple(len(_cell_channels(station, side)) for side in SIDES)
-        if counts != self._cells:
-            self._cells = (counts[0], counts[1])
-            for side, count in zip(SIDES, counts, strict=True):
-                self._maps[side].set_cells(cells_of(count, right=side == "right"))
         live, values = not station.robot.is_stale(), station.robot.values
-        for side in SIDES:
-            pressures = [values.get(name) for name in _cell_channels(station, side)]
+        if slow:
+            self._refresh_soles(station, live=live)
+        for side, known in self._soles.items():
+            pressures = [values.get(f"{side}_insole.cell_{number}") for number in range(known.count)]
             x, y = values.get(f"{side}_insole.cop_x"), values.get(f"{side}_insole.cop_y")
             cop = None if x is None or y is None else (x, y)
             self._maps[side].show_pressures(pressures, cop, live=live)
-        if slow:
-            force = self._desk.shown.units.unit("force", "N")
-            for side in SIDES:
-                text = f"{side.upper()}  {force.text(values.get(f'{side}_insole.force'))} {force.symbol}"
-                set_text(self._loads[side], text)
-            self._pressure.set_note(_layout_note(counts) if live else _old(station))
+
+    def _refresh_soles(self, station: Station, *, live: bool) -> None:
+        force = self._desk.shown.units.unit("force", "N")
+        for side in SIDES:
+            known = sole(station.robot, side)
+            if known != self._soles[side]:
+                self._soles[side] = known
+                self._maps[side].set_cells(known.cells)
+            value = station.robot.values.get(f"{side}_insole.force")
+            set_text(self._loads[side], f"{side.upper()}  {force.text(value)} {force.symbol}")
+        sources = dict.fromkeys(known.source for known in self._soles.values())
+        self._pressure.set_note("; ".join(sources) if live else _old(station))
 
 
 def _angle_texts(pose: Pose, unit: Unit) -> list[str]:
@@ -196,23 +199,6 @@ def _angle_texts(pose: Pose, unit: Unit) -> list[str]:
         else f"{angle:+.2f}"
         for angle in angles
     ]
-
-
-def _cell_channels(station: Station, side: str) -> list[str]:
-    names: list[str] = []
-    while (name := f"{side}_insole.cell_{len(names)}") in station.robot.values:
-        names.append(name)
-    return names
-
-
-def _layout_note(counts: tuple[int, ...]) -> str:
-    count = max(counts, default=0)
-    if not count:
-        return "no insole"
-    name = layout_name(count)
-    return (
-        f"{count} cells, placed as {name}" if name else f"{count} cells in their order: no layout has so many"
-    )
 
 
 def _old(station: Station) -> str:

@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
+from msgspec import UNSET, UnsetType
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Batch, ClockOffset, ConnectionState
@@ -18,6 +19,7 @@ from gateway.messages import (
     Description,
     GatewayUse,
     GuardInfo,
+    LayoutInfo,
     MemoryUse,
     ParameterInfo,
     ParameterValue,
@@ -131,10 +133,17 @@ class Bench:
         QApplication.processEvents()
 
 
-def described(name: str = "exo-01", cells: int = 16, parameters: Mapping[str, float] = HELD) -> Described:
+def described(
+    name: str = "exo-01",
+    cells: int = 16,
+    parameters: Mapping[str, float] = HELD,
+    layout: LayoutInfo | UnsetType = UNSET,
+) -> Described:
     """A robot with six joints, two insoles and an IMU."""
     components = [ComponentInfo(joint, "joint", "ok") for joint in JOINTS]
-    components += [ComponentInfo(f"{side}_insole", "insole", "ok") for side in ("left", "right")]
+    components += [
+        ComponentInfo(f"{side}_insole", "insole", "ok", layout=layout) for side in ("left", "right")
+    ]
     components += [ComponentInfo("trunk", "imu", "ok"), ComponentInfo("gait", "device", "ok")]
     channels = [
         ChannelInfo(f"{joint}.{quantity}", unit, joint, quantity)

@@ -8,7 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
-from server_gui.core.desk.soles import cells_of
+from gateway.messages import LayoutInfo
+from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.desk.walk import leg_phase, phase_at
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.units import Units
@@ -113,6 +114,30 @@ def test_an_insole_that_no_layout_describes_is_drawn_in_its_order(overview: Over
     overview.refresh()
     assert "20 cells in their order" in overview.notes[2]
     assert len(colours(overview.grab().toImage())) > 50
+
+
+def test_an_insole_that_the_robot_describes_is_drawn_as_it_says(overview: Overview, bench: Bench) -> None:
+    cells = [(0.05 + 0.01 * number, 0.02 if number % 2 else -0.02, 1e-3) for number in range(20)]
+    bench.station.take([described(layout=LayoutInfo("own-20", cells)), walking(20, cells=20)])
+    overview.refresh()
+    assert overview.notes[2] == "20 cells, own-20"
+    assert sole(bench.station.robot, "left").cells == tuple((x, y) for x, y, _ in cells)
+
+
+def test_a_layout_of_other_cells_than_the_robot_sends_is_not_believed(bench: Bench) -> None:
+    bench.station.take([described(layout=LayoutInfo("own-2", [(0.1, 0.0, 1e-3)] * 2)), walking(20)])
+    found = sole(bench.station.robot, "left")
+    assert found.cells == cells_of(16, right=False)
+    assert "the robot does not say where they are" in found.source
+
+
+def test_a_foot_that_is_larger_than_the_drawing_is_drawn_whole(theme: Theme) -> None:
+    foot = PressureMap(theme, "left")
+    foot.set_cells(((0.03, 0.0), (0.31, -0.03)))
+    foot.show_pressures([0.0, 100_000.0], (0.31, -0.03), live=True)
+    assert np.frombuffer(foot._image.bits(), np.uint8).max() > 50
+    (x, y) = foot._trail[-1] or (0.0, 0.0)
+    assert (x, y) == pytest.approx((0.250, -0.03 * 0.250 / 0.31))
 
 
 def test_a_straight_leg_stands_below_its_hip_and_a_bent_knee_brings_the_ankle_back() -> None:

@@ -95,6 +95,16 @@ def test_describe_tells_what_the_drives_do_by_themselves(client: Client) -> None
     assert (step["unit"], step["access"], step["problem"]) == ("m", "rw", None)
 
 
+def test_describe_tells_where_the_cells_of_each_sole_are(client: Client) -> None:
+    parts = {one["name"]: one for one in client.call("robot.describe")["components"]}
+    left, right = (parts[f"{side}_insole"]["layout"] for side in ("left", "right"))
+    assert left["name"] == "insole-16"
+    assert len(left["cells"]) == 16
+    assert all(area > 0 for _, _, area in left["cells"])
+    assert [[x, -y, area] for x, y, area in left["cells"]] == right["cells"]
+    assert "layout" not in parts["left_knee"]
+
+
 def test_a_parameter_is_written_and_the_device_has_it(client: Client, robot: SimulatedRobot) -> None:
     until(lambda: all_ok(client), "every component is there")
     client.call("control.acquire", ttl_s=60)

@@ -1,27 +1,58 @@
-"""Where the cells of an insole are: a robot tells how many it has, the layouts that ship tell where."""
+"""Where the cells of an insole are: as the robot describes them, or else by a shipped layout of as many."""
 
 import tomllib
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Final
+
+from gateway.messages import LayoutInfo
+from server_gui.core.robot import Robot
 
 Cell = tuple[float, float]  # x forward from the heel, y left, m
 
 SHIPPED: Final = "drivers.insole"  # its folder `layouts` is data, one TOML file a layout
 NAMES: Final = {3: "insole-3", 8: "insole-8", 16: "insole-16", 18: "insole-18", 35: "insole-35"}
+ORDER: Final = "in their order: the robot does not say where they are, and no layout that ships has so many"
+
+
+@dataclass(frozen=True, slots=True)
+class Sole:
+    """One foot: how many cells, where each is (None: nobody knows), and in words how that is known."""
+
+    count: int = 0
+    cells: tuple[Cell, ...] | None = None
+    source: str = "no insole"
+
+
+def sole(robot: Robot, side: str) -> Sole:
+    """The cells of the insole of one side."""
+    component = f"{side}_insole"
+    count = 0
+    while f"{component}.cell_{count}" in robot.values:
+        count += 1
+    if not count:
+        return Sole()
+    layout = _described(robot, component)
+    if layout is not None and len(layout.cells) == count:
+        return Sole(count, tuple((x, y) for x, y, _ in layout.cells), f"{count} cells, {layout.name}")
+    cells = cells_of(count, right=side == "right")
+    source = ORDER if cells is None else f"placed as {NAMES[count]}: the robot does not say where they are"
+    return Sole(count, cells, f"{count} cells {source}")
 
 
 def cells_of(count: int, *, right: bool) -> tuple[Cell, ...] | None:
-    """Where so many cells are on a left or right foot; None where no layout has as many."""
+    """Where so many cells are on a foot by the layouts that ship; None where none has as many."""
     left = _left_cells(count)
     if left is None:
         return None
     return tuple((x, -y) for x, y in left) if right else left
 
 
-def layout_name(count: int) -> str | None:
-    """The layout that is taken for so many cells."""
-    return NAMES.get(count)
+def _described(robot: Robot, component: str) -> LayoutInfo | None:
+    parts = [] if robot.description is None else robot.description.components
+    layouts = (part.layout for part in parts if part.name == component)
+    return next((layout for layout in layouts if isinstance(layout, LayoutInfo)), None)
 
 
 @cache

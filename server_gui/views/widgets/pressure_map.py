@@ -17,6 +17,7 @@ from server_gui.views.theme import Theme
 FULL_PA: Final = 250_000.0  # the colour scale's end
 LENGTH_M, WIDTH_M = 0.272, 0.104  # what the picture covers, behind the heel to before the toes
 BEHIND_M: Final = 0.004
+FARTHEST_M, WIDEST_M = 0.250, 0.044  # from heel and middle, where cells of this foot can be
 COLUMNS, ROWS = 40, 104  # pixels of the picture
 SPREAD_M: Final = 0.017  # of one cell
 TRAIL: Final = 18
@@ -42,6 +43,7 @@ class PressureMap(QWidget):
         self._sign = 1.0 if side == "left" else -1.0
         self._weights: Weights | None = None
         self._cells: tuple[Cell, ...] | None = None
+        self._size = 1.0
         self._pressures: npt.NDArray[np.float32] = np.zeros(0, np.float32)
         self._image = QImage(COLUMNS, ROWS, QImage.Format.Format_Indexed8)
         self._image.setColorTable(colour_table())
@@ -59,16 +61,17 @@ class PressureMap(QWidget):
         return QSize(100, 230)
 
     def set_cells(self, cells: tuple[Cell, ...] | None) -> None:
-        """Where the cells are (m); None where nobody knows."""
-        self._cells = cells
-        self._weights = None if cells is None else weights(cells)
+        """Where the cells are (m); None where nobody knows. A larger foot is drawn as large as this one."""
+        self._size = size_of(cells or ())
+        self._cells = None if cells is None else tuple((x / self._size, y / self._size) for x, y in cells)
+        self._weights = None if self._cells is None else weights(self._cells)
         self._trail.clear()
 
     def show_pressures(self, pressures: Sequence[float | None], cop: Cell | None, *, live: bool) -> None:
         """Draw these pressures (Pa, cell after cell) and the centre of pressure (m)."""
         self._pressures = np.array([value or 0.0 for value in pressures], np.float32)
         self._live = live
-        self._trail.append(cop)
+        self._trail.append(None if cop is None else (cop[0] / self._size, cop[1] / self._size))
         if self._weights is not None and self._weights.shape[1] == len(self._pressures):
             self._fill(self._weights @ self._pressures)
         self.update()
@@ -162,6 +165,11 @@ class PressureMap(QWidget):
         pen = QPen(self._theme.colour(colour), width)
         pen.setCosmetic(True)
         return pen
+
+
+def size_of(cells: Sequence[Cell]) -> float:
+    """How much larger than the outline a foot with these cells is; 1 where they are within it."""
+    return max([1.0, *(x / FARTHEST_M for x, _ in cells), *(abs(y) / WIDEST_M for _, y in cells)])
 
 
 def weights(cells: Sequence[Cell]) -> Weights:
