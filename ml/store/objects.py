@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import obstore
+import pyarrow as pa
 from obstore.exceptions import AlreadyExistsError, NotFoundError
 from obstore.store import ObjectStore, from_url
 
@@ -55,6 +56,13 @@ class Objects:
             except AlreadyExistsError:
                 return False
             return True
+
+    def put(self, path: str, data: pa.Buffer) -> None:
+        """Write an object that is in memory; for any thread."""
+        with translated(f"{self.url}/{path} cannot be written"):
+            obstore.put(
+                self._objects, path, memoryview(data).cast("B"), chunk_size=PIECE_BYTES, max_concurrency=2
+            )
 
     def read(self, path: str) -> bytes | None:
         """An object's content, None where it is not there."""

@@ -19,10 +19,12 @@ from deltalake import (
     WriterProperties,
     write_deltalake,
 )
+from deltalake import Schema as DeltaSchema
 from deltalake.exceptions import CommitFailedError
+from deltalake.transaction import AddAction
 from pyarrow.fs import FileSystem
 
-from ml.store import durable
+from ml.store import durable, writing
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
 from ml.store.files import filesystem
 from ml.store.fragments import as_dataset
@@ -32,7 +34,6 @@ from ml.store.tables import Table
 
 ATTEMPTS: Final = 20  # races that an append may lose before it gives up
 CHECKPOINT_EVERY: Final = 50  # commits; a reader never replays more log than this
-ROW_GROUP: Final = 100_000  # rows that are read or left out together
 ABOUT: Final = "store.json"
 FORMAT: Final = 1  # of the store as a whole
 # We make checkpoints ourselves, so that those in a folder are synchronised like everything else.
@@ -105,18 +106,22 @@ class Store:
             StoreError: it is not known whether they were appended; repeat it.
 
         """
+        files: list[AddAction] = []
         with translated(f"{self.url}/{location} cannot be written"):
             for _ in range(ATTEMPTS):
-                delta = self._writable(table, location)
-                new = (delta.transaction_version(writer) or 0) < sequence
+                delta = self._writable(table, location, schema)
+                seen = delta.version()
                 try:
+                    self._widen(delta, location, schema)
+                    new = (delta.transaction_version(writer) or 0) < sequence
                     if new:
-                        self._write(delta, schema, batches(), Transaction(writer, sequence))
+                        files = files or self._files(table, location, batches())
+                        self._commit(delta, table, files, Transaction(writer, sequence))
                 except CommitFailedError:
                     continue  # another writer was faster, or we ourselves in an attempt that seemed to fail
                 finally:
                     self._open.pop(location, None)
-                self._settle(location, delta, writer, sequence)
+                self._settle(location, delta, seen, writer, sequence)
                 self._open[location] = delta
                 return new
         raise StoreError(
@@ -131,7 +136,7 @@ class Store:
 
         """
         with translated(f"{self.url}/{location} cannot be written"):
-            delta = self._writable(table, location)
+            delta = self._writable(table, location, table.schema)
             write_deltalake(
                 delta,
                 rows,
@@ -197,19 +202,19 @@ class Store:
     def _options(self) -> dict[str, str]:
         return {} if self.folder is not None else s3_options() | {"max_retries": str(RETRIES)}
 
-    def _writable(self, table: Table, location: str) -> DeltaTable:
+    def _writable(self, table: Table, location: str, schema: pa.Schema) -> DeltaTable:
         delta = self._open.get(location)
         if delta is not None:
             return delta
         try:
             return self.table(location)
         except NoSuchTable:
-            return self._create(table, location)
+            return self._create(table, location, schema)
 
-    def _create(self, table: Table, location: str) -> DeltaTable:
+    def _create(self, table: Table, location: str, schema: pa.Schema) -> DeltaTable:
         delta = DeltaTable.create(
             self._uri(location),
-            table.schema,
+            schema,
             mode="ignore",
             partition_by=list(table.partition_by),
             description=table.meaning,
@@ -220,26 +225,43 @@ class Store:
             durable.synchronise((self.folder / location / durable.LOG).iterdir())
         return delta
 
-    def _write(
-        self,
-        delta: DeltaTable,
-        schema: pa.Schema,
-        batches: Iterator[pa.RecordBatch],
-        transaction: Transaction,
+    def _files(self, table: Table, location: str, batches: Iterator[pa.RecordBatch]) -> list[AddAction]:
+        """New files with these rows, in a folder already synchronised: a log never names what may vanish."""
+        files = writing.write(self.objects, table, location, batches)
+        if self.folder is not None:
+            durable.synchronise(self.folder / location / file.path for file in files)
+        return files
+
+    def _widen(self, delta: DeltaTable, location: str, schema: pa.Schema) -> None:
+        """Add the columns that the table does not have."""
+        known = {field.name: field.type for field in delta.schema().fields}
+        wanted = DeltaSchema.from_arrow(schema).fields
+        wrong = [field.name for field in wanted if known.get(field.name, field.type) != field.type]
+        if wrong:
+            raise StoreError(f"{self.url}/{location} has {', '.join(wrong)} of another type")
+        new = [field for field in wanted if field.name not in known]
+        if new:
+            delta.alter.add_columns(new, post_commithook_properties=NO_HOOKS)
+            if self.folder is not None:
+                entry = f"{delta.version():020}.json"
+                durable.synchronise([self.folder / location / durable.LOG / entry])
+
+    def _commit(
+        self, delta: DeltaTable, table: Table, files: list[AddAction], transaction: Transaction
     ) -> None:
-        write_deltalake(
-            delta,
-            pa.RecordBatchReader.from_batches(schema, batches),
-            mode="append",
-            schema_mode="merge",
-            writer_properties=writer_properties(schema),
+        delta.create_write_transaction(
+            [*files],
+            "append",
+            delta.schema(),
+            list(table.partition_by),
             commit_properties=CommitProperties(app_transactions=[transaction]),
             post_commithook_properties=NO_HOOKS,
         )
+        delta.update_incremental()
 
-    def _settle(self, location: str, delta: DeltaTable, writer: str, sequence: int) -> None:
-        """Make the commit last, and now and then spare readers the log before it."""
-        checkpoint = delta.version() % CHECKPOINT_EVERY == 0
+    def _settle(self, location: str, delta: DeltaTable, seen: int, writer: str, sequence: int) -> None:
+        """Make the commit last, and now and then spare readers the log before it; `seen` was before it."""
+        checkpoint = delta.version() // CHECKPOINT_EVERY > seen // CHECKPOINT_EVERY
         if checkpoint:
             delta.create_checkpoint()
         if self.folder is not None:
@@ -259,7 +281,7 @@ def writer_properties(schema: pa.Schema) -> WriterProperties:
     return WriterProperties(
         compression="ZSTD",
         compression_level=1,
-        max_row_group_size=ROW_GROUP,
+        max_row_group_size=writing.ROW_GROUP,
         default_column_properties=plain,
         column_properties=numbers,
     )

@@ -67,11 +67,15 @@ class Columns:
             "row": pa.array(run.rows),
         }
         layout = zip(run.layout.channels, run.layout.units, strict=True)
-        found |= {self._names[key]: _nullable(column) for key, column in zip(layout, run.values, strict=True)}
+        found |= {self._names[key]: column for key, column in zip(layout, _nullable(run.values), strict=True)}
         nothing = pa.nulls(rows, pa.float64())
         return pa.record_batch([found.get(name, nothing) for name in self.schema.names], schema=self.schema)
 
 
-def _nullable(column: npt.NDArray[np.float64]) -> pa.Array:
-    missing = np.isnan(column)  # how a run says null
-    return pa.array(column, mask=missing if missing.any() else None)  # without a copy where nothing is
+def _nullable(values: npt.NDArray[np.float64]) -> list[pa.Array]:
+    """An array a row; NaN is how a run says null. Without a copy where nothing is missing."""
+    missing = np.isnan(values.sum(axis=1))
+    return [
+        pa.array(column, mask=np.isnan(column) if some else None)
+        for column, some in zip(values, missing, strict=True)
+    ]

@@ -14,7 +14,7 @@ from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
 
 SCHEMA: Final = """
-CREATE TABLE IF NOT EXISTS layout (id INTEGER PRIMARY KEY, description BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS layout (id INTEGER PRIMARY KEY, robot TEXT NOT NULL, description BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS run (
     robot TEXT NOT NULL, connection TEXT NOT NULL, stream INTEGER NOT NULL,
     seq INTEGER NOT NULL, row INTEGER NOT NULL, -- of the first of its rows
@@ -50,9 +50,9 @@ class Segment:
             self._database.execute("PRAGMA journal_mode=WAL")
             self._database.execute("PRAGMA synchronous=FULL")
             self._database.executescript(SCHEMA)
-            self._layouts: dict[Layout, int] = {
-                _layout_decoder.decode(description): number
-                for number, description in self._database.execute("SELECT id, description FROM layout")
+            self._layouts: dict[tuple[str, Layout], int] = {
+                (robot, _layout_decoder.decode(description)): number
+                for number, robot, description in self._database.execute("SELECT * FROM layout")
             }
             self.rows = self._count()
         except sqlite3.Error as error:
@@ -90,14 +90,15 @@ class Segment:
     def _line(self, run: Run) -> tuple[object, ...]:
         first = (int(run.seqs[0]), int(run.rows[0]))
         name = (run.robot, run.connection, run.stream, *first)
-        return (*name, len(run), run.session, self._layout(run.layout), pack(run))
+        return (*name, len(run), run.session, self._layout(run), pack(run))
 
-    def _layout(self, layout: Layout) -> int:
-        number = self._layouts.get(layout)
+    def _layout(self, run: Run) -> int:
+        number = self._layouts.get((run.robot, run.layout))
         if number is None:
             number = len(self._layouts) + 1
-            self._database.execute("INSERT INTO layout VALUES (?, ?)", (number, _encoder.encode(layout)))
-            self._layouts[layout] = number
+            line = (number, run.robot, _encoder.encode(run.layout))
+            self._database.execute("INSERT INTO layout VALUES (?, ?, ?)", line)
+            self._layouts[run.robot, run.layout] = number
         return number
 
     @contextlib.contextmanager
@@ -115,16 +116,14 @@ class Segment:
 
     def layouts(self) -> list[tuple[str, Layout]]:
         """Each robot with each of its layouts."""
-        layouts = {number: layout for layout, number in self._layouts.items()}
-        found = self._database.execute("SELECT DISTINCT robot, layout FROM run ORDER BY robot, layout")
-        return [(robot, layouts[layout]) for robot, layout in found]
+        return list(self._layouts)
 
     def runs(self) -> Iterator[Run]:
         """Every row: robot by robot, connection by connection, stream by stream, in the order of `seq`.
 
         What follows each other with the same name and columns is one run, up to `ROWS_AT_ONCE`.
         """
-        layouts = {number: layout for layout, number in self._layouts.items()}
+        layouts = {number: layout for (_, layout), number in self._layouts.items()}
         found = self._database.execute(
             "SELECT robot, session, connection, stream, layout, rows, data FROM run "
             "ORDER BY robot, connection, stream, seq, row"

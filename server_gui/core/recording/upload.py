@@ -4,7 +4,6 @@ import contextlib
 import functools
 from collections import defaultdict
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 
 import pyarrow as pa
 
@@ -56,19 +55,7 @@ def _telemetry(segment: Segment, spool: str, store: Store, location: str, robots
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
     columns = Columns(layouts, store.units(location))
 
-    with ThreadPoolExecutor(1, "upload") as maker:
+    def batches() -> Iterator[pa.RecordBatch]:
+        return (columns.batch(run) for run in segment.runs() if run.robot in robots)
 
-        def batches() -> Iterator[pa.RecordBatch]:
-            made = (columns.batch(run) for run in segment.runs() if run.robot in robots)
-            return _ahead(maker, made, maker.submit(next, made, None))
-
-        store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)
-
-
-def _ahead(
-    maker: ThreadPoolExecutor, batches: Iterator[pa.RecordBatch], coming: "Future[pa.RecordBatch | None]"
-) -> Iterator[pa.RecordBatch]:
-    """The same batches: the next one is made while the store writes the last one."""
-    while (batch := coming.result()) is not None:
-        coming = maker.submit(next, batches, None)
-        yield batch
+    store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)

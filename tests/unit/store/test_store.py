@@ -187,3 +187,30 @@ def test_rows_that_are_none_of_the_table_are_refused() -> None:
         ("kind", "x"),
         ("utc", None),
     }
+
+
+def test_what_does_not_fit_a_table_is_refused_before_anything_is_written(store_url: str) -> None:
+    store = Store(store_url)
+    store.append(TELEMETRY, HERE, *telemetry(2), "spool-a", 1)
+    kept = store.objects.names(HERE)
+    schema, batches = telemetry(2, 2)
+    at = schema.get_field_index("left_knee.position")
+    text = schema.set(at, pa.field("left_knee.position", pa.string()))
+    with pytest.raises(StoreError, match=r"has left_knee\.position of another type"):
+        store.append(TELEMETRY, HERE, text, batches, "spool-a", 2)
+    (batch,) = batches()
+    mixed = pa.record_batch([pa.array(["exo-01", "exo-02"]), *batch.columns[1:]], schema=schema)
+    with pytest.raises(StoreError, match="rows of one robot, session only"):
+        store.append(TELEMETRY, HERE, schema, lambda: iter([mixed]), "spool-a", 2)
+    assert store.objects.names(HERE) == kept
+
+
+def test_any_name_can_be_a_partition(store_url: str) -> None:
+    store = Store(store_url)
+    schema, batches = telemetry(3)
+    (batch,) = batches()
+    named = pa.record_batch([pa.repeat("Ada's exo: ä/%20=1", 3), *batch.columns[1:]], schema=schema)
+    store.append(TELEMETRY, HERE, schema, lambda: iter([named]), "spool-a", 1)
+    found = Store(store_url).dataset(HERE).to_table(columns=["robot", "stamp_ns"])
+    assert found.to_pylist() == [{"robot": "Ada's exo: ä/%20=1", "stamp_ns": number} for number in range(3)]
+    assert store.table(HERE).to_pyarrow_table().num_rows == 3
