@@ -26,7 +26,7 @@ def features_hash(recipe: Recipe) -> str:
         compute = compute.func
     digest = hashlib.sha256(repr((recipe.name, recipe.rate_hz, recipe.look_back, recipe.channels)).encode())
     for name in sorted(_modules(compute.__module__, set())):
-        digest.update("\n".join((name, *_said(_tree(name)))).encode())
+        digest.update(_digest(name))
     return digest.hexdigest()
 
 
@@ -38,14 +38,22 @@ def versions() -> dict[str, str]:
 def _modules(name: str, seen: set[str]) -> set[str]:
     """A module, those of ours that it imports, and so on."""
     seen.add(name)
-    for node in ast.walk(_tree(name)):
-        found = node.module or "" if isinstance(node, ast.ImportFrom) else ""
-        if found.startswith(PACKAGES) and found not in seen:
-            _modules(found, seen)
+    for found in _imports(name) - seen:
+        _modules(found, seen)
     return seen
 
 
 @functools.cache
+def _imports(name: str) -> frozenset[str]:
+    found = (node.module or "" for node in ast.walk(_tree(name)) if isinstance(node, ast.ImportFrom))
+    return frozenset(module for module in found if module.startswith(PACKAGES))
+
+
+@functools.cache
+def _digest(name: str) -> bytes:
+    return hashlib.sha256("\n".join((name, *_said(_tree(name)))).encode()).digest()
+
+
 def _tree(name: str) -> ast.Module:
     return ast.parse(inspect.getsource(importlib.import_module(name)))
 
