@@ -56,6 +56,7 @@ class Connection(asyncio.Protocol):
         self.address = address
         self.closed: asyncio.Future[ClientError] = asyncio.get_running_loop().create_future()
         self.received_ns = time.monotonic_ns()
+        self.received_bytes = 0
         self._on_notification = on_notification
         self._transport: asyncio.Transport | None = None
         self._waiting: dict[int, tuple[asyncio.Future[msgspec.Raw], OnResult | None]] = {}
@@ -133,6 +134,7 @@ class Connection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         self.received_ns = time.monotonic_ns()
+        self.received_bytes += len(data)
         try:
             for line in self._lines.feed(data):
                 self._take(line)

@@ -75,6 +75,7 @@ class Link:
         self.hello: Hello | None = None
         self.clock = ClockTracker()
         self.connections = 0
+        self._received_bytes = 0  # over connections that have ended
         self._on_state = on_state
         self._connection: Connection | None = None
         self._supervisor: asyncio.Task[None] | None = None
@@ -125,6 +126,11 @@ class Link:
         return self.hello
 
     # --- use
+
+    @property
+    def received_bytes(self) -> int:
+        """What the robot has sent over all connections, whatever became of it."""
+        return self._received_bytes + (self._connection.received_bytes if self._connection else 0)
 
     async def call(
         self, method: str, params: object, answer: type[Answer], timeout_s: float | None = None
@@ -211,6 +217,7 @@ class Link:
                 backoff.reset()  # it lived: not one that closes whatever connects
         finally:
             self._connection = None
+            self._received_bytes += connection.received_bytes
             self._streams.clear()
             connection.close()
 

@@ -23,10 +23,10 @@ log = logging.getLogger(__name__)
 UNIT = Path(__file__).with_name("collect.service")
 LOOK_S = 0.5  # between looks whether it is to end
 HEADER = (
-    "robot", "address", "link", "since", "links", "rows/s", "rows", "size", "missed", "dropped", "newest",
-    "round trip", "clock",
+    "robot", "address", "link", "quality", "since", "links", "rows/s", "received/s", "rows", "missed",
+    "dropped", "newest", "round trip", "clock",
 )  # fmt: skip
-RIGHT = range(4, len(HEADER))
+RIGHT = range(5, len(HEADER))
 
 EPILOG = """What comes from a robot is safe in the spool on this computer first, and goes to the store a batch
 at a time; nothing is decimated, and what is missing is recorded as an event. Robots are followed each by
@@ -130,7 +130,7 @@ def status_text(report: CollectorReport) -> str:
     ]
     robots = report.robots.items()
     links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)
-    problems = [f"{name}: {link.problem}\n" for name, link in robots if link.problem is not None]
+    problems = [f"{name}: {reason}\n" for name, link in robots for reason in link.quality.reasons]
     return "\n".join([*lines, "", links, *problems])
 
 
@@ -139,15 +139,16 @@ def _row(name: str, link: LinkReport) -> tuple[str, ...]:
         name,
         link.address,
         link.state,
+        link.quality.health.value,
         NONE if link.since_utc_s is None else _instant(link.since_utc_s),
         str(link.links),
         f"{link.rows_per_s:.0f}",
+        size(round(link.received_per_s)),
         str(link.rows),
-        size(link.bytes),
         str(link.missed),
         str(link.dropped),
         age(link.newest_age_s),
-        age(link.round_trip_s),
+        age(link.quality.round_trip),
         NONE if link.clock_uncertainty_s is None else f"±{1e3 * link.clock_uncertainty_s:.2f} ms",
     )
 

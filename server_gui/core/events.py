@@ -63,11 +63,12 @@ class Looked:
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """CPU, memory and processes at `at_ns`, and the round trip to the robot."""
+    """CPU, memory and processes at `at_ns`, the round trip to the robot, and all bytes that it has sent."""
 
     snapshot: ResourceSnapshot
     round_trip_ns: int | None
     at_ns: int
+    received_bytes: int = 0
 
 
 @dataclass(frozen=True, slots=True)

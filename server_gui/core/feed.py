@@ -175,7 +175,8 @@ class Feed:
 
     async def _resources(self) -> None:
         snapshot = await self._client.resources(self._following.resources)
-        self._tell(Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns()))
+        link = self._client.link
+        self._tell(Resources(snapshot, link.clock.round_trip_ns, time.monotonic_ns(), link.received_bytes))
 
     async def _journal(self) -> None:
         """Tell the newest entries when there are new ones, without a hole as far as the robot has them."""

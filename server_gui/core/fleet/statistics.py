@@ -8,6 +8,7 @@ from msgspec import Struct
 
 from gateway.client import Address, ClockOffset, ConnectionState
 from server_gui.core.events import Described, Event, LinkChanged, Resources, Telemetry
+from server_gui.core.processing.communication import LinkMonitor, LinkQuality
 from server_gui.core.recording.rows import KEYS, VALUE
 
 RATE_S: Final = 5  # rows a second are counted over so long
@@ -27,10 +28,12 @@ class LinkReport(Struct, frozen=True):
     rows: int
     rows_per_s: float
     bytes: int  # that its rows take in the spool
+    received: int  # bytes that came over the network
+    received_per_s: float  # between the newest two looks at the robot's computer
     missed: int  # notifications that never came
     dropped: int  # rows that the robot threw away
     newest_age_s: float | None  # since rows came
-    round_trip_s: float | None
+    quality: LinkQuality  # over the last minute
     clock_offset_s: float | None  # the robot's monotonic clock minus ours
     clock_uncertainty_s: float | None
 
@@ -52,7 +55,9 @@ class LinkStatistics:
         self._dropped = 0
         self._stream = (0, 0)  # link and stream; what the robot dropped is counted anew with each
         self._dropped_before = 0
-        self._round_trip_ns: int | None = None
+        self._received = (0, 0)  # bytes, and when that was
+        self._received_per_s = 0.0
+        self._monitor = LinkMonitor()
         self._clock: ClockOffset | None = None
         self._recent: collections.deque[tuple[int, int]] = collections.deque(
             maxlen=RATE_S + 1
@@ -64,12 +69,15 @@ class LinkStatistics:
             case Telemetry():
                 self._telemetry(event)
             case Resources():
-                self._round_trip_ns = event.round_trip_ns
+                self._monitor.round_trip(event.round_trip_ns)
+                self._look(event.received_bytes, event.at_ns)
             case Described():
                 self._calls_itself = event.description.robot
             case LinkChanged():
                 self._links += event.state is ConnectionState.CONNECTED
                 self.state, self._problem, self._since_s = event.state, event.problem, time.time()
+                self._received_per_s = 0.0
+                self._monitor.state(event.state, event.problem, event.at_ns)
 
     def report(self, session: str) -> LinkReport:
         """How it stands now."""
@@ -85,15 +93,24 @@ class LinkStatistics:
             rows=self._rows,
             rows_per_s=self._rows_per_s(now_ns),
             bytes=self._bytes,
+            received=self._received[0],
+            received_per_s=self._received_per_s,
             missed=self._missed,
             dropped=self._dropped,
             newest_age_s=None if self.newest_ns is None else (now_ns - self.newest_ns) / 1e9,
-            round_trip_s=None if self._round_trip_ns is None else self._round_trip_ns / 1e9,
+            quality=self._monitor.quality(now_ns),
             clock_offset_s=None if self._clock is None else self._clock.offset_ns / 1e9,
             clock_uncertainty_s=None if self._clock is None else self._clock.uncertainty_ns / 1e9,
         )
 
+    def _look(self, received: int, at_ns: int) -> None:
+        before, before_ns = self._received
+        if before_ns and received > before:
+            self._received_per_s = (received - before) * 1e9 / (at_ns - before_ns)
+        self._received = received, at_ns
+
     def _telemetry(self, event: Telemetry) -> None:
+        self._monitor.take(event.stream, event.batch, event.age_ns)
         batch = event.batch
         rows = len(batch.stamps_ns)
         self._rows += rows

@@ -219,6 +219,19 @@ async def test_clock_offset_is_known_and_begins_anew_with_another_boot(robot: Fa
         assert abs(offset.offset_ns) <= offset.uncertainty_ns
 
 
+@in_loop
+async def test_bytes_add_up_over_connections(robot: FakeRobot) -> None:
+    async with Client(robot.address, PATIENT) as client:
+        greeted = client.link.received_bytes
+        assert greeted > 100
+        await client.describe()
+        described = client.link.received_bytes
+        assert described > greeted
+        await asyncio.to_thread(robot.cut)
+        await until(lambda: client.link.connections == 2)
+        assert client.link.received_bytes >= described + greeted
+
+
 def test_rows_pair_each_stamp_with_its_values() -> None:
     batch = Batch([10, 20], {"a": [1.0, None], "b": [3.0, 4.0]}, 0, 0, 0, 1, 99)
     assert list(batch.rows()) == [(10, {"a": 1.0, "b": 3.0}), (20, {"a": None, "b": 4.0})]

@@ -95,6 +95,6 @@ def test_a_status_says_what_people_ask_first() -> None:
         "2 batches uploaded, 7 wait (upload = idle)",
         "5.0 MiB",
         "192.0.2.7:7420",
-        "idle",
+        "exo-01: the link is idle",
     ):
         assert words in text

@@ -8,9 +8,11 @@ from msgspec.structs import replace
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
 from gateway.messages import ComponentInfo, ParameterInfo
-from server_gui.core.events import LinkChanged, Telemetry
+from server_gui.core.events import LinkChanged, Resources, Telemetry
 from server_gui.core.fleet.facts import configuration_hash, facts
-from server_gui.core.fleet.statistics import SECOND_NS, LinkStatistics
+from server_gui.core.fleet.statistics import SECOND_NS, LinkReport, LinkStatistics
+from server_gui.core.processing.communication import Health
+from tests.unit.processing.test_resource import look
 from tests.unit.recording.robots import description
 
 KNEE = ComponentInfo("left_knee", "joint", "ok", None, {"eds": "joint_drive.eds", "node_id": 2})
@@ -85,6 +87,31 @@ def test_rows_a_second_are_those_of_the_last_whole_seconds(monkeypatch: pytest.M
     assert counted.report("").rows_per_s == 100.0
     monkeypatch.setattr("time.monotonic_ns", lambda: 110 * SECOND_NS)
     assert counted.report("").rows_per_s == 0.0
+
+
+def test_what_came_over_the_network_is_counted_whatever_became_of_it() -> None:
+    counted = LinkStatistics(Address())
+    counted.take(LinkChanged(ConnectionState.CONNECTED, None, SECOND_NS))
+    for at_s, received in ((10, 1_000), (15, 51_000), (20, 61_000)):
+        counted.take(Resources(look(at_s), 2_000_000, at_s * SECOND_NS, received))
+    report = counted.report("")
+    assert (report.received, report.received_per_s) == (61_000, 2_000.0)
+    counted.take(LinkChanged(ConnectionState.WAITING, "closed", 21 * SECOND_NS))
+    report = counted.report("")
+    assert (report.received, report.received_per_s) == (61_000, 0.0)
+
+
+def test_a_link_tells_its_quality_and_why_it_is_not_good(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = LinkStatistics(Address())
+    counted.take(LinkChanged(ConnectionState.CONNECTED, None, 90 * SECOND_NS))
+    counted.take(Resources(look(95), 2_000_000, 95 * SECOND_NS))
+    for seq in range(10):
+        counted.take(telemetry(1, 1, seq, at_s=90 + seq, dropped=seq))
+    monkeypatch.setattr("time.monotonic_ns", lambda: 100 * SECOND_NS)
+    quality = counted.report("").quality
+    assert (quality.health, quality.round_trip) == (Health.POOR, 0.002)
+    assert any("rows are lost" in reason for reason in quality.reasons)
+    assert msgspec.json.decode(msgspec.json.encode(counted.report("")), type=LinkReport).quality == quality
 
 
 def test_a_link_says_what_it_is_and_since_when() -> None:
