@@ -17,11 +17,12 @@ from ml.store.sessions import Session, in_order, made, newest
 from ml.store.tables import SESSIONS
 from ml.store.tables import UTC as UTC_TIME
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.rows import Record
+from server_gui.core.recording.rows import Layout, Record, Run, unpack
 
 _WAITING: Final = "????????.db"
 _UPLOADED: Final = "????????.uploaded.db"
 _decoder = msgspec.msgpack.Decoder(Record)
+_layout_decoder = msgspec.msgpack.Decoder(Layout)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,18 @@ def rows(spool: Path, table: Table) -> list[dict[str, Any]]:
     ]
 
 
+def runs(spool: Path, session: Session) -> Iterator[Run]:
+    """A session's telemetry in what waits for upload, with what is being recorded; in no order."""
+    sql = (
+        "SELECT connection, stream, description, data FROM run JOIN layout ON layout = layout.id "
+        "WHERE run.robot = ? AND session = ?"
+    )
+    for segment in sorted(spool.glob(_WAITING)):
+        for connection, stream, description, data in _read(segment, sql, session.robot, session.session):
+            layout = _layout_decoder.decode(description)
+            yield unpack(session.robot, session.session, connection, stream, layout, data)
+
+
 def uploaded(spool: Path) -> Iterator[Batch]:
     """Every batch that is kept as a second copy, oldest first."""
     for segment in sorted(spool.glob(_UPLOADED)):
@@ -82,7 +95,7 @@ def _records(segment: Path) -> list[Record]:
     return [_decoder.decode(content) for (content,) in found]
 
 
-def _read(segment: Path, sql: str) -> list[tuple[Any, ...]]:
+def _read(segment: Path, sql: str, *values: str) -> list[tuple[Any, ...]]:
     """Nothing where the file has gone: who records may just have uploaded or removed it.
 
     Raises:
@@ -91,7 +104,7 @@ def _read(segment: Path, sql: str) -> list[tuple[Any, ...]]:
     """
     try:
         with contextlib.closing(sqlite3.connect(f"{segment.as_uri()}?mode=ro", uri=True)) as database:
-            return database.execute(sql).fetchall()
+            return database.execute(sql, values).fetchall()
     except sqlite3.Error as error:
         if segment.exists():
             raise SpoolUnusable(f"the spool's file {segment} cannot be read: {error}") from error

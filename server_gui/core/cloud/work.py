@@ -1,0 +1,100 @@
+"""What the window lets do with recordings: exported, uploaded, copied to another place, verified."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+import pyarrow as pa
+
+from gateway.cli.text import size
+from ml.store import Store, StoreError, sessions
+from ml.store.sessions import Session
+from server_gui.core.cloud import parts, transfer, verify
+from server_gui.core.cloud.chosen import Choice, Recording, choose
+from server_gui.core.cloud.jobs import Job, Work
+from server_gui.core.cloud.mcap import write_mcap
+from server_gui.core.cloud.tabular import write_csv, write_parquet
+from server_gui.core.fleet.collector import connect
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import send
+from server_gui.core.settings import ServerSettings, StoreSettings
+
+FORMATS: Final[dict[str, Callable[[Path, Recording], int]]] = {
+    "csv": write_csv,
+    "parquet": write_parquet,
+    "mcap": write_mcap,
+}
+PROBLEMS_TOLD: Final = 3
+
+
+def export(store: StoreSettings, session: Session, choice: Choice, kind: str, file: Path) -> Work:
+    """A session, or a part of it, as a file of one of `FORMATS`; there whole or not at all."""
+
+    def work(job: Job) -> str:
+        opened = Store.existing(store.url)
+        known = sessions.find(opened, session.session, session.robot)
+        job.expect(known.rows, "rows")
+        chosen = choose(opened, known, choice)
+        counted = dataclasses.replace(chosen, tables=_counted(chosen.tables, job))
+        count = FORMATS[kind](file, counted)
+        return f"{file}: {count} {'messages' if kind == 'mcap' else 'rows'}"
+
+    return work
+
+
+def upload(settings: ServerSettings) -> Work:
+    """What waits in a spool that nobody records into, to the store."""
+
+    def work(job: Job) -> str:
+        with Spool(settings.recorder.spool) as spool:
+            waiting = spool.waiting()
+            job.expect(len(waiting), "batches")
+            store = connect(settings.store)
+            for number in waiting:
+                send(spool, number, store)
+                job.advance(1)
+        return f"{len(waiting)} batches uploaded to {settings.store.url}; nothing waits"
+
+    return work
+
+
+def download(url: str, folder: Path, wanted: Sequence[Session] = ()) -> Work:
+    """A store into a folder, which is a store then: whole with its versions, or these sessions of it."""
+
+    def work(job: Job) -> str:
+        source, target = Store.existing(url), folder.absolute().as_uri()
+        if wanted:
+            job.expect(sum(session.rows for session in wanted), "rows")
+            rows = parts.copy(source, Store(target), wanted, (), job.advance)
+            return f"{folder}: {len(wanted)} sessions, {rows} rows of telemetry copied and counted"
+        to = transfer.open_target(source, target)
+        missing = transfer.missing(source.objects, to)
+        job.expect(sum(found.size_bytes for found in missing), "bytes")
+        done = transfer.copy(source.objects, to, missing, job.advance)
+        return f"{folder}: {len(missing)} files copied, {size(done.size_bytes)}"
+
+    return work
+
+
+def check(settings: ServerSettings, *, deep: bool) -> Work:
+    """Whether every file of the store is there and whole, and every batch that the spool has sent."""
+
+    def work(job: Job) -> str:
+        store = Store.existing(settings.store.url)
+        files = verify.files(store)
+        job.expect(len(files), "files")
+        problems = list(verify.damages(store, files, job.advance, deep=deep))
+        problems += verify.batches_missing(store, settings.recorder.spool)
+        if problems:
+            told = "; ".join(problems[:PROBLEMS_TOLD])
+            raise StoreError(f"{len(problems)} problems: {told} (gwrms cloud verify lists them)")
+        return f"{store.url} is whole: {len(files)} files with {sum(file.rows for file in files)} rows"
+
+    return work
+
+
+def _counted(tables: Iterable[pa.Table], job: Job) -> Iterator[pa.Table]:
+    for each in tables:
+        yield each
+        job.advance(each.num_rows)
