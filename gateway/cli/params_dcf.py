@@ -7,7 +7,7 @@ from pathlib import Path
 import eds
 from eds import Description, dcf
 from eds.datatypes import DATA_TYPE_BY_NAME
-from gateway.cli.params_file import FileProblem, Saved, Scope, device, is_configuration, is_meant
+from gateway.cli.params_file import FileProblem, Saved, Scope, WhichDevice, device, is_configuration, is_meant
 from gateway.coding import Coding, Number, scaled
 from gateway.messages import ComponentInfo, ParameterInfo
 
@@ -54,7 +54,7 @@ def _named(scope: Scope, name: str | None) -> ComponentInfo:
     devices = {one.name: one for one in scope.robot.components if "eds" in device(one)}
     if name not in devices:
         said = "a DCF is for one device" if name is None else f"there is no CANopen device {name!r}"
-        raise FileProblem(f"{said}; give --component, one of {', '.join(devices) or 'none'}")
+        raise WhichDevice(f"{said}; give --component, one of {', '.join(devices) or 'none'}")
     return devices[name]
 
 

@@ -17,6 +17,10 @@ class FileProblem(ValueError):
     """A file of parameters that cannot be used; the message names file, place and remedy."""
 
 
+class WhichDevice(FileProblem):
+    """A file is for one device, and nothing says for which."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scope:
     """The robot that a file is made of or compared with; one device of it, where `--component` says so."""

@@ -29,7 +29,7 @@ def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
     """The file's content."""
     infos = {info.name: info for info in scope.robot.parameters}
     used = {infos[name].component for name in values}
-    files = {one.name: device(one).get("eds", "") for one in scope.robot.components if one.name in used}
+    described = [one for one in scope.robot.components if one.name in used and "eds" in device(one)]
     lines = [
         "# Parameters as the devices of a robot held them, in the units of that robot's file.",
         f"# gwrms params compare {path.name}",
@@ -40,7 +40,7 @@ def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
         f"saved = {datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
         "",
         "[eds]",
-        *(f"{_quoted(name)} = {_quoted(str(file))}" for name, file in files.items()),
+        *(f"{_quoted(one.name)} = {_quoted(str(device(one)['eds']))}" for one in described),
         "",
         "[parameters]",
         *(_line(infos[name], value) for name, value in values.items()),

@@ -50,6 +50,7 @@ class MainWindow(QMainWindow):
         self._desk = desk
         self._theme = theme
         self.kept = settings
+        desk.pins.take(settings.value("pinned"))
         self._frame = 0
         self.setWindowTitle("GWRMS")
         self.resize(1680, 1000)
@@ -101,6 +102,7 @@ class MainWindow(QMainWindow):
         self.kept.setValue("look", self._theme.look.value)
         self.kept.setValue("scale", round(self._theme.scale * 100))
         self.kept.setValue("units", dict(self._desk.shown.units.by_si))
+        self.kept.setValue("pinned", self._desk.pins.to_keep())
         super().closeEvent(event)
         self.closed.emit()
 

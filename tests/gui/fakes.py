@@ -181,7 +181,20 @@ def info(name: str) -> ParameterInfo:
     }.get(name, ("N·m", 8.0, 80.0, 40.0))
     component = name.partition(".")[0]
     return ParameterInfo(
-        name, unit, low, high, step, True, None, component, "0x2001:0", "rw", False, scale=0.001
+        name,
+        unit,
+        low,
+        high,
+        step,
+        True,
+        None,
+        component,
+        "0x2001:0",
+        "rw",
+        component != "gait",
+        type="INTEGER32",
+        scale=0.001,
+        default=0.42 if component == "gait" else None,
     )
 
 

@@ -14,7 +14,7 @@ from gateway.messages import Confirmed, Lease, Reverted, Written
 from server_gui.core.processing.units import Units
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import SETTLE_MS
-from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID
+from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from server_gui.views.theme import Theme
 from tests.gui.fakes import HELD, Bench, described, looked
 
@@ -36,7 +36,7 @@ def row(panel: ParametersPanel, name: str) -> list[str]:
     panel.refresh()
     panel.tree.select_name(name)
     index = panel.tree.currentIndex()
-    return [str(index.siblingAtColumn(column).data() or "") for column in range(6)]
+    return [str(index.siblingAtColumn(column).data() or "") for column in range(len(TITLES))]
 
 
 def settle(panel: ParametersPanel) -> None:
@@ -266,7 +266,7 @@ def test_typing_into_the_table_edits_the_exact_value(panel: ParametersPanel, ben
 
 
 def test_the_filter_finds_by_words_and_by_object(panel: ParametersPanel) -> None:
-    panel.words.setText("0x2001 torque")
+    panel.filters.words.setText("0x2001 torque")
     panel.refresh()
     shown = panel.tree.filter
     groups = [shown.index(place, NAME) for place in range(shown.rowCount())]

@@ -91,14 +91,14 @@ def test_f12_and_ctrl_space_stop_while_somebody_types(
     keys = StopKeys(qt)
     keys.pressed.connect(lambda: bench.station.stop("key"))
     window.activateWindow()
-    window.parameters.words.setFocus()
+    window.parameters.filters.words.setFocus()
     QTest.qWaitForWindowActive(window)
     handle = window.windowHandle()
     QTest.keyClick(handle, Qt.Key.Key_A)
     QTest.keyClick(handle, Qt.Key.Key_F12)
     QTest.keyClick(handle, Qt.Key.Key_Space, Qt.KeyboardModifier.ControlModifier)
     assert len(bench.first.named("stop")) == 2
-    assert window.parameters.words.text() == "a", "the keys went into the field"
+    assert window.parameters.filters.words.text() == "a", "the keys went into the field"
 
 
 def test_stop_works_while_a_menu_is_open(qt: QApplication, window: MainWindow, bench: Bench) -> None:

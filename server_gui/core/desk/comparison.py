@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gateway.cli.params_diff import Row, Verdict, compare
-from gateway.cli.params_file import FileProblem, Saved, Scope
+from gateway.cli.params_file import FileProblem, Saved, Scope, WhichDevice
 from gateway.cli.params_formats import format_of, read_file
 from gateway.messages import Description, ParameterInfo, ParameterValue
 from gateway.records import durable
@@ -13,7 +13,7 @@ from gateway.records import durable
 Held = Mapping[str, ParameterValue]
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Comparison:
     """One file, and how its values stand to the robot's; the rows are those of what can be changed there."""
 
@@ -50,10 +50,11 @@ def open_file(path: Path, description: Description, component: str | None) -> Co
     """
     try:
         return Comparison(path, read_file(path, Scope(description)))
-    except FileProblem:
-        if component is None or path.suffix.lower() != ".dcf":
-            raise
-        return Comparison(path, read_file(path, Scope(description, component)))
+    except WhichDevice as error:
+        if component is None:
+            said = f"{path} does not say which device it is for"
+            raise FileProblem(f"{said}: choose a parameter of that device, then open it again") from error
+    return Comparison(path, read_file(path, Scope(description, component)))
 
 
 def save_file(path: Path, description: Description, held: Held) -> int:

@@ -11,7 +11,9 @@ from gateway.messages import Number, ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
+from server_gui.core.desk.stored import RULE
 from server_gui.core.processing.units import Unit
+from server_gui.views.parameters.tree import exact
 from server_gui.views.widgets.card import Card, set_text
 
 STEPS: Final = 200
@@ -28,11 +30,12 @@ class CalmSlider(QSlider):
 
 
 class Detail(Card):
-    """`typed` brings name and text, `slid` name and SI value, `dropped` the name of an edit to forget."""
+    """`typed` brings name and text, `slid` name and SI value, `dropped` and `pinned` the name."""
 
     typed = Signal(str, str)
     slid = Signal(str, float)
     dropped = Signal(str)
+    pinned = Signal(str)
 
     def __init__(self, desk: Desk) -> None:
         super().__init__("No parameter chosen")
@@ -51,7 +54,12 @@ class Detail(Card):
         self._unit.setObjectName("dim")
         self._drop = QPushButton("Forget edit")
         self._drop.clicked.connect(self._dropped)
+        self.pin = QPushButton("☆")
+        self.pin.setAccessibleName("Pinned")
+        self.pin.setToolTip("Pin it, or no more: kept for this robot, and shown with the filter ★ (Ctrl+P)")
+        self.pin.clicked.connect(self._pinned)
         row = QHBoxLayout()
+        row.addWidget(self.pin)
         row.addWidget(self.slider, 3)
         row.addWidget(self.field, 2)
         row.addWidget(self._unit)
@@ -60,6 +68,7 @@ class Detail(Card):
         self._facts = QLabel("Choose a parameter above; F2 or typing edits it.")
         self._facts.setObjectName("dim")
         self._facts.setWordWrap(True)
+        self._facts.setToolTip(f"Stored: {RULE}")
         self.body.addWidget(self._facts)
 
     def choose(self, name: str | None) -> None:
@@ -71,7 +80,7 @@ class Detail(Card):
         """Show how it is now; what is being typed is left alone."""
         station = self._desk.selected
         info = None if station is None or self._name is None else station.known.get(self._name)
-        for widget in (self.slider, self.field, self._drop):
+        for widget in (self.slider, self.field, self._drop, self.pin):
             widget.setEnabled(info is not None)
         if station is None or info is None:
             return
@@ -81,6 +90,9 @@ class Detail(Card):
         value = staged.value if staged is not None else current
         self.set_title(info.name)
         set_text(self._unit, unit.symbol)
+        star = "★" if info.name in self._desk.pins.of(station.title) else "☆"
+        if self.pin.text() != star:
+            self.pin.setText(star)
         self._drop.setEnabled(staged is not None)
         if anew or not (self.field.hasFocus() and self.field.isModified()):
             text = "" if value is None else unit.editable(value)
@@ -115,6 +127,10 @@ class Detail(Card):
             self.field.setModified(False)
             self.typed.emit(self._name, self.field.text())
 
+    def _pinned(self) -> None:
+        if self._name is not None:
+            self.pinned.emit(self._name)
+
     def _dropped(self) -> None:
         if self._name is not None:
             self.dropped.emit(self._name)
@@ -147,4 +163,9 @@ def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | 
         station.writing.rows.get(info.name) or info.problem or (held.problem if held is not None else None)
     )
     said = f"\n✕ {problem}" if problem else ""
-    return f"robot {robot} · {live}{step} · object {info.object} · stored in flash: not known{said}"
+    stored = f"stored: {'yes' if station.is_stored(info.name) else 'unknown'}"
+    default = "" if info.default is None else f" · default {unit.editable(info.default)}"
+    row = None if station.file is None else station.file.rows.get(info.name)
+    file = "" if row is None or row.file is None else f" · file {unit.editable(row.file)}"
+    limits = f" · from {exact(unit, info.min) or '–'} to {exact(unit, info.max) or '–'}"
+    return f"robot {robot}{limits}{default}{file} · {stored} · {live}{step} · object {info.object}{said}"

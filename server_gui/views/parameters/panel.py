@@ -1,31 +1,35 @@
-"""The parameters panel: filter, tree, chosen one; review, write or try, undo."""
+"""The parameters panel: filter, tree, chosen one; review, write or try, undo; a file; storing to flash."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
-    QButtonGroup,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
-    QLineEdit,
     QPushButton,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from gateway.cli.params_file import FileProblem
+from server_gui.core.desk.comparison import open_file, save_file, staged_as
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import Change, unit_of
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.writing import WriteState
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
+from server_gui.views.parameters.file_bar import FileBar
+from server_gui.views.parameters.filter import FilterBar
 from server_gui.views.parameters.review import Review
+from server_gui.views.parameters.store_page import StorePage
 from server_gui.views.parameters.tree import ParameterTree
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.files import ask_open, ask_save
 
 
 class ParametersPanel(QWidget):
@@ -39,9 +43,11 @@ class ParametersPanel(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.tree, self.detail, self.review = ParameterTree(desk, theme), Detail(desk), Review(theme)
         self.trial, self.control = TrialBar(desk), ControlBar(desk, theme)
+        self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
+        self.storing = StorePage(desk, theme)
         self.pages = QStackedWidget()
-        self.pages.addWidget(self._edit_page())
-        self.pages.addWidget(self.review)
+        for page in (self._edit_page(), self.review, self.storing):
+            self.pages.addWidget(page)
         self.banner = QLabel()
         self.banner.setObjectName("banner")
         self.banner.setWordWrap(True)
@@ -56,22 +62,23 @@ class ParametersPanel(QWidget):
 
     def refresh(self) -> None:
         """Show how it is now."""
-        for part in (self.control, self.tree, self.trial, self.detail):
+        for part in (self.control, self.file, self.tree, self.trial, self.detail):
             part.refresh()
         station = self._desk.selected
         staged = 0 if station is None else len(station.difference(self._desk.shown.units))
-        total = 0 if station is None else len(station.known)
-        reviewing = self.pages.currentWidget() is self.review
-        self.all.setText(f"All {total}")
-        self.changed.setText(f"Changed {staged}")
+        editing = self.pages.currentIndex() == 0
         self._review_button.setText(f"Review {staged} …" if staged else "Review …")
-        self._review_button.setEnabled(bool(staged) and not reviewing)
+        self._review_button.setEnabled(bool(staged) and editing)
         self._discard.setEnabled(bool(staged))
-        self.undo.setEnabled(station is not None and bool(station.writing.undo) and not reviewing)
+        self.undo.setEnabled(station is not None and bool(station.writing.undo) and editing)
+        for button in (self._compare, self._save, self.store_button):
+            button.setEnabled(station is not None and bool(station.known) and editing)
         self._filter()
         self._refresh_banner(station, staged)
-        if reviewing and station is not None:
+        if self.pages.currentWidget() is self.review and station is not None:
             self._refresh_review(station)
+        elif self.pages.currentWidget() is self.storing:
+            self.storing.refresh()
 
     def stage_text(self, name: str, text: str) -> None:
         """Stage what was typed, in the unit that is shown."""
@@ -101,28 +108,43 @@ class ParametersPanel(QWidget):
             self.review.show_changes(station.difference(self._desk.shown.units))
             self.pages.setCurrentWidget(self.review)
 
+    def open_file(self, path: Path) -> None:
+        """Compare with a file from now on; nothing is staged and nothing is sent."""
+        station = self._desk.selected
+        if station is None or station.robot.description is None:
+            return
+        chosen = station.known.get(self.tree.current_name or "")
+        component = None if chosen is None else chosen.component
+        try:
+            station.file = open_file(path, station.robot.description, component)
+        except FileProblem as error:
+            self._problem = str(error)
+            return
+        self._problem = ""
+        self.refresh()
+
+    def save_file(self, path: Path) -> None:
+        """Save what the robot holds."""
+        station = self._desk.selected
+        if station is None or station.robot.description is None:
+            return
+        try:
+            count = save_file(path, station.robot.description, station.robot.parameters)
+        except FileProblem as error:
+            self._problem = str(error)
+            return
+        self._problem = ""
+        station.writing.say(WriteState.DONE, f"{path}: {count} parameters saved as the robot holds them")
+
     # --- how it is put together
 
     def _edit_page(self) -> QWidget:
         page = QWidget()
-        self.words = QLineEdit()
-        self.words.setPlaceholderText("Filter: name, 0x6072, unit …   Ctrl+F")
-        self.words.setClearButtonEnabled(True)
-        self.words.setAccessibleName("Filter of the parameters")
-        self.all, self.changed = QPushButton("All"), QPushButton("Changed")
-        kinds = QButtonGroup(self)
-        row = QHBoxLayout()
-        for button in (self.all, self.changed):
-            button.setCheckable(True)
-            kinds.addButton(button)
-            row.addWidget(button)
-        row.addStretch(1)
-        self.all.setChecked(True)
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.words)
-        layout.addLayout(row)
+        layout.addWidget(self.filters)
         layout.addWidget(self.tree, 1)
+        layout.addWidget(self.file)
         layout.addWidget(self.detail)
         return page
 
@@ -131,20 +153,37 @@ class ParametersPanel(QWidget):
         self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
         self._review_button = QPushButton("Review …")
         self._review_button.setObjectName("primary")
+        self._compare, self._save = QPushButton("Compare …"), QPushButton("Save …")
+        self._compare.setToolTip(
+            "Compare with a .toml or .dcf file, and load edits from it. Nothing is written"
+        )
+        self._save.setToolTip("Save what the robot holds as a .toml file")
+        self.store_button = QPushButton("Store to flash …")
+        self.store_button.setToolTip(
+            "Make a device keep its parameters when its power goes; a step of its own"
+        )
         grid = QGridLayout()
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
         grid.addWidget(self._review_button, 0, 2)
+        grid.addWidget(self._compare, 1, 0)
+        grid.addWidget(self._save, 1, 1)
+        grid.addWidget(self.store_button, 1, 2)
         grid.setColumnStretch(2, 1)
         return grid
 
     def _connect(self) -> None:
-        QShortcut(QKeySequence.StandardKey.Find, self, self.words.setFocus)
+        QShortcut(QKeySequence.StandardKey.Find, self, self.filters.words.setFocus)
+        self.filters.changed.connect(self._filter)
         self.tree.typed.connect(self.stage_text)
         self.tree.chosen.connect(self.detail.choose)
         self.detail.typed.connect(self.stage_text)
         self.detail.slid.connect(self.stage)
         self.detail.dropped.connect(lambda name: self._with(lambda station: station.edits.drop(name)))
+        for part in (self.tree, self.detail):
+            part.pinned.connect(self._pin)
+        self.file.stage.connect(lambda: self._with(self._load))
+        self.file.forget.connect(lambda: self._with(_close_file))
         self.trial.keep.connect(lambda: self._with(Station.keep_trial))
         self.trial.take_back.connect(lambda: self._with(Station.end_trial))
         self.control.take.connect(lambda: self._with(Station.take_control))
@@ -154,6 +193,11 @@ class ParametersPanel(QWidget):
         self._review_button.clicked.connect(self.begin_review)
         self.review.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.review.write.connect(self._write)
+        self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
+        self._save.clicked.connect(lambda: ask_save(self, "Save parameters", "toml", self.save_file))
+        self.store_button.clicked.connect(self._begin_store)
+        self.storing.back.connect(lambda: self.pages.setCurrentIndex(0))
+        self.storing.store.connect(self._store)
         self._desk.on_select.append(self._selected)
 
     # --- what people do
@@ -165,6 +209,30 @@ class ParametersPanel(QWidget):
     def _selected(self, _station: Station | None) -> None:
         self._problem = ""
         self.pages.setCurrentIndex(0)
+
+    def _pin(self, name: str) -> None:
+        station = self._desk.selected
+        if station is not None:
+            self._desk.pins.toggle(station.title, name)
+            self.refresh()
+
+    def _load(self, station: Station) -> None:
+        if station.file is not None:
+            for name, value in staged_as(station.file.different).items():
+                self.stage(name, value)
+
+    def _begin_store(self) -> None:
+        chosen = (
+            None
+            if self._desk.selected is None
+            else self._desk.selected.known.get(self.tree.current_name or "")
+        )
+        self.storing.begin(None if chosen is None else chosen.component)
+        self.pages.setCurrentWidget(self.storing)
+
+    def _store(self, component: str) -> None:
+        self.pages.setCurrentIndex(0)
+        self._with(lambda station: station.store(component))
 
     def _undo_latest(self) -> None:
         self._with(Station.stage_undo)
@@ -184,9 +252,7 @@ class ParametersPanel(QWidget):
     # --- what is shown
 
     def _filter(self) -> None:
-        station = self._desk.selected
-        names = None if station is None or not self.changed.isChecked() else list(station.edits.staged)
-        self.tree.filter.show(self.words.text(), names)
+        self.tree.filter.show(self.filters.words.text(), self.filters.refresh())
 
     def _refresh_review(self, station: Station) -> None:
         now = station.difference(self._desk.shown.units)
@@ -201,6 +267,10 @@ class ParametersPanel(QWidget):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
             self.banner.style().polish(self.banner)
+
+
+def _close_file(station: Station) -> None:
+    station.file = None
 
 
 def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, str]:

@@ -1,10 +1,10 @@
-"""The parameters by component: what the robot holds, what is staged, unit, range, what came of it."""
+"""The parameters by component: held, staged, unit, range, default, the file's, stored, what came of it."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, Final
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSortFilterProxyModel, Qt, Signal
-from PySide6.QtGui import QStandardItem, QStandardItemModel
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt, Signal
+from PySide6.QtGui import QAction, QResizeEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -15,17 +15,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.cli.params_diff import Verdict
 from gateway.messages import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
+from server_gui.core.desk.stored import RULE
 from server_gui.core.processing.units import Unit
+from server_gui.views.parameters.filter import NAME_ROLE, Filter
 from server_gui.views.theme import Theme
 
 Index = QModelIndex | QPersistentModelIndex
-TITLES: Final = ("Parameter", "Robot", "New", "Unit", "Range", "")
-NAME, ROBOT, NEW, UNIT, RANGE, SAID = range(6)
-NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
+TITLES: Final = ("Parameter", "Robot", "New", "Unit", "Range", "Default", "File", "Stored", "")
+NAME, ROBOT, NEW, UNIT, RANGE, DEFAULT, FILE, STORED, SAID = range(len(TITLES))
+IF_ROOM: Final = (FILE, RANGE, STORED, DEFAULT)  # shown while they fit; the chosen one's card has them all
+NAME_PX: Final = 130  # that a name has at least
 
 
 class NewValue(QStyledItemDelegate):
@@ -52,38 +56,12 @@ class NewValue(QStyledItemDelegate):
             self.typed.emit(str(index.data(NAME_ROLE)), editor.text())
 
 
-class Filter(QSortFilterProxyModel):
-    """By words in name, object and unit, and by a set of names."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._words: list[str] = []
-        self._names: frozenset[str] | None = None
-        self.setRecursiveFilteringEnabled(True)
-
-    def show(self, words: str, names: Iterable[str] | None) -> None:
-        """Show what has all words, and is one of `names`."""
-        wanted = None if names is None else frozenset(names)
-        if (words.lower().split(), wanted) != (self._words, self._names):
-            self._words, self._names = words.lower().split(), wanted
-            self.invalidate()
-
-    def filterAcceptsRow(self, row: int, parent: Index) -> bool:
-        index = self.sourceModel().index(row, NAME, parent)
-        name = index.data(NAME_ROLE)
-        if name is None:
-            return False  # a group is shown for what is in it
-        if self._names is not None and name not in self._names:
-            return False
-        text = f"{name} {index.data(Qt.ItemDataRole.ToolTipRole)}".lower()
-        return all(word in text for word in self._words)
-
-
 class ParameterTree(QTreeView):
-    """`typed` brings a parameter's name and the text for its new value, `chosen` the one that is selected."""
+    """`typed` brings a name and the text for its new value, `chosen` and `pinned` the name."""
 
     typed = Signal(str, str)
     chosen = Signal(str)
+    pinned = Signal(str)
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
@@ -91,6 +69,7 @@ class ParameterTree(QTreeView):
         self._theme = theme
         self._rows: dict[str, list[QStandardItem]] = {}
         self._shape: tuple[object, ...] = ()
+        self._fitted: tuple[object, ...] = ()
         self._model = QStandardItemModel()
         self._model.setHorizontalHeaderLabels(TITLES)
         self.filter = Filter()
@@ -109,6 +88,12 @@ class ParameterTree(QTreeView):
         delegate.typed.connect(self.typed)
         self.setItemDelegateForColumn(NEW, delegate)
         self.selectionModel().currentChanged.connect(self._chosen)
+        pin = QAction("Pin or unpin", self)
+        pin.setShortcut("Ctrl+P")
+        pin.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        pin.triggered.connect(self._pin)
+        self.addAction(pin)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._size_columns()
         theme.changed.connect(self.refresh)
 
@@ -116,13 +101,19 @@ class ParameterTree(QTreeView):
         """Show how it is now; rows are made anew only when the robot has others."""
         station = self._desk.selected
         known = {} if station is None else station.known
+        file = None if station is None else station.file
         shape = (station, *known, self._desk.shown.revision, self._theme.look, self._theme.scale)
         if shape != self._shape:
             self._shape = shape
             self._build(known)
         if station is not None:
+            pinned = self._desk.pins.of(station.title)
             for name, info in known.items():
                 self._refresh_row(station, name, info)
+                self._refresh_facts(station, name, info, pinned)
+        if (shape, file) != self._fitted:
+            self._fitted = shape, file
+            self._show_columns()
 
     def select_name(self, name: str) -> None:
         """Choose a parameter."""
@@ -163,16 +154,18 @@ class ParameterTree(QTreeView):
     def _row(self, name: str, info: ParameterInfo) -> list[QStandardItem]:
         unit = unit_of(name, info.unit, self._desk.shown.units)
         items = [QStandardItem() for _ in TITLES]
-        items[NAME].setText(name.partition(".")[2].replace("_", " "))
         items[UNIT].setText(unit.symbol)
         items[RANGE].setText(range_text(info, unit))
+        items[DEFAULT].setText("–" if info.default is None else brief(unit, info.default))
         tip = f"{name}\nobject {info.object} {info.type}\n{info.unit}"
         for place, item in enumerate(items):
             item.setData(name, NAME_ROLE)
             item.setToolTip(tip)
             editable = Qt.ItemFlag.ItemIsEditable if place == NEW else Qt.ItemFlag.NoItemFlags
             item.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable | editable)
-        for place in (ROBOT, NEW, RANGE):
+        items[RANGE].setToolTip(f"{exact(unit, info.min)} … {exact(unit, info.max)} {unit.symbol}")
+        items[STORED].setToolTip(RULE)
+        for place in (ROBOT, NEW, RANGE, DEFAULT, FILE):
             items[place].setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         return items
 
@@ -207,6 +200,21 @@ class ParameterTree(QTreeView):
                 item.setData(colour, Qt.ItemDataRole.BackgroundRole)
         items[SAID].setToolTip(problem or "")
 
+    def _refresh_facts(
+        self, station: Station, name: str, info: ParameterInfo, pinned: frozenset[str]
+    ) -> None:
+        """What is known of it beside its value."""
+        items = self._rows[name]
+        short = name.partition(".")[2].replace("_", " ")
+        _set(items[NAME], f"★ {short}" if name in pinned else short)
+        _set(items[STORED], "yes" if station.is_stored(name) else "unknown")
+        row = None if station.file is None else station.file.rows.get(name)
+        value = None if row is None else row.file
+        unit = unit_of(name, info.unit, self._desk.shown.units)
+        _set(items[FILE], "" if value is None else brief(unit, value))
+        same = row is None or row.verdict is Verdict.SAME
+        items[FILE].setForeground(self._theme.colour("dim" if same else "warn"))
+
     def _exact(self, name: str) -> str:
         station = self._desk.selected
         if station is None or name not in station.known:
@@ -216,10 +224,30 @@ class ParameterTree(QTreeView):
         value = staged.value if staged is not None else (None if held is None else held.value)
         return "" if value is None else unit.editable(value)
 
+    def _pin(self) -> None:
+        if self.current_name is not None:
+            self.pinned.emit(self.current_name)
+
     def _chosen(self, current: QModelIndex, before: QModelIndex) -> None:
         name = current.siblingAtColumn(NAME).data(NAME_ROLE)
         if isinstance(name, str):
             self.chosen.emit(name)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._show_columns()
+
+    def _show_columns(self) -> None:
+        station = self._desk.selected
+        always = sum(self._width(column) for column in (ROBOT, NEW, UNIT, SAID))
+        room = self.viewport().width() - self._theme.px(NAME_PX) - always
+        for column in IF_ROOM:
+            wanted = column != FILE or (station is not None and station.file is not None)
+            room -= self._width(column) if wanted else 0
+            self.setColumnHidden(column, not wanted or room < 0)
+
+    def _width(self, column: int) -> int:
+        return max(self.sizeHintForColumn(column), self.header().sectionSizeHint(column))
 
     def _size_columns(self) -> None:
         header = self.header()
@@ -231,15 +259,20 @@ class ParameterTree(QTreeView):
 
 
 def range_text(info: ParameterInfo, unit: Unit) -> str:
-    """The smallest and largest that are allowed."""
-    low = "" if info.min is None else brief(unit, info.min)
-    high = "" if info.max is None else brief(unit, info.max)
+    """The smallest and largest that are allowed, in four digits."""
+    low = "" if info.min is None else f"{info.min * unit.scale:.4g}"
+    high = "" if info.max is None else f"{info.max * unit.scale:.4g}"
     return f"{low} … {high}" if low or high else "–"
 
 
 def brief(unit: Unit, value: float) -> str:
     """For reading in a narrow column: six digits; editing and tooltips have them all."""
     return f"{value * unit.scale:.6g}"
+
+
+def exact(unit: Unit, value: float | None) -> str:
+    """Every digit."""
+    return "" if value is None else unit.editable(value)
 
 
 def _set(item: QStandardItem, text: str) -> None:
