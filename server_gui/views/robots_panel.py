@@ -55,12 +55,12 @@ class RobotCard(QFrame):
         """What it says."""
         return self._name.text(), self._state.text(), self._link.text()
 
-    def refresh(self, *, selected: bool, twins: bool) -> None:
-        """Show how it is now; `twins`: another robot has the same name."""
+    def refresh(self, *, selected: bool) -> None:
+        """Show how it is now."""
         station, robot = self.station, self.station.robot
         mark = station_mark(station)
         self._icon.show_mark(mark)
-        set_text(self._name, f"{station.title} at {station.address}" if twins else station.title)
+        set_text(self._name, station.title)
         set_text(self._state, mark.word if station.is_linked else f"{mark.word}: {_why(station)}")
         age = age_text(robot.age_s())
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
@@ -127,11 +127,8 @@ class RobotsPanel(QWidget):
         """Show how all of them are now."""
         for station in self._desk.stations[len(self.cards) :]:
             self._add_card(station)
-        titles = [station.title for station in self._desk]
         for card in self.cards:
-            card.refresh(
-                selected=card.station is self._desk.selected, twins=titles.count(card.station.title) > 1
-            )
+            card.refresh(selected=card.station is self._desk.selected)
 
     def _restyle(self) -> None:
         self.setMinimumWidth(self._theme.px(170))

@@ -1,5 +1,6 @@
 """Signals: chosen channels over time, one plot a unit; pause, zoom and export while data go on coming."""
 
+import contextlib
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from server_gui.core.processing.units import Unit
 from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.plot import Curve, Plot
 
 Floats = npt.NDArray[np.float64]
@@ -99,6 +101,7 @@ class Signals(QWidget):
         self.plots: list[UnitPlot] = []
         self._frozen: Frozen | None = None
         self._frame = 0
+        self._exported = ""  # what came of the latest export
         self._described: tuple[object, ...] = ()
         self.setObjectName("page")
         self.channels = QTreeWidget()
@@ -154,7 +157,7 @@ class Signals(QWidget):
             plot.plot.draw(source, times, found, live=live, scale=plot.unit.scale)
         self._frame += 1
         if self._frame % SLOW == 1:
-            set_text(self.said, self._state(station))
+            set_text(self.said, self._state(station) + self._exported)
             for plot in self.plots:
                 plot.show_values([self._newest(station, name) for name in plot.channels])
 
@@ -188,6 +191,11 @@ class Signals(QWidget):
                 values = (column[row] for column in columns.values())
                 writer.writerow([f"{time_s:.6f}", *("" if np.isnan(value) else value for value in values)])
 
+    def save_png(self, path: Path) -> None:
+        """What is on screen, as a picture."""
+        if not self.grab().save(str(path), "PNG"):
+            raise OSError(f"the picture could not be written: is there room in {path.parent}, and may you?")
+
     # --- how it is put together
 
     def _tools(self) -> QHBoxLayout:
@@ -206,8 +214,7 @@ class Signals(QWidget):
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
         as_csv.clicked.connect(self._ask_csv)
         as_png.clicked.connect(self._ask_png)
-        self.said = QLabel()
-        self.said.setObjectName("dim")
+        self.said = ElidedLabel("dim")
         row = QHBoxLayout()
         for widget in (self._span, self.pause, self.fit, as_csv, as_png):
             row.addWidget(widget)
@@ -294,17 +301,30 @@ class Signals(QWidget):
         self._ask("CSV", self.save_csv)
 
     def _ask_png(self) -> None:
-        self._ask("PNG", lambda path: self.grab().save(str(path)))
+        self._ask("PNG", self.save_png)
 
-    def _ask(self, kind: str, save: Callable[[Path], object]) -> None:
+    def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
         """A file dialog that is not modal: nothing stands in the way of STOP."""
         dialog = QFileDialog(self, f"Export as {kind}", "", f"{kind} (*.{kind.lower()})")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(kind.lower())
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setModal(False)
-        dialog.fileSelected.connect(lambda name: save(Path(name)))
+        dialog.fileSelected.connect(lambda name: self.export(save, Path(name)))
         dialog.show()
+
+    def export(self, save: Callable[[Path], None], path: Path) -> None:
+        """Save, and say what came of it; what was there before stays until all is written."""
+        part = path.with_name(f"{path.name}.part")
+        try:
+            save(part)
+            part.replace(path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            self._exported = f" · NOT SAVED as {path.name}: {error.strerror or error}"
+        else:
+            self._exported = f" · saved as {path.name}"
 
     # --- data
 

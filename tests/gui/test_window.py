@@ -1,13 +1,12 @@
 """The window as a whole: first run, robots, looks, sizes, layout, words that are always there."""
 
-import random
 import re
 import time
 
 import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 
 from gateway.client import ConnectionState
 from server_gui.core.desk.desk import Desk
@@ -156,28 +155,6 @@ def test_everything_that_can_be_reached_has_a_name(window: MainWindow) -> None:
         and widget.objectName() not in ("qt_spinbox_lineedit",)
     ]
     assert nameless == []
-
-
-def test_a_monkey_breaks_nothing(window: MainWindow, bench: Bench) -> None:
-    rng = random.Random(7)
-    bench.station.take([looked(), resources([])])
-    for step in range(120):
-        if step % 10 == 0:
-            bench.station.take([walking(20)])
-            bench.draw(window)
-        widgets = [
-            widget for widget in window.findChildren(QWidget) if widget.isVisible() and widget.isEnabled()
-        ]
-        widget = rng.choice(widgets)
-        if isinstance(widget, QAbstractButton) and "…" in widget.text():
-            continue  # opens a file dialog of the platform
-        if rng.random() < 0.6:
-            QTest.mouseClick(widget, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier)
-        else:
-            QTest.keyClicks(widget, rng.choice(["1", "-3.5", "x", "\t", " "]))
-    for popup in QApplication.topLevelWidgets():
-        if popup is not window:
-            popup.close()
 
 
 def contrast(one: str, other: str) -> float:

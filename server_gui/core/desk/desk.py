@@ -41,6 +41,7 @@ class Desk:
     def add(self, station: Station) -> None:
         """Another robot; the first is selected."""
         self.stations.append(station)
+        station.neighbours = self.stations
         if self.selected is None:
             self.select(station)
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from typing import Final
 
@@ -56,6 +56,7 @@ class Station:
     def __init__(self, name: str, address: str, commands: Commands, deliver: Deliver, news: News) -> None:
         self.name = name
         self.address = address
+        self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
         self.processing = RobotProcessing()
@@ -76,9 +77,19 @@ class Station:
         self._watched_ns = 0
 
     @property
-    def title(self) -> str:
+    def called(self) -> str:
         """What the robot calls itself, or what we call it while it has not spoken."""
         return self.robot.description.robot if self.robot.description is not None else self.name
+
+    @property
+    def has_twin(self) -> bool:
+        """Whether another robot of the desk calls itself so too."""
+        return any(other is not self and other.called == self.called for other in self.neighbours)
+
+    @property
+    def title(self) -> str:
+        """What the robot is called, and where it is, where another one is called so too."""
+        return f"{self.called} at {self.address}" if self.has_twin else self.called
 
     @property
     def known(self) -> dict[str, ParameterInfo]:
@@ -132,6 +143,10 @@ class Station:
             self.rings.clear()
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
         self.stopping.held = description.stop.held
+        if self.has_twin and (before is None or before.robot != description.robot):
+            self.tell(
+                NewsKind.WARNING, "another robot is called so too: give one another [robot] name in its file"
+            )
         gone = self.edits.vanished(self.known)
         if gone:
             self.tell(NewsKind.WARNING, f"staged edits dropped, the robot no longer has {', '.join(gone)}")
@@ -258,6 +273,8 @@ class Station:
         if self.writing.undo:
             for name, value in self.writing.undo.pop().items():
                 self.edits.stage(name, value, self.robot.parameters.get(name))
+            for name in self.edits.vanished(self.known):
+                self.tell(NewsKind.WARNING, f"{name} is not undone: the robot no longer lets it be written")
 
     def _kept(self) -> None:
         self.writing.kept()
