@@ -1,0 +1,158 @@
+"""`gwrms models` as somebody types it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gateway.main import main
+from ml.registry.card import Card, Source, TableVersion
+from ml.registry.judged import judged
+from ml.registry.registry import CARD, FOLDER, Registry
+from ml.store.objects import Objects
+from tests.unit.registry.models import card, features, learned
+from tests.unit.registry.test_registry import NOWHERE
+from tests.unit.store.test_store import HERE
+from tests.unit.store.test_upkeep import filled
+
+
+class Desk:
+    """A server's file and its store; `run` is the command line."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.url = (folder / "store").as_uri()
+        self.registry = Registry(self.url, NOWHERE)
+        self._config = folder / "server.toml"
+        self._config.write_text(f'[store]\nurl = "{self.url}"\n')
+        self._capsys = capsys
+
+    def run(self, *words: str, status: int = 0) -> str:
+        """What it prints, or where `status` is another one, what it complains of."""
+        assert main(["models", *words, "--config", str(self._config)]) == status
+        said = self._capsys.readouterr()
+        return said.err if status else said.out
+
+    def ask(self, *words: str) -> Any:
+        assert main(["models", *words, "--config", str(self._config), "--json"]) == 0
+        return json.loads(self._capsys.readouterr().out)
+
+    def publish(self, seed: int = 0, **changes: Any) -> Card:
+        model = learned(seed=seed)
+        return self.registry.card(self.registry.publish(model.state(), card(model, **changes)))
+
+
+@pytest.fixture
+def desk(
+    store_libraries: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> Desk:
+    shipped = tmp_path / "shipped"
+    model = learned(seed=2)
+    Registry(shipped.as_uri(), NOWHERE).publish(model.state(), card(model, source=Source.SIMULATED))
+    monkeypatch.setattr(Registry.__init__, "__defaults__", (shipped,))
+    return Desk(tmp_path, capsys)
+
+
+def test_models_are_listed_with_what_they_serve(desk: Desk) -> None:
+    one, own = desk.publish(), desk.publish(robot="exo-01")
+    assert desk.run("promote", one.id[:14]) == f"falling: {one.id} serves every robot\n"
+    assert desk.ask("promote", own.id, "--robot", "exo-01", "--who", "Ada")["now"]["who"] == "Ada"
+    shipped, first, second = desk.run("ls").splitlines()[1:]
+    assert "shipped, simulated" in shipped
+    assert "where no other does" in shipped
+    assert first.split()[0] == one.id
+    assert first.endswith("every robot")
+    assert second.endswith("exo-01")
+    listed = desk.ask("ls", "--task", "falling")["models"]
+    assert [(each["id"], each["shipped"], each["serves"]) for each in listed[1:]] == [
+        (one.id, False, ["every robot"]),
+        (own.id, False, ["exo-01"]),
+    ]
+    assert desk.ask("ls", "--task", "activity")["models"] == []
+
+
+def test_a_rollback_brings_back_what_served_before(desk: Desk) -> None:
+    one, other = desk.publish(), desk.publish(seed=1)
+    desk.run("promote", one.id)
+    desk.run("promote", other.id, "--who", "Ada", "--why", "stairs too")
+    assert desk.run("rollback", "falling") == f"falling: {one.id} serves every robot\n"
+    assert desk.run("rollback", "falling") == "falling: no model serves every robot any more\n"
+    assert "nothing to roll back" in desk.run("rollback", "falling", status=1)
+    assert "nothing to roll back" in desk.run("rollback", "falling", "--robot", "exo-01", status=1)
+    lines = desk.run("history", "falling").splitlines()
+    assert other.id in lines[2]
+    assert lines[2].endswith("Ada   stairs too")
+    assert [each["model"] for each in desk.ask("history", "falling")] == [one.id, other.id, one.id, ""]
+
+
+def test_a_model_is_shown_with_all_that_says_how_far_to_trust_it(desk: Desk) -> None:
+    rows, truth = features(seed=5)
+    model = learned()
+    verdicts = model.judge(rows)
+    index = np.array([model.classes.index(name) for name in truth])
+    people = ["Ada", "Bob"] * (len(rows) // 2)
+    store = filled(desk.url)
+    version = store.table(HERE).version()
+    made = desk.publish(
+        metrics=judged(model.classes, index, verdicts.probabilities, verdicts.label, people),
+        learned=tuple(f"2026112{day}" for day in range(9)),
+        held_out=("20261201",),
+        tables=(TableVersion(desk.url, HERE, version),),
+        ranges={model.recipe.channels[0]: (-3.25, 12.0)},
+    )
+    said = desk.run("show", made.id)
+    for words in (
+        "20261125 and 3 more",
+        "never saw      20261201",
+        f"{HERE} version {version}",
+        " -3.25 ",
+        "near_fall",
+        "Bob",
+        "steady  near_fall  fall  unknown",
+        "PROBABILITY SAID",
+        "probabilities are off by",
+        "serves         nobody",
+    ):
+        assert words in said
+    assert "CANNOT SERVE" not in said
+    answer = desk.ask("show", made.id)
+    assert answer["problem"] == ""
+    assert len(answer["metrics"]["confusion"]) == 3
+
+
+def test_what_cannot_serve_is_listed_and_said_and_not_promoted(desk: Desk) -> None:
+    good, bad, gone = desk.publish(), desk.publish(seed=1), desk.publish(notes="gone")
+    desk.run("promote", good.id)
+    objects = Objects(desk.url)
+    objects.write(f"{FOLDER}/{bad.id}/model.skops", [b"\x80\x04."])
+    objects.write(f"{FOLDER}/{gone.id}/{CARD}", [b"{}"])
+    assert f"{gone.id}: model.json is no model's card" in desk.run("ls", status=1)
+    assert main(["models", "show", bad.id, "--url", desk.url]) == 1
+    assert "SHA-256" in desk.run("promote", bad.id, status=1)
+    assert "SHA-256" in desk.run("export", bad.id, "--onnx", "never.onnx", status=1)
+    assert desk.registry.serving("falling") == good.id
+
+
+def test_names_that_nothing_or_several_have_are_refused(desk: Desk, tmp_path: Path) -> None:
+    desk.publish()
+    assert "several begin: falling-" in desk.run("show", "falling", status=1)
+    assert "has no model 'walking'" in desk.run("promote", "walking", status=1)
+    assert "no name of a robot" in desk.run("promote", desk.publish().id, "--robot", "../x", status=1)
+    nowhere = (tmp_path / "typo").as_uri()
+    assert "no store at" in desk.run("ls", "--url", nowhere, status=1)
+    assert not (tmp_path / "typo").exists()
+
+
+def test_a_classifier_is_exported(desk: Desk, tmp_path: Path) -> None:
+    pytest.importorskip("skl2onnx")
+    made, file = desk.publish(), tmp_path / "model.onnx"
+    assert made.id in desk.run("export", made.id, "--onnx", str(file))
+    from ml.registry.onnx import probabilities
+
+    rows, _ = features(seed=3)
+    expected = learned().judge(rows).probabilities
+    np.testing.assert_allclose(probabilities(file.read_bytes(), rows), expected, atol=1e-5)
