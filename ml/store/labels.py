@@ -23,6 +23,7 @@ ACTIVITIES: Final = (
 # What happens at one instant: the gait phase of a leg goes from one heel strike to the next.
 INSTANTS: Final = ("left_heel_strike", "right_heel_strike", "left_toe_off", "right_toe_off")
 WEARER: Final = "wearer "  # before a name: who wore the robot
+REGRESSION: Final = "regression set"  # of a session: no model learns from it, each is judged by it
 
 
 class Source(Enum):

@@ -10,7 +10,7 @@ import msgspec
 
 from gateway.cli.text import NONE, say, say_json, table, warn
 from ml.store import Store
-from ml.store.labels import ACTIVITIES, INSTANTS, WEARER, Label, utc_ns, wearer
+from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
 from ml.store.sessions import Session
 from server_gui.commands.cloud_reach import absolute, instant_or_seconds, parser
 from server_gui.core.labelling import Kept, Labelling, span
@@ -29,6 +29,7 @@ table. Of one author two activities at one time contradict each other and are re
 examples
   gwrms label 20261121T1530 walk --from 10 --to 70
   gwrms label 20261121T1530 --wearer P03           # whose models must not be judged by himself
+  gwrms label 20261121T1530 --regression           # a test that every model must pass
   gwrms label 20261121T1530 --file labels.csv      # with the columns from,to,label
   gwrms label 20261121T1530 --gait-events          # heel strikes and toe offs, as the sensors show them
   gwrms label 20261121T1530 --truth truth.jsonl    # of gwrms sim --truth
@@ -52,7 +53,7 @@ def main(argv: list[str]) -> int:
     if arguments.remove:
         return _remove(labelling, labels, as_json=arguments.json)
     for name in sorted({each.label for each in labels} - {*ACTIVITIES, *INSTANTS}):
-        if wearer(name) is None:
+        if wearer(name) is None and name != REGRESSION:
             warn("label", f"no model learns from {name!r} (gwrms label --help names what they learn from)")
     return _tell(labelling.add_all(labels), as_json=arguments.json)
 
@@ -69,13 +70,15 @@ def _wanted(
         return from_truth(Store.existing(settings.store.url), session, arguments.truth)
     if arguments.gait_events:
         return from_events(Store.existing(settings.store.url), session)
-    if arguments.wearer is not None:
-        begins, ends = span(session)
-        return [_label(session, f"{WEARER}{arguments.wearer}", begins, ends, arguments)]
+    if arguments.wearer is not None or arguments.regression:
+        whole = REGRESSION if arguments.regression else f"{WEARER}{arguments.wearer}"
+        return [_label(session, whole, *span(session), arguments)]
     begin = absolute(session, arguments.begin)
     end = absolute(session, arguments.end) or begin
     if arguments.label is None or begin is None or end is None:
-        made.error("say LABEL and --from, or one of --file, --truth, --gait-events, --wearer, --ls")
+        made.error(
+            "say LABEL and --from, or one of --file, --truth, --gait-events, --wearer, --regression, --ls"
+        )
     return [_label(session, arguments.label, utc_ns(begin), utc_ns(end), arguments)]
 
 
@@ -147,6 +150,9 @@ def _parser() -> argparse.ArgumentParser:
     others.add_argument("--truth", type=Path, metavar="FILE.jsonl", help="what a simulated wearer did")
     others.add_argument("--gait-events", action="store_true", help="steps that the recording itself shows")
     others.add_argument("--wearer", metavar="NAME", help="who wore the robot, all the time")
+    others.add_argument(
+        "--regression", action="store_true", help="never learn from this session, judge every model by it"
+    )
     others.add_argument("--ls", action="store_true", help="show the labels that hold")
     made.add_argument("--remove", action="store_true", help="take back what is named instead of keeping it")
     return made

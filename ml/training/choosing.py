@@ -1,0 +1,80 @@
+"""Which sessions a model learns from, by which it is judged, and which sensors it takes."""
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence, Set
+from typing import Final
+
+from ml.errors import UnusableData
+from ml.features.recipe import Recipe
+from ml.robot.task import Task
+from ml.training.dataset import Part
+
+HELD_OUT_SHARE: Final = 0.25  # of wearers, or sessions, where nobody says which
+
+
+def recipe_for(task: Task, channels: Mapping[str, Set[str]]) -> Recipe:
+    """The richest recipe that at least half of the sessions have the channels for.
+
+    `channels` are those with values, by session.
+
+    Raises:
+        UnusableData: no session has enough.
+
+    """
+    offered = {recipe.name: recipe for there in channels.values() if (recipe := task.recipe(there))}
+    having = {
+        name: sum(there >= set(recipe.channels) for there in channels.values())
+        for name, recipe in offered.items()
+    }
+    enough = [recipe for name, recipe in offered.items() if 2 * having[name] >= len(channels)]
+    found = enough or list(offered.values())
+    if not found:
+        raise UnusableData(
+            f"no session has the channels that {task.name} takes (docs/prediction.md lists them)"
+        )
+    return max(found, key=lambda recipe: (len(recipe.channels), recipe.name))
+
+
+def held_out(groups: Iterable[str], wanted: Sequence[str] = ()) -> frozenset[str]:
+    """The wearers, or sessions, that judge: those that are wanted, else a quarter by a hash of their names.
+
+    So somebody who is held out once stays so, however much is recorded later.
+
+    Raises:
+        UnusableData: one that is wanted is not there, or too few are left.
+
+    """
+    known = sorted(set(groups))
+    for name in wanted:
+        if name not in known:
+            raise UnusableData(f"nobody is called {name!r}; there are {', '.join(known)}")
+    if wanted:
+        chosen = frozenset(wanted)
+    else:
+        places = {name: _place(name) for name in known}
+        chosen = frozenset(name for name, place in places.items() if place < HELD_OUT_SHARE)
+        chosen = chosen or frozenset(sorted(known, key=_place)[:1])
+        while len(known) - len(chosen) < 2 and len(chosen) > 1:
+            chosen -= {max(chosen, key=_place)}
+    if len(known) - len(chosen) < 2:
+        raise UnusableData(
+            f"there are {len(known)} wearers or sessions with labels ({', '.join(known) or 'none'}): "
+            "it takes two to learn from and one to judge by"
+        )
+    return chosen
+
+
+def _place(name: str) -> float:
+    """From 0 to 1, the same for ever."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8]) / 2**64
+
+
+def split(parts: Iterable[Part], held: Set[str]) -> tuple[list[Part], list[Part], list[Part]]:
+    """Parts to learn from, held out, and of the regression set."""
+    every = list(parts)
+    usual = [each for each in every if not each.regression]
+    return (
+        [each for each in usual if each.group not in held],
+        [each for each in usual if each.group in held],
+        [each for each in every if each.regression],
+    )

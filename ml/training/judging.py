@@ -1,0 +1,213 @@
+"""A new model against the one that serves: on people neither may know, and on a fixed regression set.
+
+It is better where its figure over the held-out decisions is; it is much worse somewhere where one class or
+one person loses more than is allowed, there or in the regression set. Both judge the same decisions.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from msgspec.structs import replace
+
+from ml.registry.card import Metrics
+from ml.registry.judged import calibrated, judged
+from ml.robot.learned import NONE, STRANGE, Learned, Verdicts
+from ml.robot.task import Task
+from ml.store.labels import Source
+from ml.training.dataset import Part
+
+FEW: Final = 20  # decisions; a class or person with fewer is no reason
+MOST_LOST: Final = 0.05  # of a class's or a person's F1, or of the calibration
+MOST_LOST_PERCENT: Final = 1.0  # of the cycle, of a person's error
+MOST_ABSTAINED: Final = 0.1  # more than the serving model
+WITHIN: Final = 0.1  # of the cycle: a phase that is right
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One set of decisions, judged by the new and, where there is one, by the serving model."""
+
+    name: str
+    decisions: int
+    new: Metrics
+    serving: Metrics | None
+    people: Mapping[str, int] = field(default_factory=dict)  # decisions of each
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Whether the new model may serve, and why, in sentences."""
+
+    better: bool
+    why: tuple[str, ...]
+
+
+def judge(
+    name: str, new: Learned, parts: Sequence[Part], serving: Learned | None, its: Sequence[Part]
+) -> Judged:
+    """Both models on the same decisions; `its` are the parts with the serving model's features, if it has."""
+    parts = [_by_people(each) for each in parts]
+    if serving is not None:
+        parts, its = _common(parts, its)
+    classes = _classes(new, parts, serving)
+    metrics = _metrics(new, parts, classes)
+    other = None if serving is None else _metrics(serving, its, classes)
+    return Judged(name, sum(len(each.truth) for each in parts), metrics, other, _people(parts))
+
+
+def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
+    """Better on the held-out decisions, and nowhere much worse."""
+    if not held_out.decisions:
+        return Decision(False, ("no decision of the held-out people can be judged by both models",))
+    figure = "macro_f1" if task.fold else "rmse_percent"
+    new = held_out.new.figures[figure]
+    if held_out.serving is None:
+        return _without_serving(task, held_out, figure)
+    old = held_out.serving.figures[figure]
+    gain = new - old if task.fold else old - new
+    reasons = [
+        f"{figure} on held-out people: {new:.4g}, the serving model's {old:.4g}"
+        + ("" if gain > 0 else ": not better")
+    ]
+    losses = [loss for each in (held_out, regression) if each is not None for loss in _losses(task, each)]
+    return Decision(gain > 0 and not losses, (*reasons, *losses))
+
+
+def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
+    """Nothing serves: so it must be better than saying always the same."""
+    new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
+    better = new > idle if task.fold else new < idle
+    told = (
+        f"{figure} on held-out people: {new:.4g}; saying always the same has {idle:.4g}; nothing serves yet"
+    )
+    return Decision(better, (told,))
+
+
+def _losses(task: Task, found: Judged) -> Iterator[str]:
+    """Where the new model is much worse."""
+    new, old = found.new, found.serving
+    if old is None:
+        return
+    for name, score in old.per_class.items():
+        lost = score.f1 - new.per_class[name].f1
+        if score.support >= FEW and lost > MOST_LOST:
+            yield f"much worse in the {found.name}: F1 of {name} falls by {lost:.3f}"
+    for who, before in old.per_subject.items():
+        lost = before - new.per_subject[who] if task.fold else new.per_subject[who] - before
+        if found.people[who] >= FEW and lost > (MOST_LOST if task.fold else MOST_LOST_PERCENT):
+            yield f"much worse in the {found.name}: {who} loses {lost:.3g}{'' if task.fold else ' %'}"
+    for name, most in (("calibration_error", MOST_LOST), ("abstained", MOST_ABSTAINED)):
+        lost = _figure(new, name) - _figure(old, name)
+        if lost > most:
+            yield f"much worse in the {found.name}: {name} rises by {lost:.3f}"
+
+
+def _figure(metrics: Metrics, name: str) -> float:
+    return metrics.calibration_error or 0.0 if name == "calibration_error" else metrics.figures[name]
+
+
+# --- decisions
+
+
+def _by_people(part: Part) -> Part:
+    """What people, the simulator or sensors say: nobody is judged by what a model said."""
+    return part.of(part.source != Source.PSEUDO.value)
+
+
+def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], list[Part]]:
+    """The decisions, session by session, that both have features for."""
+    others = {(each.ask.robot, each.ask.session): _by_people(each) for each in its}
+    mine, theirs = [], []
+    for each in parts:
+        other = others.get((each.ask.robot, each.ask.session))
+        if other is not None:
+            _, ours, others_ = np.intersect1d(each.stamps_ns, other.stamps_ns, return_indices=True)
+            mine.append(each.of(ours))
+            theirs.append(other.of(others_))
+    return mine, theirs
+
+
+def _people(parts: Sequence[Part]) -> dict[str, int]:
+    counts: Counter[str] = Counter()
+    for each in parts:
+        counts[each.group] += len(each.truth)
+    return counts
+
+
+def _classes(new: Learned, parts: Sequence[Part], serving: Learned | None) -> tuple[str, ...]:
+    """The new model's, and then those that it does not know, but the other one or somebody does."""
+    others = {str(name) for each in parts if new.task.fold for name in np.unique(each.truth)}
+    others |= set(() if serving is None else serving.classes)
+    return (*new.classes, *sorted(others - set(new.classes)))
+
+
+def _metrics(learned: Learned, parts: Sequence[Part], classes: Sequence[str]) -> Metrics:
+    """How right it is in terms of these classes."""
+    parts = [each for each in parts if len(each.truth)]
+    if not parts:
+        return Metrics()
+    truth = np.concatenate([each.truth for each in parts])
+    verdicts = [learned.judge(each.features) for each in parts]
+    people = np.concatenate([np.full(len(each.truth), each.group) for each in parts])
+    if learned.task.fold:
+        return _of_classes(learned.classes, classes, truth, verdicts, people)
+    return _of_phases(truth, verdicts, people)
+
+
+def _label(verdicts: Sequence[Verdicts]) -> npt.NDArray[np.int_]:
+    """What is said: nothing of what it does not know."""
+    return np.concatenate([np.where(one.novelty < STRANGE, one.label, NONE) for one in verdicts])
+
+
+def _of_classes(
+    known: Sequence[str],
+    every: Sequence[str],
+    truth: npt.NDArray[Any],
+    verdicts: Sequence[Verdicts],
+    people: npt.NDArray[Any],
+) -> Metrics:
+    """A class that the model does not know is one that it never says."""
+    place = np.array([*(every.index(name) for name in known), NONE])
+    probabilities = np.zeros((len(truth), len(every)))
+    probabilities[:, place[:-1]] = np.concatenate([one.probabilities for one in verdicts])
+    index = (truth[:, None] == np.array(every)).argmax(axis=1)
+    found = judged(every, index, probabilities, place[_label(verdicts)], people.tolist())
+    usual = np.full(len(index), np.bincount(index).argmax())
+    idle = judged(every, index, np.eye(len(every))[usual], usual, people.tolist())
+    return replace(found, figures=found.figures | {"idle": idle.figures["macro_f1"]})
+
+
+def _of_phases(truth: npt.NDArray[Any], verdicts: Sequence[Verdicts], people: npt.NDArray[Any]) -> Metrics:
+    """Errors over both legs where they step; whether it says so, where they do not."""
+    steps = ~np.isnan(truth).any(axis=1)
+    said = _label(verdicts) != NONE
+    phases = np.concatenate(
+        [np.stack([one.values[side] for side in ("left", "right")], axis=1) for one in verdicts]
+    )
+    error = np.abs((phases - np.where(steps[:, None], truth, 0.0) + 0.5) % 1.0 - 0.5)
+    right = steps & (error <= WITHIN).all(axis=1)
+    sure = np.concatenate([one.probabilities[:, 0] for one in verdicts])
+    calibration = calibrated(np.stack([sure, np.zeros_like(sure)], axis=1), np.where(right, 0, 1))
+    figures = {
+        "rmse_percent": _rmse(error[steps]),
+        "abstained": float((~said)[steps].mean()) if steps.any() else 0.0,
+        "stepping_where_none_steps": float(said[~steps].mean()) if (~steps).any() else 0.0,
+        "idle": 100.0 / math.sqrt(12.0),  # of a phase that is anything
+    }
+    walkers = np.unique(people[steps])
+    return Metrics(
+        figures=figures,
+        per_subject={str(one): _rmse(error[steps & (people == one)]) for one in walkers},
+        calibration=calibration,
+        calibration_error=sum(abs(one.said - one.right) * one.count for one in calibration) / len(truth),
+    )
+
+
+def _rmse(error: npt.NDArray[np.float64]) -> float:
+    """In percent of the cycle; of nothing, the worst there is."""
+    return 100.0 * float(np.sqrt(np.mean(error * error))) if len(error) else 50.0

@@ -1,0 +1,273 @@
+"""Training: what a store's sessions and labels say → a model, its card, and whether it may serve.
+
+Nothing is published here. The same tables and the same wish give the same model, bit by bit.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Final
+
+import numpy as np
+from msgspec.structs import replace
+from threadpoolctl import threadpool_limits
+
+from ml.errors import UnusableData, UnusableModel
+from ml.features.recipe import Recipe
+from ml.registry.card import Card, Metrics
+from ml.registry.card import Source as Origin
+from ml.registry.code import features_hash
+from ml.registry.code import versions as library_versions
+from ml.registry.registry import Registry
+from ml.robot.groups import unit
+from ml.robot.learn import LEAST_ROWS, learn
+from ml.robot.learned import Learned
+from ml.robot.task import Task
+from ml.store.labels import Source
+from ml.training.adapting import adapted, divided
+from ml.training.choosing import held_out, recipe_for, split
+from ml.training.dataset import LeftOut, Part
+from ml.training.judging import Decision, Judged, decide, judge
+from ml.training.material import Material, Wish, material
+
+SEED: Final = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Trained:
+    """A model, how it was judged, and what it learned from."""
+
+    learned: Learned
+    card: Card
+    serving: str  # the model that it was compared with; "" where nothing serves
+    held_out: Judged
+    regression: Judged | None
+    decision: Decision
+    left_out: tuple[LeftOut, ...]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Model:
+    """A published one."""
+
+    name: str
+    card: Card
+    learned: Learned
+
+
+def train(url: str, wish: Wish, cluster: str = "") -> Trained:
+    """Learn what is wished for, and judge it against what serves.
+
+    Raises:
+        UnusableData: nothing can be learned; says what is missing.
+        UnusableModel: the serving model, or the one to adapt, cannot be used.
+        StoreError: the store cannot be read.
+
+    """
+    teach = _personal if wish.adapt_from else _general
+    with threadpool_limits(1):  # the same bits on every computer; and networks as small as these learn faster
+        return teach(Registry(url), material(url, wish, cluster), wish)
+
+
+def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
+    recipe = recipe_for(found.task, found.channels())
+    serving = _serving(registry, found.task, wish.robot, recipe)
+    parts, left_out = found.parts(recipe, *_teacher(wish, serving))
+    if not parts:
+        raise UnusableData("no session can be learned from; " + "; ".join(map(told, left_out)))
+    labelled = [each for each in parts if not each.regression and (each.source != Source.PSEUDO.value).any()]
+    held = held_out((each.group for each in labelled), wish.held_out)
+    lessons, judges, regression = split(parts, held)
+    lessons, remarks = _enough(found.task, lessons)
+    if not lessons:
+        raise UnusableData(f"nothing is left to learn from; {'; '.join(remarks)}")
+    learned = learn(
+        found.task,
+        recipe,
+        np.concatenate([each.features for each in lessons]),
+        np.concatenate([each.truth for each in lessons]),
+        np.concatenate([np.full(len(each.truth), each.group) for each in lessons]),
+        SEED,
+    )
+    other = None if serving is None else serving.learned
+    its = _its_parts(found, serving, recipe, [*judges, *regression])
+    people = judge("held-out people", learned, judges, other, its)
+    fixed = judge("regression set", learned, regression, other, its)
+    if not regression:
+        remarks.append("there is no regression set (gwrms label SESSION --regression): none was judged by")
+    card = _card(found, learned, lessons, [*judges, *regression], people.new)
+    return _trained(learned, card, serving, people, fixed, left_out, remarks)
+
+
+def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
+    if not wish.robot:
+        raise UnusableData("a model is adapted to the wearer of one robot: name it with --robot")
+    if found.task.fold:
+        raise UnusableData(f"{found.task.name} is not adapted to a wearer; gait_phase is")
+    base = _loaded(registry, wish.adapt_from)
+    if base.learned.task is not found.task:
+        raise UnusableModel(f"{base.name} is a model of {base.learned.task.name}, not of {found.task.name}")
+    parts, left_out = found.parts(base.learned.recipe)
+    walk = divided([each for each in parts if not each.regression])
+    learned = adapted(base.learned, walk.early, SEED)
+    serving = _serving(registry, found.task, wish.robot, base.learned.recipe) or base
+    its = _its_parts(found, serving, base.learned.recipe, walk.later)
+    later = judge("later walking", learned, walk.later, serving.learned, its)
+    before = judge("later walking", learned, walk.later, base.learned, walk.later)
+    card = _card(found, learned, walk.early, walk.later, later.new)
+    card = replace(card, robot=wish.robot, parent=base.name, source=_both(card.source, base.card.source))
+    nothing = Judged("regression set", 0, Metrics(), None)
+    return _trained(learned, card, serving, later, nothing, left_out, [_cut(before)])
+
+
+def told(left_out: LeftOut) -> str:
+    """Why a session is left out, for people."""
+    return f"{left_out.ask.session} of {left_out.ask.robot}: {left_out.why}"
+
+
+def _cut(judged: Judged) -> str:
+    new, old = (
+        judged.new.figures["rmse_percent"],
+        judged.serving.figures["rmse_percent"] if judged.serving else 0.0,
+    )
+    return (
+        f"adapting cuts the error of the later walking by {100.0 * (1.0 - new / old):.0f} %: "
+        f"from {old:.2f} to {new:.2f} % of the cycle"
+    )
+
+
+# --- models
+
+
+def _loaded(registry: Registry, name: str) -> _Model:
+    card, state = registry.load(name)
+    return _Model(name, card, Learned.restored(state))
+
+
+def _serving(registry: Registry, task: Task, robot: str, recipe: Recipe) -> _Model | None:
+    """The model that serves robots with these sensors."""
+    name = registry.serving(task.name, robot, set(recipe.channels))
+    return None if name is None else _loaded(registry, name)
+
+
+def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
+    if wish.pseudo is None:
+        return "", 1.0
+    if not serving or not serving.learned.task.fold:
+        raise UnusableData(f"there are no pseudo-labels for {wish.task}: no model serves that gives any")
+    return serving.name, wish.pseudo
+
+
+def _its_parts(
+    found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[Part]
+) -> Sequence[Part]:
+    """The same sessions with the features of the serving model."""
+    if serving is None or serving.learned.recipe.name == recipe.name:
+        return judges
+    return found.of(judges).parts(serving.learned.recipe)[0]
+
+
+# --- examples
+
+
+def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]:
+    """Lessons of classes with examples enough, and what is left out."""
+    if not task.fold or not lessons:
+        return list(lessons), []
+    counts = Counter(np.concatenate([each.truth for each in lessons]).tolist())
+    rare = sorted(name for name, count in counts.items() if count < LEAST_ROWS)
+    kept = [each.of(~np.isin(each.truth, rare)) for each in lessons]
+    remarks = [f"{name} is left out: {counts[name]} examples; it takes {LEAST_ROWS}" for name in rare]
+    return [each for each in kept if len(each.truth)], remarks
+
+
+def _rows(lessons: Sequence[Part]) -> Mapping[str, int]:
+    """How many were labelled by whom."""
+    return Counter(np.concatenate([each.source for each in lessons]).tolist())
+
+
+# --- the card
+
+
+def _card(
+    found: Material, learned: Learned, lessons: Sequence[Part], judges: Sequence[Part], metrics: Metrics
+) -> Card:
+    recipe, rows = learned.recipe, _rows(lessons)
+    lows, highs = (
+        extreme(np.stack([each.ranges[:, at] for each in lessons]), axis=0)
+        for at, extreme in enumerate((np.min, np.max))
+    )
+    return Card(
+        task=learned.task.name,
+        recipe=recipe.name,
+        classes=learned.classes,
+        channels=recipe.channels,
+        units={name: unit(name) for name in recipe.channels},
+        ranges={
+            name: (float(low), float(high))
+            for name, low, high in zip(recipe.channels, lows, highs, strict=True)
+        },
+        features_hash=features_hash(recipe),
+        source=_origin(rows),
+        seed=SEED,
+        made=datetime.now(UTC),
+        versions=library_versions(),
+        tables=found.tables(),
+        learned=_sessions(lessons),
+        held_out=_sessions(judges),
+        metrics=_of_its_classes(metrics, learned.classes),
+        notes="learned from decisions labelled by: "
+        + ", ".join(f"{source} {count}" for source, count in sorted(rows.items())),
+    )
+
+
+def _sessions(parts: Sequence[Part]) -> tuple[str, ...]:
+    return tuple(sorted({each.ask.session for each in parts}))
+
+
+def _origin(rows: Mapping[str, int]) -> Origin:
+    simulated = rows.get(Source.SIMULATOR.value, 0)
+    if not simulated:
+        return Origin.RECORDED
+    return Origin.SIMULATED if simulated == sum(rows.values()) else Origin.MIXED
+
+
+def _both(one: Origin, other: Origin) -> Origin:
+    return one if one is other else Origin.MIXED
+
+
+def _of_its_classes(metrics: Metrics, classes: Sequence[str]) -> Metrics:
+    """Without the rows and columns of classes that it does not know, but somebody else does."""
+    own = len(classes)
+    confusion = tuple((*row[:own], row[-1]) for row in metrics.confusion[:own])
+    return replace(metrics, confusion=confusion)
+
+
+def _trained(
+    learned: Learned,
+    card: Card,
+    serving: _Model | None,
+    people: Judged,
+    fixed: Judged,
+    left_out: Sequence[LeftOut],
+    remarks: Sequence[str],
+) -> Trained:
+    known = set(() if serving is None else serving.card.learned) & set(card.held_out)
+    if known:
+        remarks = [
+            *remarks,
+            f"the serving model has learned from {', '.join(sorted(known))}: that flatters it",
+        ]
+    regression = fixed if fixed.decisions else None
+    return Trained(
+        learned,
+        card,
+        "" if serving is None else serving.name,
+        people,
+        regression,
+        decide(learned.task, people, regression),
+        tuple(left_out),
+        tuple(remarks),
+    )
