@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.processing.units import UNITS, Units
+from server_gui.views.audit import Audit
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
@@ -64,12 +65,12 @@ class MainWindow(QMainWindow):
         self.parameters = ParametersPanel(desk, theme)
         self.events = EventsPanel(desk, theme)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
-        self.resources = Resources(desk, theme)
+        self.resources, self.audit = Resources(desk, theme), Audit(desk, theme)
         self.empty = EmptyView(theme)
         self.empty.simulator.connect(self.simulator)
         self.tabs = QTabWidget()
-        self._views = (self.overview, self.signals, self.resources)
-        for title, view in zip(("&Overview", "&Signals", "&Resources"), self._views, strict=True):
+        self._views = (self.overview, self.signals, self.resources, self.audit)
+        for title, view in zip(("&Overview", "&Signals", "&Resources", "&Audit"), self._views, strict=True):
             self.tabs.addTab(_scrolled(view), title)
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)

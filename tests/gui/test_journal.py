@@ -73,8 +73,7 @@ def test_stores_and_stops_are_told_too(journal: RobotsJournal) -> None:
     journal.say("stop", reason="STOP key")
     audit.take(journal.told().journal.entries)
     assert done(audit) == [
-        ("store", "left_knee", ""),
-        ("store done", "left_knee", "stored"),
+        ("store", "left_knee", "store done: stored"),
         ("stop", "", "STOP key"),
     ]
 

@@ -32,29 +32,29 @@ class Act:
 def acts(entries: Iterable[Entry]) -> list[Act]:
     """Everything that was done, oldest first; a write's end is told at its beginning."""
     found: dict[tuple[int, str], Act] = {}
-    writes: dict[Any, int] = {}  # write → its entry's number
+    open_: dict[object, list[tuple[int, str]]] = {}  # write or component → what was begun there
     for entry in entries:
-        what = str(entry.get("what"))
-        if what == "write":
-            writes[entry.get("write")] = entry["n"]
+        what, place = str(entry.get("what")), entry.get("write", entry.get("component"))
         ending = _ENDINGS.get(what)
-        if ending is None:
-            found |= {(act.n, act.thing): act for act in _begun(entry, what)}
+        if ending is None or place not in open_:
+            begun = {(act.n, act.thing): act for act in _begun(entry, what)}
+            found |= begun
+            if what in _LASTING:
+                open_[place] = list(begun)
             continue
-        begun = writes.get(entry.get("write"))
-        for key in [key for key in found if key[0] == begun]:
+        for key in open_[place]:
             found[key] = ending(found[key], entry)
     return list(found.values())
 
 
 def _begun(entry: Entry, what: str) -> Iterable[Act]:
     after, before = _numbers(entry, "after"), _numbers(entry, "before")
-    said = str(entry.get("result") or entry.get("reason") or "")
+    said = OPEN if what in _LASTING else str(entry.get("result") or entry.get("reason") or "")
     base = Act(entry["n"], int(entry.get("utc_ns") or 0), str(entry.get("who")), what, "", said)
     if what in ("write", "write refused"):
         trial_s = entry.get("trial_s")
         word = "write" if trial_s is None else f"trial of {trial_s:g} s"
-        outcome = f"refused: {said}" if what == "write refused" else OPEN
+        outcome = f"refused: {said}" if what == "write refused" else said
         for name, new in after.items():
             yield dataclasses.replace(
                 base, what=word, thing=name, old=before.get(name), new=new, outcome=outcome
@@ -85,6 +85,11 @@ def _other_end(act: Act, entry: Entry) -> Act:
     return dataclasses.replace(act, outcome=f"{entry['what']}: {why}")
 
 
+def _told(act: Act, entry: Entry) -> Act:
+    return dataclasses.replace(act, outcome=f"{entry['what']}: {entry.get('result') or ''}")
+
+
+_LASTING: Final = ("write", "store", "restore")  # an entry at its beginning and one at its end
 _ENDINGS: Final[Mapping[str, Callable[[Act, Entry], Act]]] = {
     "write done": _done,
     "trial begun": _on_trial,
@@ -93,6 +98,10 @@ _ENDINGS: Final[Mapping[str, Callable[[Act, Entry], Act]]] = {
     "NOT TAKEN BACK yet": _other_end,
     "write taken back": _other_end,
     "ROLL-BACK FAILED": _other_end,
+    "store done": _told,
+    "store FAILED": _told,
+    "restore done": _told,
+    "restore FAILED": _told,
 }
 
 

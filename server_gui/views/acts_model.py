@@ -1,0 +1,131 @@
+"""The audit's lines as a table: a line is known by its robot, entry and thing, and is never made anew."""
+
+import datetime
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
+
+from gateway.messages import Number
+from server_gui.core.desk.acts import Act
+from server_gui.core.processing.units import Unit
+from server_gui.views.parameters.tree import brief, exact
+from server_gui.views.theme import Theme
+
+Index = QModelIndex | QPersistentModelIndex
+SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
+TITLES: Final = ("Time", "Robot", "Who", "What", "Of", "Old", "New", "Read back", "Unit", "What came of it")
+TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, OUTCOME = range(len(TITLES))
+NUMBERS: Final = (OLD, NEW, READ_BACK)
+BAD: Final = ("NOT", "FAILED", "refused", "write taken back")  # how an outcome begins that is looked at first
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One act on one robot, and the unit that its values are shown in."""
+
+    robot: str
+    act: Act
+    unit: Unit
+
+    @property
+    def key(self) -> tuple[str, int, str]:
+        return self.robot, self.act.n, self.act.thing
+
+
+class ActsModel(QAbstractTableModel):
+    """`lines` as they were taken the last time, oldest first of each robot."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.lines: list[Line] = []
+
+    def take(self, lines: Sequence[Line]) -> None:
+        """Show these from now on."""
+        found = {line.key: line for line in lines}
+        for row in reversed(range(len(self.lines))):
+            if self.lines[row].key not in found:
+                self.beginRemoveRows(QModelIndex(), row, row)
+                del self.lines[row]
+                self.endRemoveRows()
+        for row, line in enumerate(self.lines):
+            new = found.pop(line.key)
+            if new != line:
+                self.lines[row] = new
+                self.dataChanged.emit(self.index(row, 0), self.index(row, OUTCOME))
+        if found:
+            first = len(self.lines)
+            self.beginInsertRows(QModelIndex(), first, first + len(found) - 1)
+            self.lines.extend(found.values())
+            self.endInsertRows()
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
+        return 0 if parent.isValid() else len(self.lines)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
+        return len(TITLES)
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
+        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return TITLES[section]
+        return None
+
+    def data(self, index: Index, role: int = 0) -> Any:
+        line, column = self.lines[index.row()], index.column()
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return _TEXTS[column](line)
+            case Qt.ItemDataRole.ToolTipRole:
+                return _tip(line)
+            case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
+                return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            case Qt.ItemDataRole.ForegroundRole if column == OUTCOME and line.act.outcome.startswith(BAD):
+                return self._theme.colour("bad")
+            case _ if role == SORT_ROLE:
+                return _sort_key(line, column)
+        return None
+
+
+def _when(line: Line) -> str:
+    when = datetime.datetime.fromtimestamp(line.act.utc_ns / 1e9, datetime.UTC).astimezone()
+    return f"{when:%Y-%m-%d %H:%M:%S}"
+
+
+def _number(line: Line, value: Number | None) -> str:
+    return "" if value is None else brief(line.unit, value)
+
+
+def _tip(line: Line) -> str:
+    """Every digit, and where it stands in the journal."""
+    act, unit = line.act, line.unit
+    known = {"old": act.old, "new": act.new, "read back": act.read_back}
+    values = (
+        f"{name} {exact(unit, value)} {unit.symbol}" for name, value in known.items() if value is not None
+    )
+    return "\n".join((*values, act.outcome, f"entry {act.n} of the journal"))
+
+
+_TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
+    _when,
+    lambda line: line.robot,
+    lambda line: line.act.who,
+    lambda line: line.act.what,
+    lambda line: line.act.thing,
+    lambda line: _number(line, line.act.old),
+    lambda line: _number(line, line.act.new),
+    lambda line: _number(line, line.act.read_back),
+    lambda line: line.unit.symbol if line.act.new is not None else "",
+    lambda line: line.act.outcome,
+)
+
+
+def _sort_key(line: Line, column: int) -> int | float | str:
+    numbers = {OLD: line.act.old, NEW: line.act.new, READ_BACK: line.act.read_back}
+    if column == TIME:
+        return line.act.utc_ns
+    if column in numbers:
+        value = numbers[column]
+        return float("-inf") if value is None else value
+    return _TEXTS[column](line).lower()

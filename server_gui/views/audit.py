@@ -1,0 +1,197 @@
+"""Audit: who changed what on which robot, when, old, new, read back; and whether the record holds."""
+
+import csv
+import datetime
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QSortFilterProxyModel, Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from server_gui.core.desk.acts import acts
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.edits import unit_of
+from server_gui.core.desk.station import Station
+from server_gui.views.acts_model import OUTCOME, SORT_ROLE, TIME, ActsModel, Index, Line
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.files import ask_save
+
+EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
+CSV_TITLES: Final = (
+    "utc",
+    "robot",
+    "entry",
+    "who",
+    "what",
+    "thing",
+    "old",
+    "new",
+    "read_back",
+    "unit",
+    "outcome",
+)
+
+
+class Chosen(QSortFilterProxyModel):
+    """The lines of one robot and one person that have all words; none of them means any."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._wanted: tuple[str, str, list[str]] = ("", "", [])
+        self.setSortRole(SORT_ROLE)
+
+    def show(self, robot: str, who: str, words: str) -> None:
+        wanted = robot, who, words.lower().split()
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self.invalidate()
+
+    def filterAcceptsRow(self, row: int, parent: Index) -> bool:
+        model = self.sourceModel()
+        robot, who, words = self._wanted
+        if not isinstance(model, ActsModel):
+            return False
+        line = model.lines[row]
+        if (robot and line.robot != robot) or (who and line.act.who != who):
+            return False
+        text = f"{line.act.thing} {line.act.what} {line.act.who} {line.act.outcome}".lower()
+        return all(word in text for word in words)
+
+
+class Audit(QWidget):
+    """Every robot's journal as far as it has been read, newest first."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._seen: tuple[object, ...] = ()
+        self._called: dict[str, Station] = {}
+        self.setObjectName("page")
+        self.model = ActsModel(theme)
+        self.chosen = Chosen()
+        self.chosen.setSourceModel(self.model)
+        self.robot, self.who = _combo("Robot", EVERY_ROBOT), _combo("Who", EVERYBODY)
+        self.words = QLineEdit()
+        self.words.setPlaceholderText("Filter: parameter, what, outcome …")
+        self.words.setClearButtonEnabled(True)
+        self.words.setAccessibleName("Filter of the audit")
+        self.words.textChanged.connect(self._filter)
+        for combo in (self.robot, self.who):
+            combo.currentIndexChanged.connect(self._filter)
+        export = QPushButton("CSV …")
+        export.setToolTip("What is shown, in SI units with every digit")
+        export.clicked.connect(lambda: ask_save(self, "Export as CSV", "csv", self.save_csv))
+        self.table = self._table(theme)
+        self.verdict = QLabel()
+        self.verdict.setObjectName("banner")
+        self.verdict.setWordWrap(True)
+        row = QHBoxLayout()
+        for widget in (self.robot, self.who):
+            row.addWidget(widget)
+        row.addWidget(self.words, 1)
+        row.addWidget(export)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 8)
+        everything.addLayout(row)
+        everything.addWidget(self.table, 1)
+        everything.addWidget(self.verdict)
+
+    def refresh(self) -> None:
+        """Show what has come."""
+        self._called = {station.title: station for station in self._desk}
+        revisions = (station.audit.revision for station in self._called.values())
+        seen = (self._desk.shown.revision, *self._called.items(), *revisions)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        self.model.take([line for name in self._called for line in self._lines(name)])
+        _offer(self.robot, list(self._called))
+        _offer(self.who, sorted({line.act.who for line in self.model.lines}))
+        self._filter()
+
+    def save_csv(self, path: Path) -> None:
+        """What is shown, in its order."""
+        places = (self.chosen.mapToSource(self.chosen.index(row, 0)) for row in range(self.chosen.rowCount()))
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(CSV_TITLES)
+            writer.writerows(_cells(self.model.lines[place.row()]) for place in places)
+
+    def _lines(self, name: str) -> Iterable[Line]:
+        station = self._called[name]
+        description, units = station.robot.description, self._desk.shown.units
+        infos = {} if description is None else {info.name: info for info in description.parameters}
+        for act in acts(station.audit.entries):
+            info = infos.get(act.thing)
+            si = "" if info is None else info.unit
+            yield Line(name, act, unit_of(act.thing, si, units))
+
+    def _filter(self) -> None:
+        robot = "" if self.robot.currentIndex() <= 0 else self.robot.currentText()
+        who = "" if self.who.currentIndex() <= 0 else self.who.currentText()
+        self.chosen.show(robot, who, self.words.text())
+        asked = {name: one.audit for name, one in self._called.items() if robot in ("", name)}
+        set_text(self.verdict, "\n".join(f"{name}: {audit.verdict}" for name, audit in asked.items()))
+        broken = any(audit.problem is not None for audit in asked.values())
+        self.verdict.setProperty("tone", "bad" if broken else "good")
+        self.verdict.style().polish(self.verdict)
+
+    def _table(self, theme: Theme) -> QTableView:
+        table = QTableView()
+        table.setModel(self.chosen)
+        table.setSortingEnabled(True)
+        table.sortByColumn(TIME, Qt.SortOrder.DescendingOrder)
+        table.setAccessibleName("What was done to the robots")
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setTabKeyNavigation(False)
+        table.setShowGrid(False)
+        table.setAlternatingRowColors(True)
+        table.setWordWrap(False)
+        table.verticalHeader().hide()
+        table.verticalHeader().setDefaultSectionSize(theme.px(20))
+        theme.scaled.connect(lambda: table.verticalHeader().setDefaultSectionSize(theme.px(20)))
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(OUTCOME, QHeaderView.ResizeMode.Stretch)
+        return table
+
+
+def _combo(name: str, all_of_them: str) -> QComboBox:
+    combo = QComboBox()
+    combo.setAccessibleName(name)
+    combo.addItem(all_of_them)
+    combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+    return combo
+
+
+def _offer(combo: QComboBox, texts: list[str]) -> None:
+    """Offer these behind the first, which is all of them; what is chosen stays."""
+    if texts == [combo.itemText(place) for place in range(1, combo.count())]:
+        return
+    chosen = combo.currentText()
+    combo.blockSignals(True)
+    while combo.count() > 1:
+        combo.removeItem(1)
+    combo.addItems(texts)
+    combo.setCurrentIndex(max(0, combo.findText(chosen)))
+    combo.blockSignals(False)
+
+
+def _cells(line: Line) -> tuple[object, ...]:
+    act = line.act
+    when = datetime.datetime.fromtimestamp(act.utc_ns / 1e9, datetime.UTC).isoformat(timespec="milliseconds")
+    values = ("" if value is None else value for value in (act.old, act.new, act.read_back))
+    return (when, line.robot, act.n, act.who, act.what, act.thing, *values, line.unit.si, act.outcome)
