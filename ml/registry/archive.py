@@ -128,13 +128,13 @@ def _written_anew(data: bytes) -> bytes:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _Rewriting(archive, len(data)).content()
+    except UnusableModel:
+        raise
     except zipfile.BadZipFile as error:
         raise UnusableModel(f"it is no model file, or a part of one is missing: {_said(error)}") from None
     except RecursionError:
         raise UnusableModel("its parts are nested too deep") from None
-    except (ArithmeticError, AttributeError, EOFError, LookupError, TypeError, ValueError) as error:
-        if isinstance(error, UnusableModel):
-            raise
+    except Exception as error:  # noqa: BLE001 - whatever a file does to who reads it, it is no model
         raise UnusableModel(f"it is damaged: {_said(error)}") from None
 
 

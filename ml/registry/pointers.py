@@ -3,6 +3,8 @@
 So two who promote at once both find their place in the history, and neither undoes the other unseen.
 """
 
+import contextlib
+import re
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
@@ -17,6 +19,7 @@ from ml.store.objects import Objects
 FOLDER: Final = "models/serving"
 EVERY_ROBOT: Final = "_all"  # no robot's name begins with _
 ATTEMPTS: Final = 100
+_NUMBER: Final = re.compile(r"/(\d{6})\.json$")
 
 
 class Pointer(Struct, frozen=True):
@@ -61,7 +64,7 @@ class Pointers:
         return self._read(last) if last else None
 
     def promote(self, model: str, who: str, why: str) -> Pointer:
-        """Let this model serve, after whatever is promoted at the same time.
+        """Let this model serve, after whatever is promoted at the same time; nothing new where it does.
 
         Raises:
             UnusableModel: others promote without end.
@@ -69,6 +72,9 @@ class Pointers:
         """
         for _ in range(ATTEMPTS):
             last = self._last()
+            with contextlib.suppress(UnusableModel):  # a damaged one is what this remedies
+                if last and (now := self._read(last)).model == model:
+                    return now
             pointer = Pointer(model, datetime.now(UTC), who, why, before=last)
             if self._create(last + 1, pointer):
                 return pointer
@@ -107,8 +113,8 @@ class Pointers:
     # --- inside
 
     def _last(self) -> int:
-        names = self._objects.names(self._folder)
-        return max((int(name.rpartition("/")[2].partition(".")[0]) for name in names), default=0)
+        names = map(_NUMBER.search, self._objects.names(self._folder))
+        return max((int(name[1]) for name in names if name), default=0)
 
     def _create(self, number: int, pointer: Pointer) -> bool:
         return create(self._objects, self._path(number), msgspec.json.encode(pointer))

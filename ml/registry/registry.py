@@ -62,8 +62,9 @@ class Registry:
     def entries(self, task: str | None = None) -> list[Card]:
         """The models that can be looked at, oldest first, those that come with GWRMS before them."""
         cards = [card for card in map(self._card, self._ids()) if isinstance(card, Card)]
+        shipped = self.shipped()
         cards = [card for card in cards if task in (None, card.task)]
-        return sorted(cards, key=lambda card: (not self.is_shipped(card.id), card.made))
+        return sorted(cards, key=lambda card: (card.id not in shipped, card.made))
 
     def damaged(self) -> dict[str, str]:
         """Models whose card cannot be read, and why."""
@@ -109,9 +110,9 @@ class Registry:
                 return data
         raise UnusableModel(f"{model}: there is no {name} of it in {self.url} (gwrms models ls lists models)")
 
-    def is_shipped(self, model: str) -> bool:
-        """Whether it comes with GWRMS and nobody has promoted it."""
-        return model in _ids(self._shipped) and model not in _ids(self._objects)
+    def shipped(self) -> frozenset[str]:
+        """The models that come with GWRMS and that nobody has promoted."""
+        return frozenset(_ids(self._shipped)) - frozenset(_ids(self._objects))
 
     # --- which one serves
 
@@ -145,7 +146,7 @@ class Registry:
         card, _ = self.load(model)
         if card.robot not in ("", robot):
             raise UnusableModel(f"{model} was adapted to {card.robot}: promote it for that robot alone")
-        if self.is_shipped(model):  # the next version of GWRMS may bring another in its place
+        if model in self.shipped():  # the next version of GWRMS may bring another in its place
             for name in (*card.sha256, CARD):
                 self._create(model, name, self.file(model, name))
         return Pointers(self._objects, card.task, robot).promote(model, who, why)

@@ -2,9 +2,10 @@
 
 import argparse
 import getpass
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 from urllib.parse import urlsplit
 
 import msgspec
@@ -57,19 +58,34 @@ def ls(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
     cards, damaged = registry.entries(arguments.task), registry.damaged()
-    serves = _serves(registry)
+    serving = Serving.of(registry)
     if arguments.json:
-        say_json({"models": [_fields(registry, card, serves) for card in cards], "damaged": damaged})
+        say_json({"models": [_fields(card, serving) for card in cards], "damaged": damaged})
     else:
         header = ("MODEL", "RECIPE", "FROM", "MADE (UTC)", "DAYS AGO", "JUDGED", "SERVES")
-        say(table(header, [_row(registry, card, serves) for card in cards], right=(4,)))
+        say(table(header, [_row(card, serving) for card in cards], right=(4,)))
     for problem in damaged.values():
         warn("models", problem)
     return 1 if damaged else 0
 
 
-def _row(registry: Registry, card: Card, serves: dict[str, list[str]]) -> tuple[str, ...]:
-    shipped = registry.is_shipped(card.id)
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """Whom each model serves that was promoted, and which came with GWRMS."""
+
+    whom: Mapping[str, list[str]]
+    shipped: frozenset[str]
+
+    @classmethod
+    def of(cls, registry: Registry) -> Self:
+        whom: dict[str, list[str]] = {}
+        for _, robot, now in registry.served():
+            whom.setdefault(now.model, []).append(robot or EVERY)
+        return cls(whom, registry.shipped())
+
+
+def _row(card: Card, serving: Serving) -> tuple[str, ...]:
+    shipped = card.id in serving.shipped
     judged = next((f"{name} {value:.3g}" for name, value in card.metrics.figures.items()), NONE)
     return (
         card.id,
@@ -78,22 +94,14 @@ def _row(registry: Registry, card: Card, serves: dict[str, list[str]]) -> tuple[
         when(card.made),
         f"{age_days(card):.0f}",
         judged,
-        "where no other does" if shipped else ", ".join(serves.get(card.id, ())) or NONE,
+        "where no other does" if shipped else ", ".join(serving.whom.get(card.id, ())) or NONE,
     )
 
 
-def _fields(registry: Registry, card: Card, serves: dict[str, list[str]]) -> dict[str, Any]:
+def _fields(card: Card, serving: Serving) -> dict[str, Any]:
     fields: dict[str, Any] = msgspec.to_builtins(card)
-    more = {"shipped": registry.is_shipped(card.id), "serves": serves.get(card.id, [])}
+    more = {"shipped": card.id in serving.shipped, "serves": serving.whom.get(card.id, [])}
     return fields | more | {"age_days": round(age_days(card), 2)}
-
-
-def _serves(registry: Registry) -> dict[str, list[str]]:
-    """Whom each model that was promoted serves now."""
-    found: dict[str, list[str]] = {}
-    for _, robot, now in registry.served():
-        found.setdefault(now.model, []).append(robot or EVERY)
-    return found
 
 
 def show(argv: list[str]) -> int:
@@ -104,11 +112,12 @@ def show(argv: list[str]) -> int:
     registry = _registry(arguments)
     card = registry.card(_named(registry, arguments.model))
     problem = _problem(registry, card.id)
-    serves = _serves(registry)
+    serving = Serving.of(registry)
     if arguments.json:
-        say_json(_fields(registry, card, serves) | {"problem": problem})
+        say_json(_fields(card, serving) | {"problem": problem})
     else:
-        say("\n".join(told(card, serves.get(card.id, []), problem, shipped=registry.is_shipped(card.id))))
+        whom, shipped = serving.whom.get(card.id, []), card.id in serving.shipped
+        say("\n".join(told(card, whom, problem, shipped=shipped)))
     return 1 if problem else 0
 
 

@@ -267,6 +267,21 @@ def test_rollback_after_rollback_goes_back_step_by_step(store_url: str) -> None:
     ]
 
 
+def test_a_model_that_is_promoted_again_is_no_step_to_roll_back(in_folder: Registry) -> None:
+    one, other = published(in_folder), published(in_folder, seed=1)
+    for model in (one, other, other):
+        in_folder.promote(model, **BY)
+    in_folder.rollback("falling", who="Ada")
+    assert serves(in_folder) == one
+
+
+def test_files_that_are_no_pointers_do_not_count(in_folder: Registry) -> None:
+    Objects(in_folder.url).write(f"{FOLDER}/serving/falling/_all/README", [b"hello"])
+    assert serves(in_folder) is None
+    in_folder.promote(published(in_folder), **BY)
+    assert [now.before for now in in_folder.history("falling")] == [0]
+
+
 def test_a_rollback_of_a_robots_own_first_model_gives_it_that_for_all(in_folder: Registry) -> None:
     one, other = published(in_folder), published(in_folder, seed=1)
     in_folder.promote(one, **BY)
@@ -347,7 +362,7 @@ def shipped(tmp_path: Path) -> Path:
 def test_a_shipped_model_serves_where_nothing_else_does(folder_url: str, shipped: Path) -> None:
     registry = Registry(folder_url, shipped)
     (base,) = registry.entries()
-    assert registry.is_shipped(base.id)
+    assert registry.shipped() == {base.id}
     assert registry.serving("falling", "exo-01", CHANNELS) == base.id
     assert registry.serving("falling", "exo-01", frozenset()) is None
     assert registry.serving("activity", "exo-01", CHANNELS) is None
@@ -366,7 +381,7 @@ def test_a_shipped_model_that_is_promoted_stays_when_another_is_shipped(
     registry = Registry(folder_url, shipped)
     (base,) = registry.entries()
     registry.promote(base.id, **BY)
-    assert not registry.is_shipped(base.id)
+    assert not registry.shipped()
     assert Registry(folder_url, NOWHERE).load(base.id)[0] == base
 
 
