@@ -42,11 +42,16 @@ class Watched:
 
     def serve(self, model: Model) -> None:
         """Another model from now on; what it looks back on is there where it looks at the same."""
-        if model.learned.recipe.name != self.model.learned.recipe.name:
-            self._windows = Windows(model.learned.recipe, self._every_ns)
-            self.due = []
+        same = model.learned.recipe.name == self.model.learned.recipe.name
         self._trusting = Trusting(model.learned.recipe.channels, model.card.ranges)
         self.model = model
+        if not same:
+            self.due = []
+            self.restart()
+
+    def restart(self) -> None:
+        """From now on nothing has been seen."""
+        self._windows = Windows(self.model.learned.recipe, self._every_ns)
 
     def predicted(self, robot: str, clock: "Clock", predictions: Sequence[Prediction]) -> Iterator[News]:
         """What these predictions, of what was due, say."""
@@ -113,6 +118,11 @@ class Following:
             elif self.tasks[task].model is not model:
                 self.tasks[task].serve(model)
 
+    def restart(self) -> None:
+        """From now on nothing has been seen."""
+        for task in self.tasks.values():
+            task.restart()
+
     def take(self, events: Iterable[Event]) -> None:
         """Take what the robot's feed has told, in order."""
         for event in events:
@@ -125,7 +135,7 @@ class Following:
                     self.units = {channel.name: channel.unit for channel in event.description.channels}
                     if event.description.boot_id != self._boot_id:
                         self._boot_id = event.description.boot_id
-                        self.tasks.clear()  # its clock has begun anew
+                        self.restart()
 
 
 def _rows(batch: Batch, channels: Sequence[str]) -> Iterator[Row]:

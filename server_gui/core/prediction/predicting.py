@@ -62,6 +62,11 @@ class Predicting:
         self._inbox.put(robot, event)
 
     @property
+    def models(self) -> Mapping[tuple[str, str], Model]:
+        """What serves, by robot and task; from any thread."""
+        return self._serving.models
+
+    @property
     def state(self) -> PredictingState:
         """How it goes now; from any thread."""
         problems = [] if self._serving.problem is None else [self._serving.problem]
@@ -105,7 +110,7 @@ class Predicting:
             known.take(events)
         except Exception:  # what a robot sends wrongly disturbs no other
             log.exception("%s sent what nothing can be predicted from; begun anew", robot)
-            known.tasks.clear()
+            known.restart()
         if known.units:
             self._serving.robot(robot, known.units)
 

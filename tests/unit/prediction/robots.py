@@ -1,0 +1,122 @@
+"""What a robot's feed tells of its hips, a model that serves it, and what is predicted of that."""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+from msgspec.structs import replace
+
+from gateway.client import Batch, ClockOffset
+from gateway.messages import ChannelInfo
+from ml.registry.card import Card, Source
+from ml.registry.code import features_hash, versions
+from ml.registry.registry import Registry
+from ml.robot.learned import Learned
+from server_gui.core.events import Described, Telemetry
+from server_gui.core.prediction.news import News, Predicted, Ruled
+from server_gui.core.prediction.predicting import Predicting
+from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
+from server_gui.core.settings import ServerSettings, StoreSettings
+from tests.unit.ml.serving.small import CHANNELS, MS, STEP_MS, Floats, learned
+from tests.unit.recording.robots import description
+
+WAIT_S = 60.0
+ROBOT = "exo-01"
+ROWS = 10  # in a batch
+
+
+def described(boot_id: str = "boot-1", unit: str = "rad") -> Described:
+    channels = [ChannelInfo(name, unit, name.partition(".")[0], "position") for name in CHANNELS]
+    told = description(ROBOT)
+    return Described(replace(told, boot_id=boot_id, channels=channels))
+
+
+def telemetry(rows: Floats, begin_ns: int = 0) -> Iterator[Telemetry]:
+    """Batches of rows every 10 ms of the robot's clock, which is 5 s behind ours."""
+    for at in range(0, len(rows), ROWS):
+        part = rows[at : at + ROWS]
+        stamps = [begin_ns + (at + row) * STEP_MS * MS for row in range(len(part))]
+        columns = dict(zip(CHANNELS, part.T.tolist(), strict=True))
+        received_ns = stamps[-1] + 5_000 * MS
+        yield Telemetry(1, Batch(stamps, columns, at, 0, 0, 1, received_ns), ClockOffset(-5_000 * MS, 1))
+
+
+def publish(url: str, model: Learned | None = None, robot: str = "", **changes: Any) -> str:
+    """A model that serves from now on."""
+    model = model or learned()
+    registry = Registry(url)
+    name = registry.publish(model.state(), card(model, **changes))
+    registry.promote(name, robot, who="tester", why="a test")
+    return name
+
+
+def card(model: Learned, **changes: Any) -> Card:
+    fields: dict[str, Any] = {
+        "task": model.task.name,
+        "recipe": model.recipe.name,
+        "classes": model.classes,
+        "channels": model.recipe.channels,
+        "units": dict.fromkeys(model.recipe.channels, "rad"),
+        "features_hash": features_hash(model.recipe),
+        "source": Source.SIMULATED,
+        "seed": 0,
+        "made": datetime.now(UTC),
+        "versions": versions(),
+    }
+    return Card(**(fields | changes))
+
+
+def settings(url: str, *rules: RuleSettings) -> ServerSettings:
+    return ServerSettings(store=StoreSettings(url), prediction=PredictionSettings(poll_s=1.0), rules=rules)
+
+
+@dataclass
+class Told:
+    """What prediction has told, for a test to wait for."""
+
+    news: list[News] = field(default_factory=list)
+    stops: list[Ruled] = field(default_factory=list)
+    order: list[object] = field(default_factory=list)
+    changed: threading.Condition = field(default_factory=threading.Condition)
+
+    def tell(self, news: Sequence[News]) -> None:
+        with self.changed:
+            self.news += news
+            self.order += news
+            self.changed.notify_all()
+
+    def stop(self, ruled: Ruled) -> None:
+        self.stops.append(ruled)
+        self.order.append("stop")
+
+    def until(self, condition: Callable[[], object], between: Callable[[], object] = lambda: None) -> None:
+        """Wait for a condition on what is told, doing something again and again."""
+        with self.changed:
+            for _ in range(round(WAIT_S / 0.05)):
+                if condition():
+                    return
+                between()
+                self.changed.wait(0.05)
+        raise AssertionError(f"not told in {WAIT_S:g} s; told was {self.news[-3:]}")
+
+    def predicted(self, robot: str = ROBOT) -> list[Predicted]:
+        return [one for one in self.news if isinstance(one, Predicted) and one.robot == robot]
+
+    def ruled(self) -> list[Ruled]:
+        return [one for one in self.news if isinstance(one, Ruled)]
+
+
+@contextmanager
+def predicting(server: ServerSettings) -> Iterator[tuple[Predicting, Told]]:
+    told = Told()
+    with Predicting(server, told.tell, told.stop) as one:
+        yield one, told
+
+
+def served(predicting: Predicting, told: Told, robot: str = ROBOT, event: Described | None = None) -> None:
+    """Introduce a robot, and wait until a model serves it, so that its first row is seen already."""
+    predicting.take(robot, event or described())
+    told.until(lambda: (robot, "activity") in predicting.models)
