@@ -73,6 +73,7 @@ class EventsPanel(QTableView):
         self.horizontalHeader().hide()
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.horizontalHeader().setSectionResizeMode(COLUMNS - 1, QHeaderView.ResizeMode.Stretch)
+        self.horizontalHeader().setResizeContentsPrecision(0)  # as wide as what is in sight, not all there is
         theme.changed.connect(self._restyle)
         self._restyle()
 
