@@ -28,6 +28,7 @@ class Rule:
         probability = self._probability(prediction)
         if self.holds:
             self.holds = probability >= self.settings.ends_below
+            self._since_ns = None
             return None if self.holds else False
         if probability < self.settings.at_least:
             self._since_ns = None
