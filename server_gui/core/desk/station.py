@@ -27,6 +27,7 @@ from server_gui.core.desk.control import Control
 from server_gui.core.desk.edits import Change, Edits
 from server_gui.core.desk.link import LEASE_S
 from server_gui.core.desk.news import News, NewsKind
+from server_gui.core.desk.predictions import StationPredictions
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.stopping import Stopping
 from server_gui.core.desk.stored import Flash
@@ -63,6 +64,7 @@ class Station:
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
+        self.predictions = StationPredictions()
         self.stopping = Stopping()
         self.control = Control()
         self.edits = Edits()
@@ -131,6 +133,7 @@ class Station:
                     self.cost = event.cost
                 case LinkChanged():
                     self.cost = None  # it was of the link that there was
+                    self.predictions.clear()
                     self.flash.forget()
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:

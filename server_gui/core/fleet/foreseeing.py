@@ -39,9 +39,9 @@ class Foreseeing(Predicting):
         self._show = show
 
     def _keep(self, news: Sequence[News]) -> None:
-        self._recorder.add(
-            *(record(self._fleet.session(one.robot), one) for one in news if isinstance(one, Predicted))
-        )
+        rows = [record(self._fleet.session(one.robot), one) for one in news if isinstance(one, Predicted)]
+        if rows:
+            self._recorder.add(*rows)
         for one in news:
             if isinstance(one, Ruled):
                 log.warning("%s: %s", one.robot, one.text)

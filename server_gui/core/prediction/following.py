@@ -10,7 +10,7 @@ from gateway.client import Batch, ClockOffset
 from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.events import Described, Event, Telemetry
-from server_gui.core.prediction.news import News, Predicted, Ruled
+from server_gui.core.prediction.news import News, Predicted, Ruled, Serves
 from server_gui.core.prediction.rules import Rule
 from server_gui.core.prediction.serving import Model
 from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
@@ -107,9 +107,10 @@ class Following:
         self._settings = settings
         self._rules = [rule for rule in rules if rule.concerns(robot)]
         self._boot_id: str | None = None
+        self._served: Serves | None = None
 
-    def serve(self, models: Mapping[str, Model]) -> None:
-        """These models, by task, from now on."""
+    def serve(self, models: Mapping[str, Model], why: Mapping[str, str]) -> Serves | None:
+        """These models, by task, from now on; the news, if that is any. `why` others do not."""
         for task in self.tasks.keys() - models.keys():
             del self.tasks[task]
         for task, model in models.items():
@@ -117,6 +118,11 @@ class Following:
                 self.tasks[task] = Watched(model, self._settings.every_ns(task), self._rules)
             elif self.tasks[task].model is not model:
                 self.tasks[task].serve(model)
+        serves = Serves(self.robot, {task: model.card for task, model in models.items()}, why)
+        if serves == self._served:
+            return None
+        self._served = serves
+        return serves
 
     def restart(self) -> None:
         """From now on nothing has been seen."""

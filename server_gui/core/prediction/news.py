@@ -1,5 +1,6 @@
 """What prediction tells of a robot: small frozen facts, handed to whoever shows or keeps them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ml.registry.card import Card
@@ -43,4 +44,16 @@ class Ruled:
         return f"{what} holds: {said}{after}" if self.began else f"{what} is over: {said}"
 
 
-News = Predicted | Ruled
+@dataclass(frozen=True, slots=True)
+class Serves:
+    """Which models serve a robot from now on, by task.
+
+    `why` says of each task without a model, or whose newest one was refused, why, and what to do.
+    """
+
+    robot: str
+    models: Mapping[str, Card]
+    why: Mapping[str, str]
+
+
+News = Predicted | Ruled | Serves

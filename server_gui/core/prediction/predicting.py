@@ -4,7 +4,7 @@ import collections
 import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Final, Self
+from typing import Final, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -19,6 +19,8 @@ from server_gui.core.prediction.state import PredictingState, TaskReport
 from server_gui.core.settings import ServerSettings
 
 log = logging.getLogger(__name__)
+
+Thing = TypeVar("Thing")
 
 BROKEN: Final = "it cannot be used: internal error, "
 
@@ -105,7 +107,7 @@ class Predicting:
         if known is None:
             known = Following(robot, self._settings.prediction, self._settings.rules)
             self._robots[robot] = known
-        known.serve(self._models(robot))
+        self._serve(known)
         try:
             known.take(events)
         except Exception:  # what a robot sends wrongly disturbs no other
@@ -114,12 +116,18 @@ class Predicting:
         if known.units:
             self._serving.robot(robot, known.units)
 
-    def _models(self, robot: str) -> Mapping[str, Model]:
-        return {
-            task: model
-            for (of, task), model in self._serving.models.items()
-            if of == robot and model.card.id not in self._broken
+    def _serve(self, robot: Following) -> None:
+        """Give a robot the models that serve it now, but for those that broke."""
+        models, why = _of(robot.robot, self._serving.models), _of(robot.robot, self._serving.why)
+        broken = {
+            task: self._broken[model.card.id]
+            for task, model in models.items()
+            if model.card.id in self._broken
         }
+        whole = {task: model for task, model in models.items() if task not in broken}
+        news = robot.serve(whole, why | broken)
+        if news is not None and (whole or news.why):
+            self._tell([news])
 
     def _due(self) -> Iterator[tuple[Model, list[tuple[Following, Watched]]]]:
         """What is due, by model: robots that have the same one are judged together."""
@@ -147,6 +155,11 @@ class Predicting:
             news += watched.predicted(robot.robot, robot.clock, own)
         self._judged += len(windows)
         return news
+
+
+def _of(robot: str, found: Mapping[tuple[str, str], Thing]) -> dict[str, Thing]:
+    """What is of this robot, by task."""
+    return {task: thing for (of, task), thing in found.items() if of == robot}
 
 
 def _reports(robot: Following) -> dict[str, TaskReport]:

@@ -37,7 +37,8 @@ class Serving:
 
     def __init__(self, store_url: str, poll_s: float) -> None:
         self.models: Mapping[Key, Model] = {}  # replaced as a whole, for any thread
-        self.problems: Mapping[Key, str] = {}  # why no model, or not the newest, serves a robot; likewise
+        self.why: Mapping[Key, str] = {}  # no model, or not the newest, serves a robot; likewise
+        self.problems: Mapping[Key, str] = {}  # those of `why` that are something wrong
         self.problem: str | None = None  # why nobody knows what serves
         self._url = store_url
         self._poll_s = poll_s
@@ -94,31 +95,34 @@ class Serving:
         served = [(task, robot, pointer.model) for task, robot, pointer in registry.served()]
         if (served, robots) == self._seen:
             return
-        models, problems = dict(self.models), {}
+        models, problems, why = dict(self.models), {}, {}
         for robot, units in robots.items():
             for task in TASKS:
                 try:
-                    self._choose(registry, (robot, task), units, models)
+                    if not self._choose(registry, (robot, task), units, models):
+                        why[robot, task] = _nobody(task, units)
                 except UnusableModel as error:
                     problems[robot, task] = str(error)
                     if self.problems.get((robot, task)) != str(error):
                         log.warning("%s: %s: %s", robot, task, error)
-        self.models, self.problems = models, problems
+        self.models, self.problems, self.why = models, problems, why | problems
         self._seen = (served, robots)
 
     def _choose(
         self, registry: "Registry", key: Key, units: Mapping[str, str], models: dict[Key, Model]
-    ) -> None:
+    ) -> bool:
+        """Let that model serve which should; False where there is none."""
         robot, task = key
         found = registry.serving(task, robot, set(units))
         if found is None:
             models.pop(key, None)
-            return
+            return False
         model = self._load(registry, found)
         if key in models and models[key].card.id != found:
             log.info("%s: %s is served by %s from now on", robot, task, found)
         check_robot(model.card, robot, units)
         models[key] = model
+        return True
 
     def _load(self, registry: "Registry", name: str) -> Model:
         """A model, loaded once; one that was refused is not asked for again."""
@@ -132,3 +136,9 @@ class Serving:
         if isinstance(found, UnusableModel):
             raise found
         return found
+
+
+def _nobody(task: str, units: Mapping[str, str]) -> str:
+    if TASKS[task].recipe(units.keys()) is None:
+        return f"{task} cannot be told from this robot's channels"
+    return f"no model serves {task}: gwrms train {task} --promote, or gwrms models promote MODEL"

@@ -14,6 +14,7 @@ from ml.serving.predictor import Prediction, Window, judged, replayed
 from ml.store.objects import Objects
 from server_gui.core.prediction import following
 from server_gui.core.prediction import predicting as module
+from server_gui.core.prediction.news import Serves
 from server_gui.core.prediction.predicting import Predicting
 from tests.unit.ml.serving.small import MS, STEP_MS, Floats, hips, learned
 from tests.unit.prediction.robots import (
@@ -107,7 +108,7 @@ def test_a_model_of_other_units_serves_nobody_and_says_why(folder_url: str) -> N
         told.until(lambda: one.state.problems)
         problems = one.state.problems
         send(one, hips(3, walks=True))
-    assert not told.news
+    assert not told.predicted()
     assert len(problems) == 1
     assert problems[0].startswith(f"{ROBOT}: activity: ")
     assert "in rad, and exo-01 gives it in °" in problems[0]
@@ -217,6 +218,16 @@ def test_without_a_model_nothing_is_said(folder_url: str) -> None:
     with predicting(settings(folder_url)) as (one, told):
         one.take(ROBOT, described())
         send(one, hips(3, walks=True))
-        told.until(lambda: one.state.robots.keys() == {ROBOT})
+        told.until(lambda: told.news, lambda: one.take(ROBOT, described()))
         assert not one.state.problems
-    assert not told.news
+    assert not told.predicted()
+    (serves,) = told.news
+    assert isinstance(serves, Serves)
+    assert not serves.models
+    assert serves.why == {
+        **{
+            task: f"no model serves {task}: gwrms train {task} --promote, or gwrms models promote MODEL"
+            for task in ("activity", "gait_phase")
+        },
+        "falling": "falling cannot be told from this robot's channels",
+    }

@@ -1,0 +1,79 @@
+"""What models say of one robot, as the window shows it: the newest of each task, and the rules that hold."""
+
+import time
+from dataclasses import dataclass, field
+from typing import Final
+
+from server_gui.core.prediction.news import News, Predicted, Ruled, Serves
+from server_gui.core.prediction.settings import RuleSettings
+
+STALE_S: Final = 2.0  # what is older is no longer so
+NOT_YET: Final = "models are looked for"
+OFF: Final = "prediction is off: write enabled = true into [prediction] of the server's file"
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The newest prediction of a task, and when it came."""
+
+    predicted: Predicted
+    came_ns: int  # our monotonic clock
+
+    def age_s(self, now_ns: int | None = None) -> float:
+        """Seconds since the newest sample that it is about."""
+        waited_ns = (time.monotonic_ns() if now_ns is None else now_ns) - self.came_ns
+        return max(0, waited_ns + (self.predicted.took_ns or 0)) / 1e9
+
+    def is_stale(self, now_ns: int | None = None) -> bool:
+        """Whether it is too old to be called live."""
+        return self.age_s(now_ns) > STALE_S
+
+
+@dataclass(slots=True)
+class StationPredictions:
+    """For one thread; `take` and `clear` are the only writers, and `revision` rises with each.
+
+    `why` says of each task without a model, or without the newest one, why that is so and what to do.
+    """
+
+    by_task: dict[str, Shown] = field(default_factory=dict)
+    why: dict[str, str] = field(default_factory=dict)
+    off: bool = False
+    revision: int = 0
+    _rules: dict[RuleSettings, Ruled] = field(default_factory=dict)
+    _looked: bool = False
+
+    @property
+    def problem(self) -> str:
+        """Why nothing is predicted, as a sentence; empty while a model serves."""
+        if self.off:
+            return OFF
+        if self.by_task:
+            return ""
+        return "; ".join(self.why.values()) if self._looked else NOT_YET
+
+    @property
+    def rules(self) -> tuple[Ruled, ...]:
+        """Those that hold now, the newest last."""
+        return tuple(self._rules.values())
+
+    def take(self, news: News) -> None:
+        """Take one fact."""
+        self.revision += 1
+        match news:
+            case Predicted():
+                self.by_task[news.prediction.task] = Shown(news, time.monotonic_ns())
+            case Ruled(began=True):
+                self._rules[news.rule] = news
+            case Ruled():
+                self._rules.pop(news.rule, None)
+            case Serves():
+                self.why, self._looked = dict(news.why), True
+                for task in self.by_task.keys() - news.models.keys():
+                    del self.by_task[task]
+
+    def clear(self) -> None:
+        """The link has dropped, or the robot has booted: nothing is known of it now."""
+        self.revision += 1
+        self.by_task.clear()
+        self._rules.clear()
