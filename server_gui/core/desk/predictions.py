@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Final
 
-from server_gui.core.prediction.news import News, Predicted, Ruled, Serves
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
 from server_gui.core.prediction.settings import RuleSettings
 
 STALE_S: Final = 2.0  # what is older is no longer so
@@ -57,7 +57,7 @@ class StationPredictions:
         """Those that hold now, the newest last."""
         return tuple(self._rules.values())
 
-    def take(self, news: News) -> None:
+    def take(self, news: Foreseen) -> None:
         """Take one fact."""
         self.revision += 1
         match news:

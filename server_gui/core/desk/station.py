@@ -43,6 +43,7 @@ from server_gui.core.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.prediction.news import Foreseen, Ruled
 from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.processing.units import Units
 from server_gui.core.robot import Robot
@@ -161,6 +162,12 @@ class Station:
         if seen is not None:
             snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
             self.processing.apply(dataclasses.replace(event, snapshot=snapshot))
+
+    def foresee(self, news: Foreseen) -> None:
+        """Apply what models say of this robot."""
+        self.predictions.take(news)
+        if isinstance(news, Ruled):
+            self.tell(NewsKind.WARNING, news.text)
 
     # --- STOP and reset
 

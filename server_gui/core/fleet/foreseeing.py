@@ -9,7 +9,7 @@ import msgspec
 from server_gui.core.events import Failed, StopAnswered
 from server_gui.core.fleet.fleet import Fleet
 from server_gui.core.network import Network
-from server_gui.core.prediction.news import News, Predicted, Ruled
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.predicting import Predicting
 from server_gui.core.recording.gathering import EventKind
 from server_gui.core.recording.recorder import Recorder
@@ -18,7 +18,7 @@ from server_gui.core.settings import ServerSettings
 
 log = logging.getLogger(__name__)
 
-Foresee = Callable[[Sequence[News]], None]
+Foresee = Callable[[Sequence[Foreseen]], None]
 
 
 class Foreseeing(Predicting):
@@ -38,7 +38,7 @@ class Foreseeing(Predicting):
         self._network = network
         self._show = show
 
-    def _keep(self, news: Sequence[News]) -> None:
+    def _keep(self, news: Sequence[Foreseen]) -> None:
         rows = [record(self._fleet.session(one.robot), one) for one in news if isinstance(one, Predicted)]
         if rows:
             self._recorder.add(*rows)

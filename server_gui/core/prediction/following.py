@@ -10,7 +10,7 @@ from gateway.client import Batch, ClockOffset
 from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.events import Described, Event, Telemetry
-from server_gui.core.prediction.news import News, Predicted, Ruled, Serves
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
 from server_gui.core.prediction.rules import Rule
 from server_gui.core.prediction.serving import Model
 from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
@@ -53,7 +53,7 @@ class Watched:
         """From now on nothing has been seen."""
         self._windows = Windows(self.model.learned.recipe, self._every_ns)
 
-    def predicted(self, robot: str, clock: "Clock", predictions: Sequence[Prediction]) -> Iterator[News]:
+    def predicted(self, robot: str, clock: "Clock", predictions: Sequence[Prediction]) -> Iterator[Foreseen]:
         """What these predictions, of what was due, say."""
         samples = [window.samples[0, :, -1] for window in self.due]
         self.due = []

@@ -56,4 +56,4 @@ class Serves:
     why: Mapping[str, str]
 
 
-News = Predicted | Ruled | Serves
+Foreseen = Predicted | Ruled | Serves

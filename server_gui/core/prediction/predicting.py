@@ -12,7 +12,7 @@ from ml.serving.predictor import judged
 from server_gui.core.events import Event
 from server_gui.core.prediction.following import Following, Watched
 from server_gui.core.prediction.inbox import Inbox
-from server_gui.core.prediction.news import News, Predicted, Ruled
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.serving import Model, Serving
 from server_gui.core.prediction.settings import Action
 from server_gui.core.prediction.state import PredictingState, TaskReport
@@ -35,7 +35,7 @@ class Predicting:
     def __init__(
         self,
         settings: ServerSettings,
-        tell: Callable[[Sequence[News]], None],
+        tell: Callable[[Sequence[Foreseen]], None],
         stop: Callable[[Ruled], None],
     ) -> None:
         self._settings = settings
@@ -140,7 +140,7 @@ class Predicting:
                     found.setdefault(model.card.id, (model, []))[1].append((robot, watched))
         yield from found.values()
 
-    def _judge(self, model: Model, due: Sequence[tuple[Following, Watched]]) -> list[News]:
+    def _judge(self, model: Model, due: Sequence[tuple[Following, Watched]]) -> list[Foreseen]:
         """What a model says of everything that is due; a model that breaks ends nothing but itself."""
         windows = [window for _, watched in due for window in watched.due]
         try:
@@ -149,7 +149,7 @@ class Predicting:
             log.exception("the model %s breaks; it serves no more", model.card.id)
             self._broken[model.card.id] = f"{model.card.id}: {BROKEN}{type(error).__name__}"
             return []
-        news: list[News] = []
+        news: list[Foreseen] = []
         for robot, watched in due:
             own = [next(predictions) for _ in watched.due]
             news += watched.predicted(robot.robot, robot.clock, own)

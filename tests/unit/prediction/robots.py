@@ -16,7 +16,7 @@ from ml.registry.code import features_hash, versions
 from ml.registry.registry import Registry
 from ml.robot.learned import Learned
 from server_gui.core.events import Described, Telemetry
-from server_gui.core.prediction.news import News, Predicted, Ruled
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.predicting import Predicting
 from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
 from server_gui.core.settings import ServerSettings, StoreSettings
@@ -77,12 +77,12 @@ def settings(url: str, *rules: RuleSettings) -> ServerSettings:
 class Told:
     """What prediction has told, for a test to wait for."""
 
-    news: list[News] = field(default_factory=list)
+    news: list[Foreseen] = field(default_factory=list)
     stops: list[Ruled] = field(default_factory=list)
     order: list[object] = field(default_factory=list)
     changed: threading.Condition = field(default_factory=threading.Condition)
 
-    def tell(self, news: Sequence[News]) -> None:
+    def tell(self, news: Sequence[Foreseen]) -> None:
         with self.changed:
             self.news += news
             self.order += news
