@@ -10,6 +10,8 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 
+from gateway import __version__
+
 # name → (where it lives, what it does). A module here is imported only when its command runs.
 COMMANDS: dict[str, tuple[str, str]] = {
     "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
@@ -98,7 +100,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0 if arguments else 2
     name, *rest = arguments
     if name == "--version":
-        sys.stdout.write(f"gwrms {importlib.import_module('importlib.metadata').version('gwrms')}\n")
+        sys.stdout.write(f"gwrms {__version__}\n")
         return 0
     if name not in COMMANDS:
         sys.stderr.write(f"gwrms: there is no command {name!r}; gwrms --help lists them\n")

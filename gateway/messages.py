@@ -127,6 +127,7 @@ class Hello(Struct, frozen=True):
     robot: str
     role: str
     boot_id: str
+    version: str | None = None  # of the gateway's software; None: from before gateways told it
 
 
 class Clock(Struct, frozen=True):
@@ -284,6 +285,7 @@ class Description(Struct, frozen=True):
     trials: list[TrialInfo] = []
     records: RecordsInfo | None = None
     budget: BudgetInfo | None = None
+    version: str | None = None  # as in `hello`
 
 
 class CpuUse(Struct, frozen=True):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
-from gateway import messages, wire
+from gateway import __version__, messages, wire
 from gateway.boot import boot_id
 from gateway.budget import Budget
 from gateway.config import RobotConfig
@@ -144,7 +144,8 @@ class Service:
                 wire.Kind.BAD_PARAMS, f"this gateway speaks protocol {wire.PROTOCOL}, not {params.protocol}"
             )
         session.who = f"{params.client} ({session.peer})"
-        return messages.Hello(wire.PROTOCOL, self._config.robot.name, CLIENT_ROLE, self._boot_id)
+        robot = self._config.robot.name
+        return messages.Hello(wire.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)
 
     def _clock(self) -> messages.Clock:
         return messages.Clock(time.monotonic_ns(), time.time_ns(), self._boot_id)
@@ -170,6 +171,7 @@ class Service:
             trials=robot.trials,
             records=robot.records,
             budget=self._budget.info,
+            version=__version__,
         )
 
     def _guard_info(self) -> messages.GuardInfo:

@@ -37,6 +37,7 @@ class FakeRobot:
         self.calls: list[tuple[str, Params]] = []
         self.boot_id = "boot-1"
         self.protocol = 1
+        self.version = "0.1.0"
         self.mute = False
         self.lost: set[str] = set()
         self.frozen = False
@@ -259,6 +260,7 @@ class FakeRobot:
             "robot": "exo-fake",
             "boot_id": self.boot_id,
             "role": "observer",
+            "version": self.version,
             "components": [
                 {
                     "name": name,
@@ -310,7 +312,13 @@ class FakeRobot:
         return globs is None or any(fnmatch.fnmatchcase(name, glob) for glob in globs)
 
     def _hello(self, params: Params) -> Params:
-        return {"protocol": self.protocol, "robot": "exo-fake", "role": "observer", "boot_id": self.boot_id}
+        return {
+            "protocol": self.protocol,
+            "robot": "exo-fake",
+            "role": "observer",
+            "boot_id": self.boot_id,
+            "version": self.version,
+        }
 
     def _resource(self, params: Params) -> Params:
         known, self._resource_asked = self._resource_asked, True

@@ -29,7 +29,8 @@ def main(argv: list[str]) -> int:
 
 
 def _chapters(robot: Description) -> Iterator[str]:
-    yield f"{robot.robot}: gateway as {robot.role}, boot {robot.boot_id}\n"
+    software = f"gwrms {robot.version}, " if robot.version else ""
+    yield f"{robot.robot}: gateway as {robot.role}, {software}boot {robot.boot_id}\n"
     yield table(
         ("COMPONENT", "KIND", "STATE", "PROBLEM"),
         [(part.name, part.kind, part.state, part.problem or "") for part in robot.components],

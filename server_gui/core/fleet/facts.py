@@ -16,10 +16,16 @@ def facts(description: Description, operator: str, notes: str) -> Facts:
     return Facts(
         configuration_hash=configuration_hash(description),
         units={channel.name: channel.unit for channel in description.channels},
-        versions={"gwrms collect": importlib.metadata.version("gwrms"), "protocol": str(PROTOCOL)},
+        versions=versions(description),
         operator=operator,
         notes=notes,
     )
+
+
+def versions(description: Description) -> dict[str, str]:
+    """Of the software that takes part, as far as it is known."""
+    known = {"gwrms collect": importlib.metadata.version("gwrms"), "protocol": str(PROTOCOL)}
+    return known if description.version is None else known | {"gateway": description.version}
 
 
 def kernel(known: KernelFacts) -> dict[str, str]:

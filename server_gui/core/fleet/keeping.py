@@ -14,7 +14,8 @@ from server_gui.core.recording.records import Facts
 class Keeping:
     """One robot's recording, in the network's thread.
 
-    A session lasts over dropped links, for as long as the robot's boot and configuration stay the same.
+    A session lasts over dropped links, for as long as the robot's boot, configuration and software stay the
+    same.
     """
 
     def __init__(self, robot: str, recorder: Recorder, operator: str = "", notes: str = "") -> None:
@@ -24,7 +25,7 @@ class Keeping:
         self._operator = operator
         self._notes = notes
         self._facts = Facts()
-        self._same: tuple[str, str] | None = None  # boot and configuration of this session
+        self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
         self._linked = False
 
     def take(self, event: Event) -> None:
@@ -50,7 +51,7 @@ class Keeping:
     def _described(self, description: Description) -> None:
         self._recorder.describe(self._robot, description)
         found = facts.facts(description, self._operator, self._notes)
-        same = (description.boot_id, found.configuration_hash)
+        same = (description.boot_id, found.configuration_hash, description.version)
         if same != self._same:
             self._same, self._facts = same, found
             self.session = self._recorder.begin(self._robot, found)

@@ -128,11 +128,14 @@ def test_a_link_that_comes_back_is_a_gap_in_the_same_session(
     assert sum("exo-fake: link dropped" in line for line in said) == 1
 
 
-def test_another_boot_of_the_robot_is_another_session(start: Start, tmp_path: Path) -> None:
+@pytest.mark.parametrize("what", ["boot_id", "version"])
+def test_another_boot_or_software_of_the_robot_is_another_session(
+    start: Start, tmp_path: Path, what: str
+) -> None:
     robot = start()
     with recording(tmp_path, {"exo-fake": robot.address}) as fleet:
         fleet.until_more("exo-fake")
-        robot.boot_id = "boot-2"
+        setattr(robot, what, "another")
         robot.cut()
         fleet.until(lambda: fleet.fleet.report()["exo-fake"].links == 2)
         fleet.until_more("exo-fake")

@@ -51,6 +51,8 @@ def test_facts_name_units_versions_and_who_records() -> None:
     assert found.units["left_knee.velocity"] == "rad/s"
     assert found.versions["protocol"] == "1"
     assert found.versions["gwrms collect"]
+    assert "gateway" not in found.versions  # which does not tell it
+    assert facts(replace(EXO, version="0.1.0"), "", "").versions["gateway"] == "0.1.0"
     assert (found.operator, found.notes) == ("Ada", "new insoles")
 
 

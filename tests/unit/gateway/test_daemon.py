@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,7 @@ def test_hello_names_the_robot_and_the_protocol(client: Client) -> None:
     answer = client.call("hello", client="test", protocol=1)
     assert (answer["protocol"], answer["robot"]) == (1, "exo-test")
     assert answer["boot_id"] == client.call("clock.read")["boot_id"]
+    assert answer["version"] == client.call("robot.describe")["version"] == version("gwrms")
 
 
 def test_another_protocol_is_refused_with_ours(client: Client) -> None:
