@@ -23,11 +23,12 @@ from PySide6.QtWidgets import (
 from server_gui.core.desk.acts import acts
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
+from server_gui.core.desk.news import NewsKind
 from server_gui.core.desk.station import Station
 from server_gui.views.acts_model import OUTCOME, SORT_ROLE, TIME, ActsModel, Index, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.files import ask_save
+from server_gui.views.widgets.files import ask_save, save_whole
 
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
 CSV_TITLES: Final = (
@@ -93,8 +94,11 @@ class Audit(QWidget):
             combo.currentIndexChanged.connect(self._filter)
         export = QPushButton("CSV …")
         export.setToolTip("What is shown, in SI units with every digit")
-        export.clicked.connect(lambda: ask_save(self, "Export as CSV", "csv", self.save_csv))
-        self.table = self._table(theme)
+        export.clicked.connect(lambda: ask_save(self, "Export as CSV", "csv", self._export))
+        self._theme = theme
+        self.table = self._table()
+        theme.scaled.connect(self._restyle)
+        self._restyle()
         self.verdict = QLabel()
         self.verdict.setObjectName("banner")
         self.verdict.setWordWrap(True)
@@ -130,6 +134,9 @@ class Audit(QWidget):
             writer.writerow(CSV_TITLES)
             writer.writerows(_cells(self.model.lines[place.row()]) for place in places)
 
+    def _export(self, path: Path) -> None:
+        self._desk.news.add(NewsKind.STATE, "audit", save_whole(self.save_csv, path))
+
     def _lines(self, name: str) -> Iterable[Line]:
         station = self._called[name]
         description, units = station.robot.description, self._desk.shown.units
@@ -149,7 +156,10 @@ class Audit(QWidget):
         self.verdict.setProperty("tone", "bad" if broken else "good")
         self.verdict.style().polish(self.verdict)
 
-    def _table(self, theme: Theme) -> QTableView:
+    def _restyle(self) -> None:
+        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(20))
+
+    def _table(self) -> QTableView:
         table = QTableView()
         table.setModel(self.chosen)
         table.setSortingEnabled(True)
@@ -161,8 +171,6 @@ class Audit(QWidget):
         table.setAlternatingRowColors(True)
         table.setWordWrap(False)
         table.verticalHeader().hide()
-        table.verticalHeader().setDefaultSectionSize(theme.px(20))
-        theme.scaled.connect(lambda: table.verticalHeader().setDefaultSectionSize(theme.px(20)))
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(OUTCOME, QHeaderView.ResizeMode.Stretch)

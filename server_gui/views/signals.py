@@ -1,6 +1,5 @@
 """Signals: chosen channels over time, one plot a unit; pause, zoom and export while data go on coming."""
 
-import contextlib
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ import numpy.typing as npt
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -33,6 +31,7 @@ from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plot import Curve, Plot
 
 Floats = npt.NDArray[np.float64]
@@ -212,8 +211,8 @@ class Signals(QWidget):
         self.fit.setToolTip("Undo zoom: the range follows the data again")
         self.fit.clicked.connect(self._follow)
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
-        as_csv.clicked.connect(self._ask_csv)
-        as_png.clicked.connect(self._ask_png)
+        as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
+        as_png.clicked.connect(lambda: self._ask("png", self.save_png))
         self.said = ElidedLabel("dim")
         row = QHBoxLayout()
         for widget in (self._span, self.pause, self.fit, as_csv, as_png):
@@ -297,34 +296,12 @@ class Signals(QWidget):
         for plot in self.plots:
             plot.plot.follow_again()
 
-    def _ask_csv(self) -> None:
-        self._ask("CSV", self.save_csv)
-
-    def _ask_png(self) -> None:
-        self._ask("PNG", self.save_png)
-
     def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
-        """A file dialog that is not modal: nothing stands in the way of STOP."""
-        dialog = QFileDialog(self, f"Export as {kind}", "", f"{kind} (*.{kind.lower()})")
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix(kind.lower())
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setModal(False)
-        dialog.fileSelected.connect(lambda name: self.export(save, Path(name)))
-        dialog.show()
+        ask_save(self, f"Export as {kind.upper()}", kind, lambda path: self.export(save, path))
 
     def export(self, save: Callable[[Path], None], path: Path) -> None:
-        """Save, and say what came of it; what was there before stays until all is written."""
-        part = path.with_name(f"{path.name}.part")
-        try:
-            save(part)
-            part.replace(path)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
-            self._exported = f" · NOT SAVED as {path.name}: {error.strerror or error}"
-        else:
-            self._exported = f" · saved as {path.name}"
+        """Save what is on screen, and say what came of it."""
+        self._exported = f" · {save_whole(save, path)}"
 
     # --- data
 

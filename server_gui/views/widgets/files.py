@@ -1,5 +1,6 @@
-"""Asks for a file's name without being modal: nothing stands in the way of STOP."""
+"""Asks for a file's name without being modal: nothing stands in the way of STOP; says what came of saving."""
 
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -24,6 +25,19 @@ def ask_save(parent: QWidget, title: str, kind: str, done: Callable[[Path], obje
     dialog.setDefaultSuffix(kind)
     dialog.show()
     return dialog
+
+
+def save_whole(save: Callable[[Path], None], path: Path) -> str:
+    """Save, and say what came of it; what was there before stays until all is written."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        save(part)
+        part.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        return f"NOT SAVED as {path.name}: {error.strerror or error}"
+    return f"saved as {path.name}"
 
 
 def _dialog(parent: QWidget, title: str, kinds: Sequence[str], done: Callable[[Path], object]) -> QFileDialog:

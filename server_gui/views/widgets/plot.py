@@ -54,9 +54,8 @@ class Curves(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        if not self._live:
-            painter.fillRect(self.rect(), self._behind)
-            painter.setOpacity(OLD)
+        painter.fillRect(self.rect(), self._behind)
+        painter.setOpacity(1.0 if self._live else OLD)
         ratio, seam, (height, width) = self.devicePixelRatioF(), self.strip.seam, self.strip.pixels.shape
         for begin, end, at in ((seam, width, 0), (0, seam, width - seam)):
             painter.drawImage(QPointF(at / ratio, 0), self._image, QRect(begin, 0, end - begin, height))

@@ -116,11 +116,12 @@ class PressureMap(QWidget):
             self._template_key = key
             self._template_made = QPixmap(self.size() * ratio)
             self._template_made.setDevicePixelRatio(ratio)
-            self._template_made.fill(self._theme.colour("card"))
+            self._template_made.fill(Qt.GlobalColor.transparent)  # so that a hole can be made into it
             self._draw_template(QPainter(self._template_made))
         return self._template_made
 
     def _draw_template(self, painter: QPainter) -> None:
+        painter.fillRect(self.rect(), self._theme.colour("card"))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         scale = self._to_metres(painter)
         painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Clear)
