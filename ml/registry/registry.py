@@ -12,7 +12,6 @@ from typing import Any, Final
 import msgspec
 
 from ml.errors import UnusableModel
-from ml.registry import archive
 from ml.registry.card import Card, checked_name, content_id, decoded, encoded
 from ml.registry.code import features_hash
 from ml.registry.lasting import create
@@ -49,6 +48,8 @@ class Registry:
             StoreError: the store does not take it, or a table's version is not there.
 
         """
+        from ml.registry import archive  # brings scikit-learn, which takes seconds: not for a look around
+
         data = archive.dump(state)
         card = msgspec.structs.replace(card, id="", sha256={SKOPS: hashlib.sha256(data).hexdigest()})
         card = msgspec.structs.replace(card, id=content_id(card))
@@ -90,6 +91,8 @@ class Registry:
             UnusableModel: something is not as it must be; the message says what.
 
         """
+        from ml.registry import archive
+
         card = self._read_card(model)
         data = self.file(model, SKOPS)
         try:
