@@ -41,7 +41,7 @@ def du(argv: list[str]) -> int:
     rows = [(each.table, each.robot or NONE, *_sizes(each)) for each in found]
     say(table(("TABLE", "ROBOT", *COLUMNS), rows, right=(2, 3, 4)))
     older = everything - sum(each.size_bytes for each in found)
-    say(f"{size(everything)} in all; {size(older)} of that are logs, and files of older versions only\n")
+    say(f"{size(everything)} in all; {size(older)} of that are logs, models, files of old versions\n")
     return 0
 
 
