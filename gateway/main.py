@@ -44,6 +44,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "cloud": ("server_gui.commands.cloud:main", "the store: browse, upload, download, verify, tidy"),
     "query": ("server_gui.commands.query:main", "SQL over everything recorded"),
     "models": ("server_gui.commands.models:main", "learned models: look at, promote, roll back, export"),
+    "predict": ("server_gui.commands.predict:main", "what robot and wearer do, live or over a recording"),
     "gui": ("server_gui.commands.gui:main", "the window: robots live, parameters changed, STOP in sight"),
     "evaluate": ("server_gui.commands.evaluate:main", "how well predictions hold for people never seen"),
     "demo": ("server_gui.cli:demo", "simulator, gateway and live view with one command"),

@@ -29,14 +29,15 @@ class Predicting:
     """Predicts from entering to leaving; use it as a context manager, which joins its threads.
 
     `take` gets everything that the robots' feeds tell. `tell` gets the news, and before that `stop` what asks
-    for a stop: both are called in the thread that predicts, and must return at once.
+    for a stop: both are called in the thread that predicts, and must return at once. Without `stop` a rule
+    only says that it would.
     """
 
     def __init__(
         self,
         settings: ServerSettings,
         tell: Callable[[Sequence[Foreseen]], None],
-        stop: Callable[[Ruled], None],
+        stop: Callable[[Ruled], None] | None = None,
     ) -> None:
         self._settings = settings
         self._tell = tell
@@ -97,7 +98,7 @@ class Predicting:
         for model, due in self._due():
             news = self._judge(model, due)
             for one in news:
-                if isinstance(one, Ruled) and one.began and one.rule.action is Action.STOP:
+                if self._stop and isinstance(one, Ruled) and one.began and one.rule.action is Action.STOP:
                     self._stop(one)
             if news:
                 self._tell(news)

@@ -1,0 +1,142 @@
+"""What models say, as text: of a robot that is followed, and of a session that was predicted again."""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from typing import Final
+
+from gateway.cli.text import NONE, age, table
+from gateway.client import ConnectionState
+from ml.registry.card import Card, age_days
+from ml.serving.predictor import Prediction
+from ml.serving.trust import Trust
+from server_gui.core.desk.predictions import Shown
+from server_gui.core.prediction.live import Watched
+from server_gui.core.prediction.replay import Quality, Replayed
+
+HEADER: Final = ("TASK", "SAYS", "PROBABILITY", "AGE", "NOVELTY", "TRUST", "MODEL", "MADE")
+RIGHT: Final = (2, 3, 4)
+SPELLS: Final = 40  # lines of what followed what
+
+
+def told(name: str, watched: Watched) -> str:
+    """A robot now: what its models say and how far to believe it; faults and rules beside."""
+    known = watched.predictions
+    lines = [f"{name}: {_link(watched)}"]
+    if known.by_task:
+        lines.append(table(HEADER, [_row(shown) for shown in known.by_task.values()], RIGHT).rstrip())
+    lines += [f"{task}: {why}" for task, why in known.why.items()] or [known.problem] * (not known.by_task)
+    lines += [f"RULE {rule.text}" for rule in known.rules]
+    drifted = {channel for shown in known.by_task.values() for channel in shown.predicted.trust.drifted}
+    lines += [
+        f"DRIFT {channel} has values that its model has not learned from" for channel in sorted(drifted)
+    ]
+    lines += [f"FAULT {part.name} {part.state}: {part.problem or NONE}" for part in watched.robot.not_ok()]
+    return "\n".join(lines) + "\n"
+
+
+def _link(watched: Watched) -> str:
+    link = watched.robot.link
+    if link.state is ConnectionState.CONNECTED:
+        return f"{watched.robot.rate_hz():.0f} rows/s, {age(watched.robot.age_s())} old"
+    return f"{link.state.value}: {link.problem}" if link.problem else link.state.value
+
+
+def _row(shown: Shown) -> tuple[str, ...]:
+    prediction, card = shown.predicted.prediction, shown.predicted.card
+    return (
+        prediction.task,
+        NONE if shown.is_stale() else said(prediction),
+        NONE if shown.is_stale() else f"{prediction.probability:.2f}",
+        age(shown.age_s()),
+        f"{prediction.novelty:.2f}",
+        shown.predicted.trust.level.value,
+        card.id,
+        made(card),
+    )
+
+
+def said(prediction: Prediction) -> str:
+    """The label, and further values."""
+    values = " ".join(f"{name} {value:.2f}" for name, value in prediction.values.items())
+    return f"{prediction.label} {values}".rstrip()
+
+
+def made(card: Card) -> str:
+    """How old a model is, and what it has learned from."""
+    return f"{age_days(card):.0f} days ago, {card.source.value}"
+
+
+# --- a session
+
+
+def replay_told(found: Replayed) -> str:
+    """One task of a session."""
+    card, predictions = found.model.card, found.predictions
+    lines = [f"{card.task}: {card.id}, made {made(card)}; {len(predictions)} decisions"]
+    if predictions:
+        lines += [f"trust: {_trust(found.trust)}", "", _labels(predictions)]
+    if found.live.decisions:
+        lines.append(f"said live: {found.live.decisions}, of which {found.live.same} are the same here\n")
+    if found.quality is not None:
+        lines.append(_quality(found.quality))
+    lines += _spells(found) if found.model.learned.task.fold else []
+    return "\n".join(lines) + "\n"
+
+
+def _trust(trust: Trust) -> str:
+    drifted = f"; other values than it has learned from: {', '.join(trust.drifted)}" if trust.drifted else ""
+    return (
+        f"{trust.level.value} (last minute: {100 * trust.abnormal:.0f} % abnormal,"
+        f" {100 * trust.unknown:.0f} % unknown, novelty {trust.novelty:.2f}){drifted}"
+    )
+
+
+def _labels(predictions: Sequence[Prediction]) -> str:
+    by_label: dict[str, list[float]] = {}
+    for one in predictions:
+        by_label.setdefault(one.label, []).append(one.probability)
+    rows = [
+        (
+            label,
+            str(len(found)),
+            f"{100 * len(found) / len(predictions):.1f} %",
+            f"{sum(found) / len(found):.2f}",
+        )
+        for label, found in sorted(by_label.items(), key=lambda item: -len(item[1]))
+    ]
+    return table(("SAYS", "DECISIONS", "SHARE", "PROBABILITY"), rows, (1, 2, 3))
+
+
+def _quality(quality: Quality) -> str:
+    said_at_all = quality.right + quality.wrong
+    right = f"{100 * quality.right / said_at_all:.1f} %" if said_at_all else NONE
+    head = (
+        f"labels: {quality.labelled} decisions are labelled; {right} of what it says of them is right,"
+        f" of {quality.unsaid} it says nothing"
+    )
+    columns = sorted({label for row in quality.confusion.values() for label in row})
+    rows = [
+        (was, *(str(row.get(label, 0)) for label in columns))
+        for was, row in sorted(quality.confusion.items())
+    ]
+    return f"{head}\n" + table(
+        ("WAS", *(f"SAYS {label}" for label in columns)), rows, range(1, len(columns) + 1)
+    )
+
+
+def _spells(found: Replayed) -> Iterator[str]:
+    """What followed what."""
+    both = zip(found.predictions, found.utc_ns, strict=True)
+    spells = [list(spell) for _, spell in itertools.groupby(both, key=lambda one: one[0].label)]
+    rows = [
+        (_time(spell[0][1]), spell[0][0].label, f"{(spell[-1][1] - spell[0][1]) / 1e9:.1f} s")
+        for spell in spells
+    ]
+    yield table(("FROM (UTC)", "SAYS", "FOR"), rows[:SPELLS], (2,)).rstrip()
+    if len(rows) > SPELLS:
+        yield f"… and {len(rows) - SPELLS} more (--json has every decision)"
+
+
+def _time(utc_ns: int) -> str:
+    return f"{datetime.fromtimestamp(utc_ns / 1e9, UTC):%H:%M:%S.%f}"[:-5]
