@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
 from gateway.messages import ResourceSnapshotParams
+from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.link import Link
 from server_gui.core.desk.recording import By, Recording
@@ -47,6 +48,7 @@ FOLLOWING: Final = Following(
     resources=ResourceSnapshotParams(processes=False),
     journal_s=2.0,
 )
+BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 
 
@@ -115,7 +117,9 @@ class App:
         self.theme = Theme(
             qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100
         )
-        self.window = MainWindow(self.desk, self.theme, kept)
+        self._archive = Archive(settings, self.desk, self._poster.deliver)
+        self._ended = True
+        self.window = MainWindow(self.desk, self.theme, kept, self._archive)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
         self.window.added.connect(lambda where: self.follow(name_of(where), Address.parse(where)))
@@ -137,6 +141,7 @@ class App:
     def __exit__(self, *exc: object) -> None:
         self._timer.stop()
         self._own.close()
+        self._ended = self._archive.close(BREAK_OFF_S)
         if self._elsewhere is not None:
             self._elsewhere.close()
         (self._collector or self.network).__exit__(*exc)
@@ -144,7 +149,7 @@ class App:
     @property
     def hangs(self) -> bool:
         """Whether something still runs after all was ended, which only the end of the process ends."""
-        return self._collector is not None and self._collector.hangs
+        return not self._ended or (self._collector is not None and self._collector.hangs)
 
     def follow(self, name: str, address: Address) -> Station:
         """Another robot, from now on."""

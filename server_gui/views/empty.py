@@ -13,9 +13,10 @@ WORDS = """<p>No robot is in the list yet.</p>
 
 
 class EmptyView(QWidget):
-    """`simulator` asks for the simulated robot."""
+    """`simulator` asks for the simulated robot, `recordings` for what was recorded before."""
 
     simulator = Signal()
+    recordings = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -29,6 +30,8 @@ class EmptyView(QWidget):
         self.start = QPushButton("Start the simulator")
         self.start.setObjectName("primary")
         self.start.clicked.connect(self._start)
+        look = QPushButton("Look at recordings")
+        look.clicked.connect(self.recordings)
         self._said = QLabel()
         self._said.setObjectName("dim")
         self._said.setWordWrap(True)
@@ -36,6 +39,7 @@ class EmptyView(QWidget):
         row = QHBoxLayout()
         row.addStretch(1)
         row.addWidget(self.start)
+        row.addWidget(look)
         row.addStretch(1)
         everything = QVBoxLayout(self)
         everything.addStretch(1)

@@ -1,7 +1,7 @@
 """The main window: header with STOP, robots left, tabs in the middle, parameters right, events below."""
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
 from PySide6.QtCore import QByteArray, QSettings, Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QCloseEvent
@@ -10,31 +10,42 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QMenu,
     QPushButton,
-    QScrollArea,
     QStackedWidget,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.core.processing.units import UNITS, Units
 from server_gui.views.audit import Audit
+from server_gui.views.cloud.panel import Cloud
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
+from server_gui.views.recordings.panel import Recordings
 from server_gui.views.resources import Resources
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.signals import Signals
 from server_gui.views.status_bar import StatusBar
 from server_gui.views.theme import Look, Theme
+from server_gui.views.widgets.scrolled import scrolled
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 SLOW: Final = 6  # frames between two looks at what people read
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²")  # quantities with more than one unit worth choosing
+
+
+class View(Protocol):
+    """What a tab holds."""
+
+    def refresh(self) -> None:
+        """Show how it is now; called each frame while the tab is visible."""
+        ...
 
 
 class MainWindow(QMainWindow):
@@ -46,7 +57,7 @@ class MainWindow(QMainWindow):
     simulator = Signal()
     closed = Signal()
 
-    def __init__(self, desk: Desk, theme: Theme, settings: QSettings) -> None:
+    def __init__(self, desk: Desk, theme: Theme, settings: QSettings, archive: Archive | None = None) -> None:
         super().__init__()
         self._desk = desk
         self._theme = theme
@@ -68,10 +79,18 @@ class MainWindow(QMainWindow):
         self.resources, self.audit = Resources(desk, theme), Audit(desk, theme)
         self.empty = EmptyView(theme)
         self.empty.simulator.connect(self.simulator)
+        self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()
-        self._views = (self.overview, self.signals, self.resources, self.audit)
+        self._views: tuple[View, ...] = (self.overview, self.signals, self.resources, self.audit)
         for title, view in zip(("&Overview", "&Signals", "&Resources", "&Audit"), self._views, strict=True):
-            self.tabs.addTab(_scrolled(view), title)
+            self.tabs.addTab(scrolled(view), title)
+        self._live = len(self._views)  # tabs that show the robot that is looked at
+        if archive is not None:
+            self.recordings = Recordings(archive, desk.recording, theme)
+            self.cloud = Cloud(archive, desk.recording, theme)
+            self._views += (self.recordings, self.cloud)
+            self.tabs.addTab(scrolled(self.recordings), "Re&cordings")
+            self.tabs.addTab(scrolled(self.cloud), "C&loud")
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
@@ -86,11 +105,12 @@ class MainWindow(QMainWindow):
         """One frame: what moves each time, what is read now and then, and only what is visible."""
         self._frame += 1
         self._bar.frame()
-        if self._desk.selected is not None:
+        shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
+        if shown:
             self._views[self.tabs.currentIndex()].refresh()
         if self._frame % SLOW:
             return
-        self._pages.setCurrentIndex(0 if self._desk.selected is None else 1)
+        self._pages.setCurrentIndex(1 if shown else 0)
         self.header.refresh()
         self.robots.refresh()
         self.parameters.refresh()
@@ -112,6 +132,9 @@ class MainWindow(QMainWindow):
         self.restoreState(self._usual, LAYOUT)
         for dock in self.docks:
             dock.show()
+
+    def _look_at_recordings(self) -> None:
+        self.tabs.setCurrentIndex(self._live)
 
     # --- how it is put together
 
@@ -182,15 +205,6 @@ class MainWindow(QMainWindow):
             self.restoreGeometry(geometry)
         if isinstance(state, QByteArray):
             self.restoreState(state, LAYOUT)
-
-
-def _scrolled(view: QWidget) -> QScrollArea:
-    """On a small screen, or with large text, a view is scrolled rather than the window made larger."""
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setWidget(view)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    return area
 
 
 def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:

@@ -98,7 +98,7 @@ class Tape:
         parts = [self.waiting.between(begin_ns, end_ns)]
         if self._stored:
             store = Store.existing(self._url)
-            found = sessions.telemetry(store, self.session, self._stored, _time(begin_ns), _time(end_ns))
+            found = sessions.telemetry(store, self.session, self._stored, as_time(begin_ns), as_time(end_ns))
             parts += [_rows(table) for table in found]
         return Rows.joined(parts)
 
@@ -161,5 +161,6 @@ def _once(events: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return [found[key] for key in sorted(found)]
 
 
-def _time(instant_ns: int) -> datetime:
+def as_time(instant_ns: int) -> datetime:
+    """An instant as the store writes it."""
     return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=instant_ns // US_NS)

@@ -1,0 +1,224 @@
+"""The tab of the store: how it is reached, what waits for it, what is in it, and work on it."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gateway.cli.text import size
+from ml.store.sessions import Session
+from server_gui.core.cloud.reached import endpoint_told, keys_told
+from server_gui.core.cloud.work import check, download, upload
+from server_gui.core.desk.archive import Archive
+from server_gui.core.desk.recording import Recording
+from server_gui.views.cloud.browser import Browser
+from server_gui.views.cloud.jobs_table import JobsTable, under_way
+from server_gui.views.marks import Mark, age_text
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.mark import MarkIcon
+
+SLOW: Final = 6  # frames between two looks
+UPLOAD: Final = "Upload what waits"
+NO_STORE: Final = (
+    "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
+    "Upload now brings it at once."
+)
+
+
+class Cloud(QWidget):
+    """Everything that takes long is done in threads; a store that is away says so and is tried again."""
+
+    def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
+        super().__init__()
+        self._archive = archive
+        self._recording = recording
+        self._frame = 0
+        self.setObjectName("page")
+        self.browser = Browser(archive.library, archive.deliver, theme)
+        self.jobs = JobsTable(archive.jobs, theme)
+        self._cards = {name: Card(name) for name in ("Store", "Waiting for upload", "In the store", "Jobs")}
+        self._facts = {name: _value() for name in ("URL", "Service", "Keys", "Holds")}
+        self._icon, self.state = MarkIcon(theme), QLabel()
+        self.state.setWordWrap(True)
+        self._cards["Store"].body.addLayout(self._store())
+        self.waiting = QLabel()
+        self.waiting.setWordWrap(True)
+        self.waiting.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.upload = QPushButton("Upload now")
+        self.upload.setObjectName("primary")
+        self.upload.setToolTip(
+            "Everything that was recorded until now, without waiting for the batch to be full"
+        )
+        self.upload.clicked.connect(self._upload)
+        self._cards["Waiting for upload"].body.addWidget(self.waiting, 1)
+        self._cards["Waiting for upload"].body.addWidget(self.upload)
+        self.hint = QLabel(NO_STORE)
+        self.hint.setObjectName("dim")
+        self.hint.setWordWrap(True)
+        self._cards["In the store"].body.addWidget(self.hint)
+        self._cards["In the store"].body.addWidget(self.browser, 1)
+        self._cards["In the store"].body.addLayout(self._actions())
+        self._cards["Jobs"].body.addWidget(self.jobs)
+        top = QHBoxLayout()
+        top.addWidget(self._cards["Store"], 3)
+        top.addWidget(self._cards["Waiting for upload"], 2)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 8)
+        everything.addLayout(top)
+        everything.addWidget(self._cards["In the store"], 3)
+        everything.addWidget(self._cards["Jobs"], 2)
+
+    def refresh(self) -> None:
+        """Look again where it is time, and show how it is."""
+        self._frame += 1
+        if self._frame % SLOW != 1:
+            return
+        self._archive.library.look()
+        self._refresh_store()
+        self._refresh_waiting()
+        self.browser.refresh()
+        self.jobs.refresh()
+        count = under_way(self._archive.jobs.jobs)
+        self._cards["Jobs"].set_note(f"{count} under way" if count else "none under way")
+
+    # --- how it is put together
+
+    def _store(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setColumnStretch(1, 1)
+        row = QHBoxLayout()
+        row.addWidget(self._icon)
+        row.addWidget(self.state, 1)
+        again = QPushButton("Look again")
+        again.clicked.connect(lambda: self._archive.library.look(now=True))
+        row.addWidget(again)
+        grid.addLayout(row, 0, 0, 1, 2)
+        for place, (name, value) in enumerate(self._facts.items(), 1):
+            title = QLabel(name)
+            title.setObjectName("dim")
+            grid.addWidget(title, place, 0)
+            grid.addWidget(value, place, 1)
+        url = self._archive.settings.store.url
+        told = {"URL": url, "Service": endpoint_told(url), "Keys": keys_told(url)}
+        for name, text in told.items():
+            self._facts[name].setText(text)
+        return grid
+
+    def _actions(self) -> QHBoxLayout:
+        self.verify, self.download = QPushButton("Verify"), QPushButton("Download")
+        menu = QMenu(self.verify)
+        menu.addAction("Every file is there and whole").triggered.connect(lambda: self._verify(deep=False))
+        menu.addAction("Every value can be read").triggered.connect(lambda: self._verify(deep=True))
+        self.verify.setMenu(menu)
+        menu = QMenu(self.download)
+        menu.addAction("The whole store …").triggered.connect(lambda: self._ask(()))
+        menu.addAction("The chosen recording …").triggered.connect(self._ask_chosen)
+        self.download.setMenu(menu)
+        self.download.setToolTip(
+            "Into a folder, which is a store then; interrupted, it goes on where it ended"
+        )
+        row = QHBoxLayout()
+        row.addStretch(1)
+        row.addWidget(self.verify)
+        row.addWidget(self.download)
+        return row
+
+    # --- what is shown
+
+    def _refresh_store(self) -> None:
+        library = self._archive.library
+        found = library.found
+        mark, text = self._reached()
+        self._icon.show_mark(mark)
+        set_text(self.state, text)
+        stored = sum(session.uploaded for session in found.sessions)
+        set_text(self._facts["Holds"], f"{size(found.size_bytes)}; recordings: {stored}")
+        self.hint.setVisible(found.is_empty)
+        there = bool(found.usage)
+        self.verify.setEnabled(there)
+        self.download.setEnabled(there)
+
+    def _reached(self) -> tuple[Mark, str]:
+        library = self._archive.library
+        if library.looked_s is None:
+            return Mark("ring", "dim", "looking"), "Looking for the first time …"
+        age = age_text(time.monotonic() - library.looked_s)
+        if library.found.problem is not None:
+            return Mark(
+                "triangle", "warn", "away"
+            ), f"Not reached, tried again by itself: {library.found.problem}"
+        if library.found.is_empty:
+            return Mark("ring", "dim", "empty"), f"There is no store at this URL yet (looked {age} ago)"
+        return Mark("disc", "good", "reached"), f"Reached; looked {age} ago"
+
+    def _refresh_waiting(self) -> None:
+        report = self._recording.report
+        busy = under_way([job for job in self._archive.jobs.jobs if job.name == UPLOAD])
+        self.upload.setEnabled(not busy)
+        if report is None:
+            folder = self._archive.settings.recorder.spool
+            set_text(self.waiting, f"{self._recording.said(None).text}. The spool is {folder}.")
+            return
+        uploader = report.uploader
+        lines = [
+            f"{uploader.waiting} batches wait, {size(uploader.backlog_bytes)} with what is being recorded",
+            f"{uploader.uploaded} uploaded since recording began",
+            f"spool {report.spool}, {size(report.disk_free_bytes)} free on its disk",
+        ]
+        if uploader.problem is not None:
+            lines.insert(0, f"▲ It is tried again by itself: {uploader.problem}")
+        lines += [f"▲ {alarm.text}" for alarm in report.recorder.alarms]
+        set_text(self.waiting, "\n".join(lines))
+
+    # --- what people do
+
+    def _upload(self) -> None:
+        if self._recording.can_ask:
+            self._recording.upload()
+        else:
+            self._archive.jobs.add(UPLOAD, upload(self._archive.settings))
+
+    def _verify(self, *, deep: bool) -> None:
+        self._archive.jobs.add(
+            "Verify every value" if deep else "Verify", check(self._archive.settings, deep=deep)
+        )
+
+    def _ask_chosen(self) -> None:
+        session = self._archive.chosen
+        if session is not None and session.uploaded:
+            self._ask((session,))
+
+    def _ask(self, wanted: Sequence[Session]) -> None:
+        """A dialog that is not modal: nothing stands in the way of STOP."""
+        dialog = QFileDialog(self, "Download into a folder")
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setModal(False)
+        dialog.fileSelected.connect(lambda chosen: self.download_to(Path(chosen), wanted))
+        dialog.show()
+
+    def download_to(self, folder: Path, wanted: Sequence[Session]) -> None:
+        """The store, or these sessions of it, in the background."""
+        what = wanted[0].session if wanted else "the store"
+        self._archive.jobs.add(f"Download {what}", download(self._archive.settings.store.url, folder, wanted))
+
+
+def _value() -> QLabel:
+    label = QLabel()
+    label.setWordWrap(True)
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+    return label

@@ -1,0 +1,188 @@
+"""One recording in the views of a robot, marked as what it is: play, jump, choose a span, label, export."""
+
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from server_gui.core.cloud.chosen import Choice
+from server_gui.core.cloud.tape import as_time
+from server_gui.core.cloud.work import FORMATS, export
+from server_gui.core.desk.archive import Archive
+from server_gui.core.desk.playback import SPEEDS
+from server_gui.views.overview import Overview
+from server_gui.views.recordings.label_bar import LabelBar
+from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
+from server_gui.views.signals import Signals
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.scrolled import scrolled
+
+SLOW: Final = 5  # frames between two looks at what people read
+
+
+class Player(QWidget):
+    """Of the archive's playback; `left` when somebody wants back to the list."""
+
+    left = Signal()
+
+    def __init__(self, archive: Archive, theme: Theme) -> None:
+        super().__init__()
+        self._archive = archive
+        self._playback = archive.playback
+        self._frame = 0
+        self._views = (Overview(self._playback.desk, theme), Signals(self._playback.desk, theme))
+        self._stack = QStackedWidget()
+        for view in self._views:
+            self._stack.addWidget(scrolled(view))
+        self.banner = QLabel()
+        self.banner.setObjectName("banner")
+        self.banner.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.timeline = Timeline(theme)
+        self.timeline.moved.connect(self._playback.seek)
+        self.timeline.toggled.connect(self._toggle)
+        self.labels = LabelBar(archive.labels, self.timeline, theme)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 8)
+        everything.setSpacing(6)
+        everything.addLayout(self._head())
+        everything.addWidget(self._stack, 1)
+        everything.addWidget(self.timeline)
+        everything.addLayout(self._transport())
+        everything.addWidget(self.labels)
+
+    def show_tape(self) -> None:
+        """The playback has another recording."""
+        if self._playback.tape is not None:
+            self.timeline.show_tape(self._playback.tape)
+            self.timeline.setFocus()
+            self._speed.setCurrentIndex(SPEEDS.index(self._playback.speed))
+
+    def refresh(self) -> None:
+        """A frame: go on playing, and draw."""
+        playback = self._playback
+        playback.step()
+        if playback.tape is None:
+            return
+        self._views[self._stack.currentIndex()].refresh()
+        self.timeline.show_position(playback.position_ns)
+        self._frame += 1
+        if self._frame % SLOW == 1:
+            self._refresh_words()
+
+    # --- how it is put together
+
+    def _head(self) -> QHBoxLayout:
+        back = QPushButton("← All recordings")
+        back.clicked.connect(self._back)
+        row = QHBoxLayout()
+        row.addWidget(back)
+        row.addWidget(self.banner, 1)
+        self._choice = QButtonGroup(self)
+        for place, name in enumerate(("Overview", "Signals")):
+            button = QPushButton(name)
+            button.setCheckable(True)
+            button.setChecked(place == 0)
+            button.setAccessibleName(f"{name} of the recording")
+            self._choice.addButton(button, place)
+            row.addWidget(button)
+        self._choice.idClicked.connect(self._stack.setCurrentIndex)
+        return row
+
+    def _transport(self) -> QHBoxLayout:
+        self.play = QPushButton("Play")
+        self.play.clicked.connect(self._toggle)
+        self._speed = QComboBox()
+        self._speed.addItems([f"{speed:g} ×" for speed in SPEEDS])
+        self._speed.setAccessibleName("Speed of the playback")
+        self._speed.currentIndexChanged.connect(self._set_speed)
+        self.place = QLabel()
+        self.export = QPushButton("Export")
+        menu = QMenu(self.export)
+        for kind in FORMATS:
+            menu.addAction(f"{kind.upper()} …").triggered.connect(lambda _=False, kind=kind: self._ask(kind))
+        self.export.setMenu(menu)
+        self.export.setToolTip("The chosen span, or all of it, as a file; made in the background")
+        row = QHBoxLayout()
+        for widget in (self.play, self._speed, self.place):
+            row.addWidget(widget)
+        row.addStretch(1)
+        row.addWidget(self.export)
+        return row
+
+    # --- what is read
+
+    def _refresh_words(self) -> None:
+        playback, tape = self._playback, self._playback.tape
+        if tape is None:
+            return
+        self._tone("bad" if playback.problem else "")
+        set_text(self.banner, self._title())
+        self.banner.setToolTip(self.banner.text())
+        text = "Pause" if playback.playing else "Play"
+        if self.play.text() != text:
+            self.play.setText(text)
+        since, length = ((at - tape.first_ns) / SECOND_NS for at in (playback.position_ns, tape.last_ns))
+        set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}")
+        self.labels.refresh(tape)
+
+    def _title(self) -> str:
+        playback, tape = self._playback, self._playback.tape
+        if tape is None:
+            return ""
+        what = f"▶ PLAYBACK, not live: {tape.session.robot}, {day_text(playback.position_ns)}"
+        if playback.problem:
+            return f"{what}. It cannot be read: {playback.problem}"
+        return f"{what} · reading …" if playback.is_loading else what
+
+    def _tone(self, tone: str) -> None:
+        if self.banner.property("tone") != tone:
+            self.banner.setProperty("tone", tone)
+            self.banner.style().polish(self.banner)
+
+    # --- what people do
+
+    def _toggle(self) -> None:
+        self._playback.play(on=not self._playback.playing)
+
+    def _set_speed(self, place: int) -> None:
+        self._playback.speed = SPEEDS[place]
+
+    def _back(self) -> None:
+        self._playback.close()
+        self.left.emit()
+
+    def _ask(self, kind: str) -> None:
+        """A file dialog that is not modal: nothing stands in the way of STOP."""
+        tape = self._playback.tape
+        if tape is None:
+            return
+        name = f"{tape.session.session}.{kind}"
+        dialog = QFileDialog(self, f"Export as {kind.upper()}", name, f"{kind.upper()} (*.{kind})")
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix(kind)
+        dialog.setModal(False)
+        dialog.fileSelected.connect(lambda chosen: self.export_to(kind, Path(chosen)))
+        dialog.show()
+
+    def export_to(self, kind: str, file: Path) -> None:
+        """The chosen span, or all of it, in the background."""
+        tape, span = self._playback.tape, self.timeline.span_ns
+        if tape is None:
+            return
+        begin, end = (None, None) if span is None else map(as_time, span)
+        work = export(self._archive.settings.store, tape.session, Choice(begin=begin, end=end), kind, file)
+        self._archive.jobs.add(f"Export {file.name}", work)

@@ -1,0 +1,291 @@
+"""Every recorded session, newest first: what is known of it, what happened in it; to be played."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any, Final
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSortFilterProxyModel,
+    Qt,
+    Signal,
+)
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QSplitter,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gateway.cli.text import size
+from ml.store.labels import utc_ns
+from ml.store.sessions import Session
+from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.archive import Archive
+from server_gui.core.desk.recording import Recording
+from server_gui.views.recordings.timeline import SECOND_NS, clock_text
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card, set_text
+
+Index = QModelIndex | QPersistentModelIndex
+TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator", "Notes")
+NUMBERS: Final = frozenset({2, 3, 4})
+SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
+EMPTY: Final = (
+    "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
+    "add a robot at the left, and its session appears here within seconds."
+)
+EVENTS_TOLD: Final = 200
+
+
+class SessionModel(QAbstractTableModel):
+    """A row a session."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.sessions: tuple[Session, ...] = ()
+
+    def show_sessions(self, sessions: tuple[Session, ...]) -> None:
+        """These, from now on; where they are the same ones, rows change in their place."""
+        names = [(each.robot, each.session) for each in sessions]
+        if names == [(each.robot, each.session) for each in self.sessions]:
+            self.sessions = sessions
+            if sessions:
+                self.dataChanged.emit(self.index(0, 0), self.index(len(sessions) - 1, len(TITLES) - 1))
+            return
+        self.beginResetModel()
+        self.sessions = sessions
+        self.endResetModel()
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
+        return 0 if parent.isValid() else len(self.sessions)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
+        return len(TITLES)
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
+        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return TITLES[section]
+        return None
+
+    def data(self, index: Index, role: int = 0) -> Any:
+        session, column = self.sessions[index.row()], index.column()
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return _cells(session)[column]
+            case _ if role == SORT_ROLE:
+                return _keys(session)[column]
+            case Qt.ItemDataRole.ToolTipRole:
+                return session.session
+            case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
+                return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            case Qt.ItemDataRole.FontRole if column in NUMBERS:
+                return self._theme.number_font()
+        return None
+
+
+class SessionsPage(QWidget):
+    """`played` when the chosen session is to be played."""
+
+    played = Signal()
+
+    def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
+        super().__init__()
+        self._archive = archive
+        self._recording = recording
+        self._theme = theme
+        self._revision = -1
+        self._told: object = None
+        self.sessions = SessionModel(theme)
+        self.table = self._table()
+        self.words = QLineEdit()
+        self.words.setPlaceholderText("Filter recordings: robot, operator, notes, day")
+        self.words.setAccessibleName("Filter of the recordings")
+        self.words.setClearButtonEnabled(True)
+        self.words.textChanged.connect(self._filter.setFilterFixedString)
+        self.said = QLabel()
+        self.said.setWordWrap(True)
+        self.said.setObjectName("dim")
+        self.play = QPushButton("Play")
+        self.play.setObjectName("primary")
+        self.play.clicked.connect(self.played)
+        self.details = QPlainTextEdit(readOnly=True)
+        self.details.setAccessibleName("What is known of the chosen recording")
+        self._card = Card("Recording")
+        self._card.body.addWidget(self.details, 1)
+        self._card.body.addWidget(self.play)
+        self._list = Card("Recordings")
+        self._list.body.addWidget(self.words)
+        self._list.body.addWidget(self.said)
+        self._list.body.addWidget(self.table, 1)
+        split = QSplitter()
+        split.addWidget(self._list)
+        split.addWidget(self._card)
+        split.setStretchFactor(0, 3)
+        split.setStretchFactor(1, 2)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 8)
+        everything.addLayout(self._mark_row())
+        everything.addWidget(split, 1)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def refresh(self) -> None:
+        """Look again where it is time, and show what there is."""
+        library = self._archive.library
+        library.look()
+        if library.revision != self._revision:
+            self._revision = library.revision
+            self.sessions.show_sessions(library.found.sessions)
+        set_text(self.said, self._state())
+        self.said.setVisible(bool(self.said.text()))
+        count = len(library.found.sessions)
+        counted = "1 session" if count == 1 else f"{count} sessions"
+        self._list.set_note(counted if library.revision else "looking …")
+        self.mark.setEnabled(self._recording.can_ask)
+        self._refresh_details()
+
+    @property
+    def chosen(self) -> Session | None:
+        """The session that is chosen in the table."""
+        rows = self.table.selectionModel().selectedRows()
+        return self.sessions.sessions[self._filter.mapToSource(rows[0]).row()] if rows else None
+
+    def _state(self) -> str:
+        library = self._archive.library
+        if library.found.problem is not None:
+            return f"The store is not reached, it is tried again: {library.found.problem}"
+        return EMPTY if library.revision and not library.found.sessions else ""
+
+    def _refresh_details(self) -> None:
+        archive, session = self._archive, self.chosen
+        self.play.setEnabled(archive.tape is not None)
+        known = (session, archive.tape, archive.problem)
+        if known != self._told:
+            self._told = known
+            self._card.set_title("Recording" if session is None else session.session)
+            self.details.setPlainText(_told(session, archive.tape, archive.problem))
+
+    # --- how it is put together
+
+    def _table(self) -> QTableView:
+        self._filter = QSortFilterProxyModel()
+        self._filter.setSourceModel(self.sessions)
+        self._filter.setSortRole(SORT_ROLE)
+        self._filter.setFilterKeyColumn(-1)
+        self._filter.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        table = QTableView()
+        table.setModel(self._filter)
+        table.setSortingEnabled(True)
+        table.sortByColumn(0, Qt.SortOrder.DescendingOrder)
+        table.setAccessibleName("Recordings")
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        table.setTabKeyNavigation(False)
+        table.setShowGrid(False)
+        table.setAlternatingRowColors(True)
+        table.setWordWrap(False)
+        table.verticalHeader().hide()
+        table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        table.horizontalHeader().setStretchLastSection(True)
+        table.selectionModel().selectionChanged.connect(lambda *_: self._archive.choose(self.chosen))
+        table.activated.connect(lambda _: self.play.click())
+        return table
+
+    def _mark_row(self) -> QHBoxLayout:
+        self.mark = QLineEdit()
+        self.mark.setPlaceholderText("Mark this instant in every robot's recording: what happens?")
+        self.mark.setAccessibleName("Text of a mark at this instant")
+        self.mark.returnPressed.connect(self._mark)
+        button = QPushButton("Mark now")
+        button.clicked.connect(self._mark)
+        row = QHBoxLayout()
+        row.addWidget(self.mark, 1)
+        row.addWidget(button)
+        return row
+
+    def _mark(self) -> None:
+        text = self.mark.text().strip()
+        if text:
+            self._recording.mark(text)
+            self.mark.clear()
+
+    def _restyle(self) -> None:
+        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(21))
+        self.details.setMinimumWidth(self._theme.px(220))
+
+
+def _cells(session: Session) -> tuple[str, ...]:
+    return (
+        _when(session.began or session.first),
+        session.robot,
+        clock_text(session.length.total_seconds()) if session.rows else "–",
+        f"{session.rows:,}" if session.rows else "–",
+        size(session.size_bytes) if session.rows else "–",
+        _state(session),
+        session.operator,
+        session.notes,
+    )
+
+
+def _keys(session: Session) -> tuple[Any, ...]:
+    began = session.began or session.first
+    cells = _cells(session)
+    numbers = (session.length.total_seconds(), session.rows, session.size_bytes)
+    return (0.0 if began is None else began.timestamp(), cells[1], *numbers, *cells[5:])
+
+
+def _state(session: Session) -> str:
+    if not session.uploaded:
+        return "waits for upload"
+    return "goes on" if session.ended is None else "stored"
+
+
+def _when(time: datetime | None) -> str:
+    return "–" if time is None else f"{time.astimezone():%Y-%m-%d %H:%M:%S}"
+
+
+def _told(session: Session | None, tape: Tape | None, problem: str) -> str:
+    """What is known of it, as text."""
+    if session is None:
+        return "Choose a recording to see what is in it."
+    known = {
+        "Robot": session.robot,
+        "Began": _when(session.began),
+        "Ended": "it goes on, or its server was killed" if session.ended is None else _when(session.ended),
+        "Operator": session.operator,
+        "Notes": session.notes,
+        "Software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),
+    }
+    lines = [f"{name}: {value}" for name, value in known.items() if value]
+    if problem:
+        lines += ["", f"It cannot be played: {problem}"]
+    elif tape is None:
+        lines += ["", "looking into it …"]
+    else:
+        lines += ["", *_inside(tape)]
+    held = [f"{name} = {value:g}" for name, value in session.parameters.items() if value is not None]
+    return "\n".join([*lines, *(["", "Parameters when it began:", *held] if held else [])])
+
+
+def _inside(tape: Tape) -> list[str]:
+    length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
+    head = f"{length} of {len(tape.units)} channels"
+    if not tape.events:
+        return [head, "Nothing is missing in it, and nobody marked anything."]
+    return [head, "", *(_event(tape, row) for row in tape.events[:EVENTS_TOLD])]
+
+
+def _event(tape: Tape, row: Mapping[str, Any]) -> str:
+    at = clock_text(max(utc_ns(row["utc"]) - tape.first_ns, 0) / SECOND_NS, 1)
+    return f"{at}  {'◆' if row['kind'] == 'marker' else '▲'} {row['kind']}: {row['text']}"

@@ -1,0 +1,227 @@
+"""The whole of a recording as a bar: where it is played, what happened when, its labels, the chosen span."""
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from ml.store.labels import Label, utc_ns
+from server_gui.core.cloud.tape import Tape
+from server_gui.core.recording.gathering import EventKind
+from server_gui.views.marks import Mark, draw
+from server_gui.views.theme import Theme
+
+SECOND_NS: Final = 1_000_000_000
+STEPS: Final = {
+    Qt.Key.Key_Left: -1.0,
+    Qt.Key.Key_Right: 1.0,
+    Qt.Key.Key_PageUp: -10.0,
+    Qt.Key.Key_PageDown: 10.0,
+}
+TICKS_S: Final = (1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 43200, 86400)
+# Paul Tol's light scheme, for labels: no two of them alike to those who see fewer colours.
+HUES: Final = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99", "#bbcc33", "#aaaa00")
+MARKER: Final = Mark("diamond", "accent", "marker")
+MISSING: Final = Mark("triangle", "warn", "something is missing")
+
+
+class Timeline(QWidget):
+    """`moved` brings the instant that was asked for, `chosen` begin and end of a span: UTC in ns."""
+
+    moved = Signal(object)
+    chosen = Signal(object, object)
+    toggled = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._tape: Tape | None = None
+        self._position_ns = 0
+        self._labels: Sequence[Label] = ()
+        self._dragged_from_ns: int | None = None
+        self.span_ns: tuple[int, int] | None = None
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Time of the recording")
+        self.setToolTip(
+            "Click or drag to jump; Shift and drag to choose a span.\n"
+            "Arrows: 1 s, Page: 10 s, Home, End; I and O: the span begins, ends here; Space: play"
+        )
+        theme.changed.connect(self.updateGeometry)
+
+    def sizeHint(self) -> QSize:
+        return QSize(400, self._theme.px(66))
+
+    def show_tape(self, tape: Tape) -> None:
+        """Another recording."""
+        self._tape, self._labels, self.span_ns = tape, (), None
+        self.show_position(tape.first_ns)
+
+    def show_position(self, position_ns: int) -> None:
+        """Where it is played."""
+        if position_ns != self._position_ns:
+            self._position_ns = position_ns
+            self.setAccessibleDescription(clock_text(self._since_s(position_ns)))
+            self.update()
+
+    def show_labels(self, labels: Sequence[Label]) -> None:
+        """What somebody says of it."""
+        self._labels = labels
+        self.update()
+
+    def choose(self, begin_ns: int, end_ns: int) -> None:
+        """Choose a span."""
+        self.span_ns = (min(begin_ns, end_ns), max(begin_ns, end_ns))
+        self.chosen.emit(*self.span_ns)
+        self.update()
+
+    def begin_span(self) -> None:
+        """The span begins where it is played."""
+        if self._tape is not None:
+            end_ns = self._tape.last_ns if self.span_ns is None else self.span_ns[1]
+            self.choose(self._position_ns, max(end_ns, self._position_ns))
+
+    def end_span(self) -> None:
+        """The span ends where it is played."""
+        if self._tape is not None:
+            begin_ns = self._tape.first_ns if self.span_ns is None else self.span_ns[0]
+            self.choose(min(begin_ns, self._position_ns), self._position_ns)
+
+    def choose_all(self) -> None:
+        """The span is the whole recording."""
+        if self._tape is not None:
+            self.choose(self._tape.first_ns, self._tape.last_ns)
+
+    # --- what people do
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if self._tape is not None and event.button() is Qt.MouseButton.LeftButton:
+            at_ns = self._instant(event.position().x())
+            shifted = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+            self._dragged_from_ns = at_ns if shifted else None
+            self.moved.emit(at_ns)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._tape is None or not event.buttons() & Qt.MouseButton.LeftButton:
+            return
+        at_ns = self._instant(event.position().x())
+        if self._dragged_from_ns is not None:
+            self.choose(self._dragged_from_ns, at_ns)
+        self.moved.emit(at_ns)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        tape, key = self._tape, Qt.Key(event.key())
+        if tape is None or event.modifiers():
+            super().keyPressEvent(event)
+            return
+        ends = {Qt.Key.Key_Home: tape.first_ns, Qt.Key.Key_End: tape.last_ns}
+        actions: dict[Qt.Key, Callable[[], None]] = {
+            Qt.Key.Key_I: self.begin_span,
+            Qt.Key.Key_O: self.end_span,
+            Qt.Key.Key_Space: self.toggled.emit,
+        }
+        if key in STEPS:
+            self.moved.emit(self._position_ns + round(STEPS[key] * SECOND_NS))
+        elif key in ends:
+            self.moved.emit(ends[key])
+        elif key in actions:
+            actions[key]()
+        else:
+            super().keyPressEvent(event)
+
+    # --- how it is drawn
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self._tape is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        bar = self._bar()
+        painter.fillRect(bar, self._theme.colour("field"))
+        self._draw_span(painter, bar)
+        self._draw_labels(painter, bar)
+        painter.setPen(self._theme.colour("accent" if self.hasFocus() else "border"))
+        painter.drawRect(bar)
+        self._draw_ticks(painter, bar)
+        for happened in self._tape.events:
+            self._draw_event(painter, bar, happened)
+        x = self._x(self._position_ns)
+        painter.setPen(QPen(self._theme.colour("text"), 2))
+        painter.drawLine(QPointF(x, 0), QPointF(x, bar.bottom() + 2))
+        painter.end()
+
+    def _draw_span(self, painter: QPainter, bar: QRectF) -> None:
+        if self.span_ns is not None:
+            left, right = map(self._x, self.span_ns)
+            colour = self._theme.colour("accent")
+            colour.setAlpha(70)
+            painter.fillRect(QRectF(left, bar.top(), max(right - left, 2.0), bar.height()), colour)
+
+    def _draw_labels(self, painter: QPainter, bar: QRectF) -> None:
+        painter.setFont(self._theme.text_font(0.85))
+        names = sorted({label.label for label in self._labels})
+        for label in self._labels:
+            left, right = self._x(label.began_utc_ns), self._x(label.ended_utc_ns)
+            box = QRectF(left, bar.center().y(), max(right - left, 2.0), bar.height() / 2)
+            painter.fillRect(box, QColor(HUES[names.index(label.label) % len(HUES)]))
+            painter.setPen(QColor("#101010"))
+            painter.drawText(box.adjusted(3, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, label.label)
+
+    def _draw_ticks(self, painter: QPainter, bar: QRectF) -> None:
+        if self._tape is None:
+            return
+        painter.setFont(self._theme.text_font(0.8))
+        painter.setPen(self._theme.colour("dim"))
+        seconds = max((self._tape.last_ns - self._tape.first_ns) / SECOND_NS, 1e-3)
+        room = max(bar.width() / self._theme.px(60), 1.0)
+        step = next((tick for tick in TICKS_S if seconds / tick <= room), TICKS_S[-1])
+        for tick in range(0, int(seconds) + 1, step):
+            x = self._x(self._tape.first_ns + tick * SECOND_NS)
+            painter.drawLine(QPointF(x, bar.bottom()), QPointF(x, bar.bottom() + 4))
+            place = QRectF(x - self._theme.px(30), bar.bottom() + 4, self._theme.px(60), self._theme.px(14))
+            painter.drawText(place, Qt.AlignmentFlag.AlignCenter, clock_text(tick))
+
+    def _draw_event(self, painter: QPainter, bar: QRectF, happened: Mapping[str, Any]) -> None:
+        mark = MARKER if happened["kind"] == EventKind.MARKER.value else MISSING
+        side = float(self._theme.px(11))
+        x = self._x(utc_ns(happened["utc"]))
+        box = QRectF(x - side / 2, bar.top() - side - 1, side, side)
+        draw(painter, mark, self._theme.colour(mark.colour), box)
+
+    # --- where an instant is
+
+    def _bar(self) -> QRectF:
+        px = self._theme.px
+        return QRectF(px(16), px(13), max(self.width() - px(32), 1), px(32))
+
+    def _x(self, instant_ns: int) -> float:
+        if self._tape is None:
+            return 0.0
+        bar, length = self._bar(), max(self._tape.last_ns - self._tape.first_ns, 1)
+        return bar.left() + bar.width() * min(max((instant_ns - self._tape.first_ns) / length, 0.0), 1.0)
+
+    def _instant(self, x: float) -> int:
+        if self._tape is None:
+            return 0
+        bar = self._bar()
+        share = min(max((x - bar.left()) / bar.width(), 0.0), 1.0)
+        return self._tape.first_ns + round(share * (self._tape.last_ns - self._tape.first_ns))
+
+    def _since_s(self, instant_ns: int) -> float:
+        return 0.0 if self._tape is None else (instant_ns - self._tape.first_ns) / SECOND_NS
+
+
+def clock_text(seconds: float, digits: int = 0) -> str:
+    """Since the beginning: m:ss, or h:mm:ss."""
+    whole = int(seconds)
+    part = "" if not digits else f"{seconds - whole:.{digits}f}"[1:]
+    hours, minutes = divmod(whole // 60, 60)
+    return f"{hours}:{minutes:02}:{whole % 60:02}{part}" if hours else f"{minutes}:{whole % 60:02}{part}"
+
+
+def day_text(instant_ns: int) -> str:
+    """A day and time of the clock on the wall here."""
+    return f"{datetime.fromtimestamp(instant_ns / 1e9, UTC).astimezone():%Y-%m-%d %H:%M:%S}"
