@@ -6,7 +6,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 TEXTS = ("0.42", "-1e9", "nan", "left", "192.0.2.7:7420", "12,5", "", "ü→", "0x6072")
 KEYS = (
@@ -42,7 +42,9 @@ class Monkey:
         )
 
     def act(self) -> None:
-        """One thing, in an open menu where there is one."""
+        """One thing, in an open menu where there is one; in no dialog that could change files of others."""
+        for dialog in self._window.findChildren(QFileDialog):
+            dialog.close()
         widget = QApplication.activePopupWidget() or self._anywhere()
         acts, shares = zip(*self._acts, strict=True)
         (act,) = self._random.choices(acts, shares)

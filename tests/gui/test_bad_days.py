@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QSettings
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
 
 from gateway.client import ConnectionState
 from gateway.messages import LayoutInfo
@@ -18,6 +18,7 @@ from server_gui.core.desk.news import NewsKind
 from server_gui.core.events import LinkChanged
 from server_gui.core.settings import ServerSettings, add_robots
 from server_gui.views.main_window import MainWindow
+from server_gui.views.widgets.files import ask_open, ask_save
 from tests.fake_robot import FakeRobot
 from tests.gui.fakes import HELD, Bench, described, looked, telemetry, walking
 from tests.gui.test_app import wait
@@ -155,13 +156,34 @@ def test_parameters_that_a_new_firmware_no_longer_has_go_with_what_was_to_be_wri
 def test_an_insole_that_nobody_describes_is_said_to_be_drawn_in_order(
     window: MainWindow, bench: Bench
 ) -> None:
-    bench.station.take([described(cells=7), walking(20, cells=7)])
+    bench.station.take([described(cells=7), walking(20, -HOUR_S, cells=7)])  # not stale within this test
     order = "7 cells in their order: the robot does not say where they are"
     shown(window, lambda: window.overview.notes[2].startswith(order), "said that nobody describes it")
     bench.station.take(
         [described(cells=7, layout=LayoutInfo("seven", [(0.03 * n, 0.0, 1e-3) for n in range(7)]))]
     )
     shown(window, lambda: window.overview.notes[2] == "7 cells, seven", "took the layout")
+
+
+def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tmp_path: Path) -> None:
+    path, chosen = tmp_path / "walk.csv", list[Path]()
+    path.write_text("before", encoding="utf-8")
+    dialogs = [
+        ask_save(window, "Export", "csv", chosen.append),
+        ask_open(window, "Open", ("csv",), chosen.append),
+    ]
+    assert not any(dialog.isModal() for dialog in dialogs)
+    assert all(dialog.testOption(QFileDialog.Option.ReadOnly) for dialog in dialogs), "Qt would ask, and wait"
+    dialogs[0].fileSelected.emit(str(path))
+    box = window.findChild(QMessageBox)
+    assert isinstance(box, QMessageBox)
+    assert box.isVisible()
+    assert QApplication.activeModalWidget() is None
+    assert chosen == []
+    box.buttons()[0].click()
+    assert chosen == [path]
+    for dialog in dialogs:
+        dialog.close()
 
 
 @pytest.mark.parametrize("kind", ["csv", "png"])

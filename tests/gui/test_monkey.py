@@ -121,6 +121,9 @@ def test_a_monkey_at_the_window_breaks_nothing_and_stop_stays_in_reach(
         left -= 1
         day.frame(left)
         window.refresh()
+        if QApplication.activeModalWidget() is not None:
+            raised.append(f"{monkey.last}: a modal dialog is in the way of STOP")
+            QApplication.activeModalWidget().close()
         if left > 0 and not raised:
             monkey.act()
 
@@ -130,7 +133,6 @@ def test_a_monkey_at_the_window_breaks_nothing_and_stop_stays_in_reach(
     timer.start()
     while left > 0 and not raised:
         QTest.qWait(1)
-        assert QApplication.activeModalWidget() is None, monkey.last
         assert window.header.stop.isVisible(), monkey.last
     timer.stop()
     while (popup := QApplication.activePopupWidget()) is not None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 
 def ask_open(
@@ -13,14 +13,14 @@ def ask_open(
 ) -> QFileDialog:
     """A file that is there, of these kinds (`toml`, `dcf`)."""
     dialog = _dialog(parent, title, kinds, done)
-    dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+    dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptOpen)
     dialog.show()
     return dialog
 
 
 def ask_save(parent: QWidget, title: str, kind: str, done: Callable[[Path], object]) -> QFileDialog:
     """A file to be written; whether one may be overwritten is asked."""
-    dialog = _dialog(parent, title, (kind,), done)
+    dialog = _dialog(parent, title, (kind,), lambda path: _unless_there(parent, path, done))
     dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
     dialog.setDefaultSuffix(kind)
     dialog.show()
@@ -45,5 +45,24 @@ def _dialog(parent: QWidget, title: str, kinds: Sequence[str], done: Callable[[P
     dialog = QFileDialog(parent, title, "", f"{' or '.join(kinds).upper()} ({patterns})")
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     dialog.setModal(False)
+    # What Qt itself would ask, of a file that is there or not, to be deleted or named anew, is modal.
+    dialog.setFileMode(QFileDialog.FileMode.AnyFile)
+    dialog.setOptions(QFileDialog.Option.DontConfirmOverwrite | QFileDialog.Option.ReadOnly)
     dialog.fileSelected.connect(lambda name: done(Path(name)))
     return dialog
+
+
+def _unless_there(parent: QWidget, path: Path, done: Callable[[Path], object]) -> None:
+    """Write at once, or ask first."""
+    if not path.exists():
+        done(path)
+        return
+    box = QMessageBox(
+        QMessageBox.Icon.Question, "Overwrite?", f"{path.name} is there already.", parent=parent
+    )
+    box.addButton("Overwrite", QMessageBox.ButtonRole.AcceptRole)
+    box.addButton(QMessageBox.StandardButton.Cancel)
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    box.setModal(False)
+    box.accepted.connect(lambda: done(path))
+    box.show()
