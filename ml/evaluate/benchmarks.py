@@ -5,18 +5,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from ml.evaluate import adapt, fall, phase, status, terrain
+from ml.evaluate import adapt, fall, phase, sim_activity, sim_falling, sim_phase, status, terrain
 from ml.evaluate.outcome import Goal, Outcome
+from ml.evaluate.sim import WHOLE, recipe_of
 from ml.features import Recipe
 from ml.features.falling import FALLING
 from ml.features.gait_phase import LEFT_PHASE
 from ml.features.gait_status import GAIT_STATUS
 from ml.features.terrain import TERRAIN
+from ml.robot.task import ACTIVITY, FALLING_TASK, GAIT_PHASE
 
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """One question to recordings of real people."""
+    """One question to recordings, of real people or, where it begins with `sim-`, of simulated ones."""
 
     name: str
     asks: str
@@ -71,6 +73,27 @@ BENCHMARKS: Final = {
             TERRAIN,
             terrain.evaluate,
             {"macro_f1": Goal(0.92), "sector_macro_f1": Goal(0.82)},
+        ),
+        Benchmark(
+            "sim-activity",
+            "synthetic: what simulated wearers do, 200 ms ago; folds of people",
+            recipe_of(ACTIVITY, WHOLE),
+            sim_activity.evaluate,
+            {},
+        ),
+        Benchmark(
+            "sim-phase",
+            "synthetic: where in the stride both legs are; folds of people",
+            recipe_of(GAIT_PHASE, WHOLE),
+            sim_phase.evaluate,
+            {},
+        ),
+        Benchmark(
+            "sim-falling",
+            "synthetic: an alarm before a fall's impact, and in a stumble; folds of people",
+            recipe_of(FALLING_TASK, WHOLE),
+            sim_falling.evaluate,
+            {},
         ),
     )
 }

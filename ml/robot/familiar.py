@@ -8,8 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from sklearn.cluster import MiniBatchKMeans
-from sklearn.decomposition import PCA
 
 from ml.robot.network import Rows
 
@@ -25,6 +23,9 @@ WITHIN: Final = 0.998  # of held-out rows lie within each distance
 
 def fitted(inputs: Rows, seed: int) -> Parts:
     """Components and prototypes of scaled rows: what `distances` needs."""
+    from sklearn.cluster import MiniBatchKMeans  # for learning alone
+    from sklearn.decomposition import PCA
+
     random = np.random.default_rng(seed)
     rows = inputs if len(inputs) <= FIT_ROWS else inputs[random.choice(len(inputs), FIT_ROWS, replace=False)]
     rows = np.clip(rows, -FARTHEST, FARTHEST)

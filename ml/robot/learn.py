@@ -33,6 +33,7 @@ TEMPERATURES: Final = np.geomspace(0.3, 6.0, 60)
 WITHIN: Final = 0.1  # of the cycle: what gait_phase's probability is about
 WANTED: Final = 0.97  # of what is said, that is right; the rest is why a model abstains
 MOST_ABSTAINED: Final = 0.1  # of what is decided
+LEAST_SURE: Final = 0.5  # what is as likely wrong as right is never said
 
 Groups = npt.NDArray[Any]
 Network = Callable[[], Any]
@@ -98,7 +99,7 @@ def _phases(
     trust = IsotonicRegression(y_min=0.0, y_max=1.0, out_of_bounds="clip").fit(lengths.min(axis=1), right)
     model |= {"length": trust.X_thresholds_, "trust": trust.y_thresholds_}
     sure = np.interp(lengths.min(axis=1), model["length"], model["trust"])
-    numbers = {"threshold": _threshold(sure[steps], right[steps]), **limits}
+    numbers = {"threshold": _threshold(sure, right), **limits}
     return Learned(task, recipe, (STRIDE,), model, numbers)
 
 
@@ -174,7 +175,7 @@ def _threshold(probability: Floats, right: npt.NDArray[np.bool_]) -> float:
     said = np.flatnonzero(share >= WANTED)
     least = int(len(order) * (1.0 - MOST_ABSTAINED))
     last = max(int(said[-1]) if len(said) else 0, least - 1)
-    return float(probability[order[min(last, len(order) - 1)]])
+    return max(LEAST_SURE, float(probability[order[min(last, len(order) - 1)]]))
 
 
 def _enough(what: str, count: int) -> None:

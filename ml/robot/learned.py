@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.features.recipe import Features, Recipe
-from ml.robot import checks, familiar
+from ml.robot import familiar
 from ml.robot.network import Rows, outputs
 from ml.robot.task import SIDES, TASKS, Task
 
@@ -65,7 +65,9 @@ class Learned:
     @classmethod
     def restored(cls, state: Mapping[str, Any]) -> "Learned":
         """What `state` says; raises `UnusableModel` where that is no model of ours."""
-        checks.check(state)
+        from ml.robot.checks import check  # brings scikit-learn, whose objects these are
+
+        check(state)
         task = TASKS[state["task"]]
         recipe = task.named(state["recipe"])
         return cls(task, recipe, tuple(state["classes"]), dict(state["parts"]), dict(state["numbers"]))

@@ -1,0 +1,112 @@
+"""What the `sim-*` benchmarks share: simulated people in folds, sensors that are missing, and noise.
+
+They are synthetic: they show what sensors can tell and what breaks it, not how well people are understood.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.errors import UnusableData
+from ml.evaluate import folds
+from ml.features.recipe import Recipe
+from ml.robot import simulated
+from ml.robot.groups import GROUPS, unit
+from ml.robot.simulated import Examples, Session
+from ml.robot.task import Task
+
+FOLDS: Final = 3
+MOST: Final = 24_000  # decisions that are learned from and judged: more say no more
+WHY: Final = (
+    "synthetic: simulated people (gwrms sim-record), judged by models that have not seen them. noise_… are"
+    " the same people with sensors of other noise, offsets and delays; no_… and only_… are robots that lack"
+    " some sensors."
+)
+SETTINGS: Final = "fixed in ml/robot/learn.py; --search looks for none"
+
+# By unit: the largest offset and the noise (standard deviation) that somebody else's sensor may have.
+_DISTURBED: Final = {"rad": (0.03, 0.005), "N": (20.0, 8.0), "m/s²": (0.3, 0.15), "rad/s": (0.02, 0.03)}
+_LATER: Final = 1  # rows by which insoles come behind: 10 ms
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Which sensors a robot has, and whether they are those that were learned from."""
+
+    name: str  # before the names of its figures; "" for the whole robot
+    groups: tuple[str, ...]
+    noisy: bool = False
+
+
+WHOLE: Final = Variant("", tuple(GROUPS))
+NOISE: Final = Variant("noise_", tuple(GROUPS), noisy=True)
+NO_FEET: Final = Variant("no_feet_", tuple(name for name in GROUPS if name != "feet"))
+NO_TRUNK: Final = Variant("no_trunk_", tuple(name for name in GROUPS if name != "trunk"))
+HIPS: Final = Variant("only_hips_", ("hips",))
+HIPS_TRUNK: Final = Variant("only_hips_trunk_", ("hips", "trunk"))
+
+
+def people(path: Path) -> list[Session]:
+    """The sessions of a file; raises `UnusableData` where they are those of fewer than three people."""
+    sessions = simulated.read(path)
+    count = len({session.subject for session in sessions})
+    if count < FOLDS:
+        raise UnusableData(
+            f"{path} holds {count} simulated people: {FOLDS} are needed (gwrms sim-record --subjects 1-12)"
+        )
+    return sessions
+
+
+def recipe_of(task: Task, variant: Variant) -> Recipe:
+    """The recipe of a robot with these sensors."""
+    recipe = task.recipe({channel for group in variant.groups for channel in GROUPS[group]})
+    if recipe is None:
+        raise UnusableData(f"{task.name} cannot be told from {', '.join(variant.groups)}")
+    return recipe
+
+
+def step_of(recipe: Recipe, sessions: Sequence[Session], least: int) -> int:
+    """Grid samples between decisions, at least `least`, so that there are at most `MOST`."""
+    seconds = sum(np.ptp(session.stamps_ns) / 1e9 for session in sessions)
+    return max(least, math.ceil(seconds * recipe.rate_hz / MOST))
+
+
+def disturbed(sessions: Sequence[Session]) -> list[Session]:
+    """The same people, with sensors that have offsets, noise and delays of their own."""
+    return [_disturbed(session, number) for number, session in enumerate(sessions)]
+
+
+def _disturbed(session: Session, number: int) -> Session:
+    random = np.random.default_rng(number)
+    values = session.values.copy()
+    for column, channel in enumerate(session.channels):
+        if channel not in _USED:
+            continue
+        offset, noise = _DISTURBED[unit(channel)]
+        values[:, column] += random.uniform(-offset, offset) + random.normal(0.0, noise, len(values))
+        if channel in GROUPS["feet"]:
+            values[_LATER:, column] = np.maximum(values[:-_LATER, column], 0.0)
+    return replace(session, values=values)
+
+
+_USED: Final = frozenset(channel for group in GROUPS.values() for channel in group)
+
+
+def examples_of(task: Task, variant: Variant, sessions: list[Session], least: int) -> Examples:
+    """Decisions of all people, as this robot's sensors have them."""
+    recipe = recipe_of(task, variant)
+    seen = disturbed(sessions) if variant.noisy else sessions
+    return simulated.examples(task, recipe, seen, step_of(recipe, sessions, least))
+
+
+def in_folds(subject: npt.NDArray[np.str_], work: Callable[[folds.Split], T]) -> list[tuple[folds.Split, T]]:
+    """`work` on each fold of people."""
+    splits = list(folds.grouped(subject, FOLDS))
+    return list(zip(splits, folds.over(work, splits), strict=True))

@@ -1,0 +1,137 @@
+"""`sim-activity`: what simulated wearers do, and whether a model knows what it does not know."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.evaluate import metrics
+from ml.evaluate.folds import Split
+from ml.evaluate.outcome import Outcome
+from ml.evaluate.search import Search
+from ml.evaluate.sim import (
+    HIPS_TRUNK,
+    NO_FEET,
+    NO_TRUNK,
+    NOISE,
+    SETTINGS,
+    WHOLE,
+    WHY,
+    Variant,
+    examples_of,
+    in_folds,
+    people,
+    recipe_of,
+)
+from ml.registry.judged import calibrated
+from ml.robot.learn import learn
+from ml.robot.learned import NONE, STRANGE
+from ml.robot.simulated import LOST, Examples
+from ml.robot.task import ACTIVITY
+
+STEP: Final = 10  # grid samples: 200 ms
+NEAR_NS: Final = 500_000_000  # around a change that is not steady
+VARIANTS: Final = (NO_FEET, NO_TRUNK, HIPS_TRUNK)
+OTHER: Final = -1  # the truth of what is no class
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What was said of people that were not learned from; arrays have a row each."""
+
+    classes: tuple[str, ...]
+    truth: npt.NDArray[np.int_]  # index into the classes, or OTHER
+    probabilities: npt.NDArray[np.float64]
+    label: npt.NDArray[np.int_]
+    novelty: npt.NDArray[np.float64]
+
+    @property
+    def known(self) -> npt.NDArray[np.bool_]:
+        known: npt.NDArray[np.bool_] = self.truth != OTHER
+        return known
+
+    @property
+    def likeliest(self) -> npt.NDArray[np.int_]:
+        likeliest: npt.NDArray[np.int_] = self.probabilities.argmax(axis=1)
+        return likeliest
+
+    def macro_f1(self, rows: npt.NDArray[np.bool_]) -> float:
+        rows = rows & self.known
+        return metrics.macro_f1(self.truth[rows], self.likeliest[rows], len(self.classes))
+
+
+def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
+    """Folds of people, by people; then robots that lack sensors, and other people's noise."""
+    sessions = people(path)
+    whole = examples_of(ACTIVITY, WHOLE, sessions, STEP)
+    judged = _judged(WHOLE, whole, whole)
+    others = {NOISE.name: _judged(WHOLE, whole, examples_of(ACTIVITY, NOISE, sessions, STEP))}
+    for variant in VARIANTS:
+        seen = examples_of(ACTIVITY, variant, sessions, STEP)
+        others[variant.name] = _judged(variant, seen, seen)
+    everything = np.ones(len(whole.subject), dtype=bool)
+    figures = _figures(judged, whole)
+    figures |= {f"{name}macro_f1": one.macro_f1(everything) for name, one in others.items()}
+    by_subject = {
+        str(one): {"macro_f1": judged.macro_f1(whole.subject == one)} for one in np.unique(whole.subject)
+    }
+    figures["worst_subject_macro_f1"] = min(one["macro_f1"] for one in by_subject.values())
+    counts = metrics.confusion(
+        judged.truth[judged.known], judged.likeliest[judged.known], len(judged.classes)
+    )
+    return Outcome(figures, len(by_subject), by_subject, "subject", judged.classes, counts, SETTINGS, (WHY,))
+
+
+def _judged(variant: Variant, taught: Examples, seen: Examples) -> Judged:
+    """Learn from some people's rows of `taught`, judge the other people's of `seen`, by turns."""
+    recipe = recipe_of(ACTIVITY, variant)
+    names = np.array([ACTIVITY.fold.get(label, "") for label in taught.label])
+
+    def fold(split: Split) -> tuple[Any, ...]:
+        train, held_out = split
+        learned = learn(ACTIVITY, recipe, taught.features[train], names[train], taught.subject[train])
+        said = learned.judge(seen.features[held_out])
+        return learned.classes, said.probabilities, said.label, said.novelty
+
+    classes = ACTIVITY.classes(recipe)
+    place = {name: number for number, name in enumerate(classes)}
+    truth = np.array([place.get(name, OTHER) for name in names])
+    probabilities = np.zeros((len(truth), len(classes)))
+    label, novelty = np.full(len(truth), NONE), np.zeros(len(truth))
+    for (_, held_out), (told, likely, said, strange) in in_folds(taught.subject, fold):
+        columns = np.array([place[name] for name in told])
+        probabilities[np.ix_(held_out, columns)] = likely
+        label[held_out] = np.where(said == NONE, NONE, columns[said])
+        novelty[held_out] = strange
+    return Judged(classes, truth, probabilities, label, novelty)
+
+
+def _figures(judged: Judged, seen: Examples) -> dict[str, float]:
+    known, said = judged.known, judged.label != NONE
+    right = judged.likeliest == judged.truth
+    strange = judged.novelty >= STRANGE
+    lost = np.isin(seen.label, list(LOST))
+    bins = calibrated(judged.probabilities[known], judged.truth[known])
+    return {
+        "macro_f1": judged.macro_f1(known),
+        "worst_subject_macro_f1": float("nan"),
+        "steady_macro_f1": judged.macro_f1(_steady(seen)),
+        "accuracy": float(right[known].mean()),
+        "said_accuracy": float(right[known & said].mean()),
+        "unknown_fraction": float(1.0 - said[known].mean()),
+        "calibration_error": sum(abs(one.said - one.right) * one.count for one in bins) / int(known.sum()),
+        "abnormal_false_fraction": float(strange[known].mean()),
+        "abnormal_found_fraction": float(strange[lost].mean()) if lost.any() else float("nan"),
+    }
+
+
+def _steady(seen: Examples) -> npt.NDArray[np.bool_]:
+    """Decisions about moments that are no change's: those of one person in time's order."""
+    changes = np.flatnonzero((seen.label[1:] != seen.label[:-1]) | (seen.subject[1:] != seen.subject[:-1]))
+    steady = np.ones(len(seen.label), dtype=bool)
+    reach = max(1, round(NEAR_NS / float(np.median(np.diff(seen.time_ns)))))
+    for change in changes:
+        steady[max(change + 1 - reach, 0) : change + 1 + reach] = False
+    return steady
