@@ -4,6 +4,7 @@ A worker that dies has its sessions done again by another one. What travels ther
 in it: workers reach the store by their own environment (AWS_…).
 """
 
+import asyncio
 from collections.abc import Sequence
 
 from ml.errors import UnusableData
@@ -24,14 +25,22 @@ def extract(asks: Sequence[Ask], cluster: str = "") -> list[Part | LeftOut]:
 
 
 def _on(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:
-    from distributed import Client, KilledWorker
+    from distributed import KilledWorker
 
     try:
-        with Client(cluster, timeout=PATIENCE_S, set_as_default=False) as client:  # type: ignore[no-untyped-call]
-            # Not `pure`: the tables' rows are no part of what is asked.
-            found: list[Part | LeftOut] = client.gather(client.map(part, asks, pure=False))
+        return asyncio.run(_gathered(cluster, asks))
     except KilledWorker as error:
         raise UnusableData(f"the cluster at {cluster} gave up: its workers died again and again") from error
     except OSError as error:
         raise UnusableData(f"no Dask scheduler answers at {cluster}: {error}") from error
-    return found
+
+
+async def _gathered(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:
+    from distributed import Client
+
+    # In a loop of our own: otherwise a client that finds nobody leaves its thread behind.
+    made = Client(cluster, timeout=PATIENCE_S, set_as_default=False, asynchronous=True)  # type: ignore[no-untyped-call]
+    async with made as client:
+        # Not `pure`: the tables' rows are no part of what is asked.
+        found: list[Part | LeftOut] = await client.gather(client.map(part, asks, pure=False))
+        return found

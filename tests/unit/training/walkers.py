@@ -1,6 +1,6 @@
 """Recordings of made-up wearers in a store, with labels: small, quick, and told apart by their joints."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -90,19 +90,30 @@ def _records(made: Made, began: int) -> list[Record]:
 Motion = Callable[[npt.NDArray[np.float64], np.random.Generator], Samples]
 
 
-def walk(t: npt.NDArray[np.float64], random: np.random.Generator) -> Samples:
-    angle = 2 * np.pi * t / STRIDE_S
+def walk(t: npt.NDArray[np.float64], random: np.random.Generator, late: float = 0.0) -> Samples:
+    """`late`: by how much of a stride this wearer's legs are behind other people's when a heel strikes."""
+    angle = 2 * np.pi * (t / STRIDE_S - late)
     size = random.uniform(0.9, 1.1)
     legs = [(0.3 * np.cos(a), 0.5 + 0.4 * np.sin(a)) for a in (angle, angle + np.pi)]
     return size * np.stack([legs[0][0], legs[1][0], legs[0][1], legs[1][1]], axis=1)
 
 
 def stand(t: npt.NDArray[np.float64], random: np.random.Generator) -> Samples:
-    return np.tile(random.normal(0.05, 0.02, 4), (len(t), 1))
+    return _still(0.05, t, random)
 
 
 def sit(t: npt.NDArray[np.float64], random: np.random.Generator) -> Samples:
-    return np.tile(random.normal(1.5, 0.03, 4), (len(t), 1))
+    return _still(1.5, t, random)
+
+
+def _still(angle: float, t: npt.NDArray[np.float64], random: np.random.Generator) -> Samples:
+    """Nobody is a statue: it sways, now this way, now that."""
+    sway = np.sin(2 * np.pi * (random.uniform(0.1, 0.4, 4) * t[:, None] + random.uniform(0, 1, 4)))
+    return angle + 0.1 * sway
+
+
+def late_walk(t: npt.NDArray[np.float64], random: np.random.Generator) -> Samples:
+    return walk(t, random, late=0.1)
 
 
 MOTIONS: Final[dict[str, Motion]] = {"walk": walk, "stand": stand, "sit": sit}
@@ -116,11 +127,12 @@ def day(
     source: Source = Source.PERSON,
     wearer: str = "",
     strikes: bool = False,
+    motions: Mapping[str, Motion] = MOTIONS,
 ) -> Made:
     """Stretches of what they do, one after the other."""
     random = np.random.default_rng(seed)
     t = np.arange(int(each_s * HZ)) / HZ
-    parts = [MOTIONS[what](t, random) for what in order]
+    parts = [motions[what](t, random) for what in order]
     values = np.concatenate(parts) + random.normal(0.0, 0.01, (len(t) * len(order), 4))
     said = [(at * each_s, (at + 1) * each_s, what, source) for at, what in enumerate(order)]
     if strikes:

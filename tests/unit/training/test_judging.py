@@ -1,0 +1,122 @@
+"""Who may serve: better on people nobody knows, and nowhere much worse."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from ml.errors import UnusableData
+from ml.registry.card import ClassScore, Metrics
+from ml.robot.task import TASKS
+from ml.training.choosing import held_out, recipe_for
+from ml.training.judging import Judged, decide
+
+ACTIVITY, PHASE = TASKS["activity"], TASKS["gait_phase"]
+USUAL = Metrics(
+    figures={"macro_f1": 0.8, "abstained": 0.05, "idle": 0.2},
+    per_class={name: ClassScore(0.8, 0.8, 0.8, 100) for name in ("walk", "stand")},
+    per_subject={"ada": 0.8, "bob": 0.8},
+    calibration_error=0.03,
+)
+WALKING = Metrics(figures={"rmse_percent": 6.0, "abstained": 0.05, "idle": 28.9}, per_subject={"ada": 6.0})
+PEOPLE = {"ada": 100, "bob": 100}
+
+
+def judged(new: Metrics, serving: Metrics | None, name: str = "held-out people") -> Judged:
+    return Judged(name, 200, new, serving, PEOPLE)
+
+
+def better(metrics: Metrics = USUAL, **figures: float) -> Metrics:
+    return replace(metrics, figures=metrics.figures | {"macro_f1": 0.82, "rmse_percent": 5.5} | figures)
+
+
+def test_what_is_better_and_nowhere_much_worse_may_serve() -> None:
+    decision = decide(ACTIVITY, judged(better(), USUAL), judged(USUAL, USUAL, "regression set"))
+    assert decision.better
+    assert decision.why == ("macro_f1 on held-out people: 0.82, the serving model's 0.8",)
+
+
+def test_as_good_is_not_better() -> None:
+    decision = decide(ACTIVITY, judged(USUAL, USUAL), None)
+    assert not decision.better
+    assert "0.8: not better" in decision.why[0]
+
+
+WORSE_CLASS = {"walk": ClassScore(0.9, 0.9, 0.9, 100), "stand": ClassScore(0.7, 0.7, 0.7, 100)}
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        (replace(better(), per_class=WORSE_CLASS), "F1 of stand falls by 0.100"),
+        (replace(better(), per_subject={"ada": 0.9, "bob": 0.7}), "bob loses 0.1"),
+        (replace(better(), calibration_error=0.2), "calibration_error rises by 0.170"),
+        (better(abstained=0.4), "abstained rises by 0.350"),
+    ],
+)
+@pytest.mark.parametrize("where", ["held-out people", "regression set"])
+def test_much_worse_anywhere_is_enough_not_to_serve(new: Metrics, words: str, where: str) -> None:
+    people = judged(new if where == "held-out people" else better(), USUAL)
+    fixed = judged(new, USUAL, where) if where == "regression set" else None
+    decision = decide(ACTIVITY, people, fixed)
+    assert not decision.better
+    assert decision.why[1:] == (f"much worse in the {where}: {words}",)
+
+
+def test_few_decisions_are_no_reason() -> None:
+    rare = {name: replace(score, support=5) for name, score in WORSE_CLASS.items()}
+    new = replace(better(), per_class=rare, per_subject={"ada": 0.9, "bob": 0.1})
+    old = replace(
+        USUAL, per_class={name: replace(score, support=5) for name, score in USUAL.per_class.items()}
+    )
+    assert decide(ACTIVITY, Judged("held-out people", 105, new, old, {"ada": 100, "bob": 5}), None).better
+
+
+def test_of_a_phase_the_error_must_fall() -> None:
+    new = better(WALKING)
+    assert decide(PHASE, judged(new, WALKING), None).better
+    assert not decide(PHASE, judged(WALKING, new), None).better
+    worse = replace(new, per_subject={"ada": 8.0})
+    assert "ada loses 2 %" in decide(PHASE, judged(worse, WALKING), None).why[1]
+
+
+@pytest.mark.parametrize(("figures", "serves"), [({"macro_f1": 0.3}, True), ({"macro_f1": 0.2}, False)])
+def test_the_first_model_must_know_more_than_nothing(figures: Any, serves: bool) -> None:
+    decision = decide(ACTIVITY, judged(better(**figures), None), None)
+    assert decision.better is serves
+    assert "saying always the same has 0.2; nothing serves yet" in decision.why[0]
+
+
+def test_where_nothing_could_be_judged_nothing_is_promoted() -> None:
+    assert not decide(ACTIVITY, Judged("held-out people", 0, Metrics(), Metrics()), None).better
+
+
+def test_who_is_held_out_stays_so_when_others_come() -> None:
+    few = [f"P{number:02}" for number in range(12)]
+    held = held_out(few)
+    assert 1 <= len(held) <= 6
+    assert held <= held_out([*few, *(f"Q{number:02}" for number in range(12))])
+    assert held_out(few, ["P03"]) == {"P03"}
+
+
+@pytest.mark.parametrize(
+    ("groups", "wanted", "words"),
+    [
+        (["P1", "P2"], [], r"there are 2 wearers or sessions with labels \(P1, P2\): it takes two to learn"),
+        ([], [], r"with labels \(none\)"),
+        (["P1", "P2", "P3"], ["P1", "P2"], "it takes two to learn from and one to judge by"),
+        (["P1", "P2", "P3"], ["P9"], "nobody is called 'P9'; there are P1, P2, P3"),
+    ],
+)
+def test_too_few_people_are_said_so(groups: list[str], wanted: list[str], words: str) -> None:
+    with pytest.raises(UnusableData, match=words):
+        held_out(groups, wanted)
+
+
+def test_one_poor_robot_does_not_make_all_models_poor() -> None:
+    rich = {f"{side}_{joint}.position" for side in ("left", "right") for joint in ("hip", "knee", "ankle")}
+    poor = {name for name in rich if "ankle" not in name}
+    assert recipe_for(ACTIVITY, {"a": rich, "b": rich, "c": poor}).name == "activity/hips+knees+ankles"
+    assert recipe_for(ACTIVITY, {"a": rich, "b": poor, "c": poor}).name == "activity/hips+knees"
+    with pytest.raises(UnusableData, match="no session has the channels that activity takes"):
+        recipe_for(ACTIVITY, {"a": {"left_knee.position"}})
