@@ -7,7 +7,6 @@ from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QFileDialog,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -29,6 +28,7 @@ from server_gui.views.cloud.jobs_table import JobsTable, under_way
 from server_gui.views.marks import Mark, age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.files import ask_folder
 from server_gui.views.widgets.mark import MarkIcon
 
 SLOW: Final = 6  # frames between two looks
@@ -203,12 +203,7 @@ class Cloud(QWidget):
             self._ask((session,))
 
     def _ask(self, wanted: Sequence[Session]) -> None:
-        """A dialog that is not modal: nothing stands in the way of STOP."""
-        dialog = QFileDialog(self, "Download into a folder")
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setModal(False)
-        dialog.fileSelected.connect(lambda chosen: self.download_to(Path(chosen), wanted))
-        dialog.show()
+        ask_folder(self, "Download into a folder", lambda folder: self.download_to(folder, wanted))
 
     def download_to(self, folder: Path, wanted: Sequence[Session]) -> None:
         """The store, or these sessions of it, in the background."""

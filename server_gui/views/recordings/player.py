@@ -7,7 +7,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QMenu,
@@ -29,6 +28,7 @@ from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
 from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.scrolled import scrolled
 
 SLOW: Final = 5  # frames between two looks at what people read
@@ -166,17 +166,7 @@ class Player(QWidget):
         self.left.emit()
 
     def _ask(self, kind: str) -> None:
-        """A file dialog that is not modal: nothing stands in the way of STOP."""
-        tape = self._playback.tape
-        if tape is None:
-            return
-        name = f"{tape.session.session}.{kind}"
-        dialog = QFileDialog(self, f"Export as {kind.upper()}", name, f"{kind.upper()} (*.{kind})")
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix(kind)
-        dialog.setModal(False)
-        dialog.fileSelected.connect(lambda chosen: self.export_to(kind, Path(chosen)))
-        dialog.show()
+        ask_save(self, f"Export as {kind.upper()}", kind, lambda file: self.export_to(kind, file))
 
     def export_to(self, kind: str, file: Path) -> None:
         """The chosen span, or all of it, in the background."""

@@ -27,6 +27,15 @@ def ask_save(parent: QWidget, title: str, kind: str, done: Callable[[Path], obje
     return dialog
 
 
+def ask_folder(parent: QWidget, title: str, done: Callable[[Path], object]) -> QFileDialog:
+    """A folder, which may be a new one."""
+    dialog = _dialog(parent, title, (), done)
+    dialog.setFileMode(QFileDialog.FileMode.Directory)
+    dialog.setOption(QFileDialog.Option.ReadOnly, on=False)
+    dialog.show()
+    return dialog
+
+
 def save_whole(save: Callable[[Path], None], path: Path) -> str:
     """Save, and say what came of it; what was there before stays until all is written."""
     part = path.with_name(f"{path.name}.part")
