@@ -18,7 +18,7 @@ SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 TITLES: Final = ("Time", "Robot", "Who", "What", "Of", "Old", "New", "Read back", "Unit", "What came of it")
 TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, OUTCOME = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, READ_BACK)
-BAD: Final = ("NOT", "FAILED", "refused", "write taken back")  # how an outcome begins that is looked at first
+BAD: Final = ("NOT ", "FAILED", "refused", "write taken back")  # in an outcome that is looked at first
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +81,15 @@ class ActsModel(QAbstractTableModel):
                 return _tip(line)
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            case Qt.ItemDataRole.ForegroundRole if column == OUTCOME and line.act.outcome.startswith(BAD):
+            case Qt.ItemDataRole.ForegroundRole if column == OUTCOME and _is_bad(line.act):
                 return self._theme.colour("bad")
             case _ if role == SORT_ROLE:
                 return _sort_key(line, column)
         return None
+
+
+def _is_bad(act: Act) -> bool:
+    return any(word in act.outcome for word in BAD)
 
 
 def _when(line: Line) -> str:

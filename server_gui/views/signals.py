@@ -1,9 +1,8 @@
-"""Signals: chosen channels over time, one plot a unit; pause, zoom and export while data go on coming."""
+"""Signals: chosen channels over time, one plot a unit; pause, zoom, measure, export while data go on."""
 
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import cycle
 from pathlib import Path
 from typing import Final
 
@@ -25,22 +24,22 @@ from PySide6.QtWidgets import (
 
 from gateway.messages import ChannelInfo
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.measuring import measure, nearest
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.units import Unit
 from server_gui.views.marks import age_text
+from server_gui.views.measuring import Measuring
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.unit_plot import UnitPlot
+from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.plot import Curve, Plot
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
-# Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
-OTHERS: Final = ("#009e73", "#cc79a7", "#d55e00", "#f0e442", "#8f8fd6", "#7fb36b")
 NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
 
@@ -60,36 +59,6 @@ class Frozen:
         )
 
 
-class UnitPlot(Card):
-    """All chosen channels of one unit."""
-
-    def __init__(self, theme: Theme, unit: Unit, channels: Sequence[str], seconds: float) -> None:
-        super().__init__(unit.symbol or "no unit")
-        self.unit = unit
-        self.channels = tuple(channels)
-        self.plot = Plot(theme, seconds, least=1e-3)
-        self._curves = [
-            Curve(name, colour) for name, colour in zip(channels, _colours(channels), strict=True)
-        ]
-        self.plot.set_curves(self._curves)
-        self._theme = theme
-        self._legend = QLabel()
-        self._legend.setTextFormat(Qt.TextFormat.RichText)
-        self._legend.setWordWrap(True)
-        self.body.addWidget(self._legend)
-        self.body.addWidget(self.plot)
-        self.setMinimumHeight(theme.px(120))
-
-    def show_values(self, values: Sequence[float | None]) -> None:
-        """The newest value of each curve, behind its name."""
-        names = (
-            f'<span style="color:{_css(self._theme, curve.colour)}">━ {curve.channel} '
-            f"<b>{self.unit.text(value)}</b></span>"
-            for curve, value in zip(self._curves, values, strict=True)
-        )
-        set_text(self._legend, "&nbsp;&nbsp; ".join(names))
-
-
 class Signals(QWidget):
     """Channels at the left, their curves at the right."""
 
@@ -101,6 +70,8 @@ class Signals(QWidget):
         self._frozen: Frozen | None = None
         self._frame = 0
         self._exported = ""  # what came of the latest export
+        self._at = [0.0, 0.0]  # the cursors, s until the newest row
+        self._active = 0
         self._described: tuple[object, ...] = ()
         self.setObjectName("page")
         self.channels = QTreeWidget()
@@ -112,6 +83,9 @@ class Signals(QWidget):
         self._words.setPlaceholderText("Filter channels")
         self._words.setAccessibleName("Filter of the channels")
         self._words.textChanged.connect(self._filter)
+        self.measuring = Measuring(theme)
+        self.measuring.chosen.connect(lambda cursor: self._move(cursor, self._at[cursor]))
+        self.measuring.stepped.connect(self._step)
         self._stack = QVBoxLayout()
         self.empty = QLabel("Tick channels at the left to see them here.")
         self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -125,6 +99,7 @@ class Signals(QWidget):
         left_box.addWidget(self.channels, 1)
         right_box.addLayout(self._tools())
         right_box.addLayout(self._stack, 1)
+        right_box.addWidget(self.measuring)
         splitter = QSplitter()
         splitter.addWidget(left)
         splitter.addWidget(right)
@@ -146,12 +121,7 @@ class Signals(QWidget):
         times = station.rings.times(seconds) if frozen is None else frozen.times_of(seconds)
         source = station.rings.source if frozen is None else frozen
         for plot in self.plots:
-            found = [
-                station.rings.values(name, len(times))
-                if frozen is None
-                else frozen.columns[name][-len(times) :]
-                for name in plot.channels
-            ]
+            found = [self._column(station, name, len(times)) for name in plot.channels]
             live = frozen is not None or not station.robot.is_stale()
             plot.plot.draw(source, times, found, live=live, scale=plot.unit.scale)
         self._frame += 1
@@ -159,6 +129,8 @@ class Signals(QWidget):
             set_text(self.said, self._state(station) + self._exported)
             for plot in self.plots:
                 plot.show_values([self._newest(station, name) for name in plot.channels])
+            if self.cursors.isChecked():
+                self._measure(station)
 
     @property
     def chosen(self) -> list[str]:
@@ -181,12 +153,15 @@ class Signals(QWidget):
         station = self._desk.selected
         if station is None:
             return
-        times, columns = self._data(station, float(SPANS_S[self._span.currentIndex()]))
+        times, (left, right) = self._times(station), self._window
+        sight = slice(int(np.searchsorted(times, left)), int(np.searchsorted(times, right, "right")))
+        names = [name for plot in self.plots for name in plot.channels]
+        columns = {name: self._column(station, name, len(times))[sight] for name in names}
         si = {info.name: info.unit for info in _infos(station)}
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["time s", *(f"{name} {si.get(name, '')}".rstrip() for name in columns)])
-            for row, time_s in enumerate(times - times[-1:]):
+            for row, time_s in enumerate(times[sight]):
                 values = (column[row] for column in columns.values())
                 writer.writerow([f"{time_s:.6f}", *("" if np.isnan(value) else value for value in values)])
 
@@ -210,12 +185,20 @@ class Signals(QWidget):
         self.fit = QPushButton("Fit")
         self.fit.setToolTip("Undo zoom: the range follows the data again")
         self.fit.clicked.connect(self._follow)
+        self.box = QPushButton("Box zoom")
+        self.box.setCheckable(True)
+        self.box.setToolTip("Drag a box around what is to be seen; else a drag moves, and the wheel zooms")
+        self.box.toggled.connect(self._choose_by_box)
+        self.cursors = QPushButton("Cursors")
+        self.cursors.setCheckable(True)
+        self.cursors.setToolTip("Two cursors with their difference, and every curve over what is in sight")
+        self.cursors.toggled.connect(self._show_cursors)
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
         as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         as_png.clicked.connect(lambda: self._ask("png", self.save_png))
         self.said = ElidedLabel("dim")
         row = QHBoxLayout()
-        for widget in (self._span, self.pause, self.fit, as_csv, as_png):
+        for widget in (self._span, self.pause, self.fit, self.box, self.cursors, as_csv, as_png):
             row.addWidget(widget)
         row.addWidget(self.said, 1)
         return row
@@ -265,6 +248,10 @@ class Signals(QWidget):
         self.plots = [UnitPlot(self._theme, unit, names, seconds) for unit, names in by_unit.items()]
         for plot in self.plots:
             self._stack.addWidget(plot, 1)
+            plot.plot.zoomed.connect(self._zoomed)
+            plot.plot.moved.connect(self._move)
+        self._choose_by_box(self.box.isChecked())
+        self._mark()
         self.empty.setVisible(not self.plots)
         if self._frozen is not None and station is not None:
             self._freeze(station)
@@ -295,6 +282,59 @@ class Signals(QWidget):
     def _follow(self) -> None:
         for plot in self.plots:
             plot.plot.follow_again()
+        self._span_changed(self._span.currentIndex())
+
+    def _zoomed(self, left: float, right: float) -> None:
+        """Every plot shows the same time."""
+        for plot in self.plots:
+            plot.plot.show_window(left, right)
+
+    def _choose_by_box(self, on: bool) -> None:
+        for plot in self.plots:
+            plot.plot.choose_by_box(on)
+
+    # --- cursors
+
+    def _show_cursors(self, on: bool) -> None:
+        left, right = self._window
+        self._at = [left + (right - left) * share for share in (1 / 3, 2 / 3)]
+        self.measuring.setVisible(on)
+        if on:
+            self.measuring.setFocus()
+        self._mark()
+        self._frame = 0  # measure at once
+
+    def _move(self, cursor: int, to_s: float) -> None:
+        self._active, self._at[cursor] = cursor, to_s
+        self._mark()
+        self._frame = 0
+
+    def _step(self, samples: int) -> None:
+        """Move the active cursor by so many samples."""
+        station = self._desk.selected
+        times = np.zeros(0) if station is None else self._times(station)
+        row = nearest(times, self._at[self._active])
+        if row is not None:
+            self._move(self._active, float(times[min(max(row + samples, 0), len(times) - 1)]))
+
+    def _mark(self) -> None:
+        at = tuple(self._at) if self.cursors.isChecked() else ()
+        for plot in self.plots:
+            plot.plot.show_cursors(at, self._active)
+
+    def _measure(self, station: Station) -> None:
+        """Read every curve at the samples that are nearest to the cursors, and over what is in sight."""
+        times, (left, right) = self._times(station), self._window
+        a, b = (nearest(times, at) for at in self._at)
+        if a is None or b is None:
+            return
+        first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
+        rows = [
+            (name, plot.unit, measure(self._column(station, name, len(times)), a, b, int(first), int(last)))
+            for plot in self.plots
+            for name in plot.channels
+        ]
+        self.measuring.show_readings(float(times[a]), float(times[b]), self._active, rows)
 
     def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
         ask_save(self, f"Export as {kind.upper()}", kind, lambda path: self.export(save, path))
@@ -305,11 +345,24 @@ class Signals(QWidget):
 
     # --- data
 
-    def _data(self, station: Station, seconds: float) -> tuple[Floats, dict[str, Floats]]:
+    @property
+    def _window(self) -> tuple[float, float]:
+        """What part of the past is in sight, s until the newest row."""
+        return (
+            self.plots[0].plot.window_s if self.plots else (-float(SPANS_S[self._span.currentIndex()]), 0.0)
+        )
+
+    def _times(self, station: Station) -> Floats:
+        """Of the rows of the chosen span, s until the newest."""
+        seconds = float(SPANS_S[self._span.currentIndex()])
+        times = station.rings.times(seconds) if self._frozen is None else self._frozen.times_of(seconds)
+        return times - times[-1] if len(times) else times
+
+    def _column(self, station: Station, name: str, rows: int) -> Floats:
+        """The newest values of a channel; not to be kept."""
         if self._frozen is None:
-            return self._live(station, seconds)
-        times = self._frozen.times_of(seconds)
-        return times, {name: column[-len(times) :] for name, column in self._frozen.columns.items()}
+            return station.rings.values(name, rows)
+        return self._frozen.columns[name][-rows:]
 
     def _live(self, station: Station, seconds: float) -> tuple[Floats, dict[str, Floats]]:
         times = station.rings.times(seconds).copy()
@@ -343,20 +396,3 @@ def _open_group(item: QTreeWidgetItem) -> None:
     group = item.parent()
     if group is not None:
         group.setExpanded(True)
-
-
-def _colours(channels: Sequence[str]) -> list[str]:
-    others, taken = cycle(OTHERS), set()
-    colours: list[str] = []
-    for name in channels:
-        side = name.partition("_")[0]
-        if side in ("left", "right") and side not in taken:
-            taken.add(side)
-            colours.append(side)
-        else:
-            colours.append(next(others))
-    return colours
-
-
-def _css(theme: Theme, colour: str) -> str:
-    return colour if colour.startswith("#") else theme.colour(colour).name()

@@ -7,12 +7,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRect, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtCore import QPointF, QRect, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
+from server_gui.views.widgets.cursors import Cursors
 
 Floats = npt.NDArray[np.float64]
 SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only now and then
@@ -65,13 +66,15 @@ class Curves(QWidget):
 class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     """Time runs from −`seconds` to 0; the other axis follows the data, quickly out and slowly in.
 
-    `least` is the smallest range that is shown, so that noise on a still joint stays noise.
+    `least` is the smallest range that is shown, so that noise on a still joint stays noise. Where it `zooms`,
+    wheel, drag and box choose a part of the time too, while new rows go on coming.
     """
 
-    def __init__(
-        self, theme: Theme, seconds: float, least: float = 1.0, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent, enableMenu=False)
+    zoomed = Signal(float, float)  # from, to: s, until the newest row
+    moved = Signal(int, float)  # which cursor, where to
+
+    def __init__(self, theme: Theme, seconds: float, least: float = 1.0, *, zooms: bool = False) -> None:
+        super().__init__(enableMenu=False)
         self._theme = theme
         self._least = least
         self._curves: Sequence[Curve] = ()
@@ -79,14 +82,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._low, self._high, self._frames = 0.0, least, 0
         self._followed: tuple[object, float] = (None, 0.0)  # whose rows set the range, and the newest
         self.follows = True  # the range follows the data; off once somebody has zoomed
+        self._at: tuple[float, ...] = ()  # the cursors
+        self._active = 0
+        self._held: int | None = None  # the cursor that is dragged
         item = self.getPlotItem()
         item.hideButtons()
         item.setContentsMargins(0, 0, 0, 0)
         item.getViewBox().setDefaultPadding(0.0)
-        item.getViewBox().setMouseEnabled(x=False, y=True)
+        item.getViewBox().setMouseEnabled(x=zooms, y=True)
         item.getViewBox().sigRangeChangedManually.connect(self._zoomed)
         item.getViewBox().sigResized.connect(self._place)
         self._lines = Curves(self.viewport())
+        self._marks = Cursors(theme, self.viewport())
         for name in ("left", "bottom"):
             item.getAxis(name).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -102,7 +109,28 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def set_seconds(self, seconds: float) -> None:
         """How much of the past is shown."""
         self.seconds = seconds
-        self.setXRange(-seconds, 0.0, padding=0.0)
+        self.getViewBox().setLimits(xMin=-seconds, xMax=0.0)
+        self.show_window(-seconds, 0.0)
+
+    def show_window(self, left: float, right: float) -> None:
+        """Show a part of that, s until the newest row."""
+        self.setXRange(left, right, padding=0.0)
+
+    @property
+    def window_s(self) -> tuple[float, float]:
+        """The part that is shown, s until the newest row."""
+        left, right = self.getViewBox().viewRange()[0]
+        return left, right
+
+    def choose_by_box(self, on: bool) -> None:
+        """Whether a drag chooses what is shown by a box, or moves it."""
+        box = self.getViewBox()
+        box.setMouseMode(box.RectMode if on else box.PanMode)
+
+    def show_cursors(self, at: tuple[float, ...], active: int) -> None:
+        """Two cursors at these times (s until the newest row), or none."""
+        self._at, self._active = at, active
+        self._mark()
 
     def set_curves(self, curves: Sequence[Curve]) -> None:
         """Which lines there are."""
@@ -119,14 +147,19 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 
         Times (s) rise, the last is now. Rows of one `source` are only ever added.
         """
+        (left, right), _ = self.getViewBox().viewRange()
+        if len(times) and right < 0.0:
+            end = int(np.searchsorted(times, times[-1] + right, "right"))
+            times, columns = times[:end], [values[:end] for values in columns]
         if self.follows and len(times):
             self._follow_new(source, times, columns, scale)
         _, (low, high) = self.getViewBox().viewRange()
         ratio = self.devicePixelRatioF()
         width, height = (max(1, round(side * ratio)) for side in (self._lines.width(), self._lines.height()))
-        view = raster.View(self.seconds, low / scale, high / scale, width, height)
+        view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, self._theme.colour("card"), live=live)
+        self._mark()
 
     def follow_again(self) -> None:
         """Let the range follow the data again."""
@@ -162,9 +195,42 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         """Over the plot's field, to the pixel."""
         field = self.getViewBox().sceneBoundingRect()
         self._lines.setGeometry(self.mapFromScene(field).boundingRect())
+        self._marks.setGeometry(self._lines.geometry())
+        self._marks.raise_()
 
-    def _zoomed(self, _axes: object) -> None:
-        self.follows = False
+    def _zoomed(self, axes: Sequence[bool]) -> None:
+        """Somebody has; one axis alone leaves the other as it was."""
+        self.follows = self.follows and not axes[1]
+        if axes[0]:
+            self.zoomed.emit(*self.window_s)
+
+    # --- cursors
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._held = self._marks.near(event.position().x() - self._marks.x())
+        if self._held is None:
+            super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._held is None:
+            super().mouseMoveEvent(event)
+            return
+        left, right = self.window_s
+        share = (event.position().x() - self._marks.x()) / max(1, self._marks.width())
+        self.moved.emit(self._held, left + min(max(share, 0.0), 1.0) * (right - left))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if self._held is None:
+            super().mouseReleaseEvent(event)
+        self._held = None
+
+    def _mark(self) -> None:
+        left, right = self.window_s
+        box, field = self.getViewBox().rbScaleBox, None
+        if box.isVisible():
+            place = self.mapFromScene(box.sceneBoundingRect()).boundingRect()
+            field = QRectF(place.translated(-self._marks.pos()))
+        self._marks.show_marks(tuple((at - left) / (right - left) for at in self._at), self._active, field)
 
     def _restyle(self) -> None:
         theme = self._theme

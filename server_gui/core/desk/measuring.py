@@ -1,0 +1,45 @@
+"""What is read off a curve: its values at two cursors, and how it is between two times."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One curve, in its own unit; None where it has no value. `sd` is the standard deviation."""
+
+    a: float | None
+    b: float | None
+    low: float | None = None
+    high: float | None = None
+    mean: float | None = None
+    sd: float | None = None
+
+    @property
+    def difference(self) -> float | None:
+        """From cursor A to cursor B."""
+        return None if self.a is None or self.b is None else self.b - self.a
+
+
+def nearest(times: Floats, at_s: float) -> int | None:
+    """The row whose time is nearest to `at_s`, both in s and `times` rising; None where there is none."""
+    if not len(times):
+        return None
+    after = min(int(np.searchsorted(times, at_s)), len(times) - 1)
+    before = max(after - 1, 0)
+    return before if at_s - times[before] <= times[after] - at_s else after
+
+
+def measure(values: Floats, a: int, b: int, first: int, last: int) -> Measured:
+    """The values at rows `a` and `b`, and how they are from row `first` until before row `last`."""
+    at_a, at_b = (None if np.isnan(values[row]) else float(values[row]) for row in (a, b))
+    known = values[first:last]
+    known = known[~np.isnan(known)]
+    if not len(known):
+        return Measured(at_a, at_b)
+    spread = (float(known.min()), float(known.max()), float(known.mean()), float(known.std()))
+    return Measured(at_a, at_b, *spread)

@@ -1,0 +1,104 @@
+"""What is measured in the signals: two cursors and their difference, each curve over what is in sight."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
+
+from server_gui.core.desk.measuring import Measured
+from server_gui.core.processing.units import Unit
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card
+
+TITLES: Final = ("Channel", "A", "B", "B − A", "Min", "Max", "Mean", "SD", "Unit")
+ROWS: Final = 6  # that are in sight at most
+FAR: Final = 10  # samples, with Shift
+KEYS: Final = {Qt.Key.Key_A: 0, Qt.Key.Key_B: 1}
+STEPS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+
+Row = tuple[str, Unit, Measured]
+
+
+class Measuring(Card):
+    """`chosen` brings a cursor, `stepped` samples for the chosen one: by the keys A and B, and the arrows."""
+
+    chosen = Signal(int)
+    stepped = Signal(int)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__("Cursors")
+        self._theme = theme
+        self.setAccessibleName("Cursors: A or B chooses one, the arrows move it, with Shift further")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.table = QTableWidget(0, len(TITLES))
+        self.table.setHorizontalHeaderLabels(TITLES)
+        self.table.setAccessibleName("What is measured")
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.table.setShowGrid(False)
+        self.table.verticalHeader().hide()
+        for column in range(1, len(TITLES)):
+            self.table.horizontalHeader().setSectionResizeMode(
+                column, QHeaderView.ResizeMode.ResizeToContents
+            )
+        self.table.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        self.body.addWidget(self.table)
+        self.hide()
+
+    def show_readings(self, a_s: float, b_s: float, active: int, rows: Sequence[Row]) -> None:
+        """The cursors' times (s, until the newest row), and every curve."""
+        apart_s = b_s - a_s
+        rate = "" if apart_s == 0.0 else f" · 1/Δt {1 / abs(apart_s):.4g} Hz"
+        marks = ["▸ " if place == active else "" for place in (0, 1)]
+        self.set_title(f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}")
+        if self.table.rowCount() != len(rows):
+            self.table.setRowCount(len(rows))
+            self._fit(len(rows))
+        for place, (name, unit, found) in enumerate(rows):
+            values = (found.a, found.b, found.difference, found.low, found.high, found.mean, found.sd)
+            texts = (name, *(_text(unit, value) for value in values), unit.symbol)
+            for column, text in enumerate(texts):
+                self._set(place, column, text)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.set_note("A or B chooses, ← → moves by a sample, with Shift by ten")
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.set_note("drag a cursor, or click here and use the keys")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key = Qt.Key(event.key())
+        if key in KEYS:
+            self.chosen.emit(KEYS[key])
+        elif key in STEPS:
+            far = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+            self.stepped.emit(STEPS[key] * (FAR if far else 1))
+        else:
+            super().keyPressEvent(event)
+
+    def _fit(self, rows: int) -> None:
+        height = self._theme.px(20)
+        self.table.verticalHeader().setDefaultSectionSize(height)
+        self.table.setFixedHeight(
+            self.table.horizontalHeader().sizeHint().height() + min(rows, ROWS) * height + 4
+        )
+
+    def _set(self, row: int, column: int, text: str) -> None:
+        item = self.table.item(row, column)
+        if item is None:
+            item = QTableWidgetItem()
+            self.table.setItem(row, column, item)
+            if 0 < column < len(TITLES) - 1:
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                item.setFont(self._theme.number_font())
+        if item.text() != text:
+            item.setText(text)
+
+
+def _text(unit: Unit, value: float | None) -> str:
+    return "–" if value is None else f"{value * unit.scale:.5g}"

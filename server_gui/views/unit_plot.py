@@ -1,0 +1,63 @@
+"""All chosen channels of one unit in one plot, with their newest values as its legend."""
+
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
+
+from server_gui.core.processing.units import Unit
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plot import Curve, Plot
+
+# Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
+OTHERS: Final = ("#009e73", "#cc79a7", "#d55e00", "#f0e442", "#8f8fd6", "#7fb36b")
+
+
+class UnitPlot(Card):
+    """One plot."""
+
+    def __init__(self, theme: Theme, unit: Unit, channels: Sequence[str], seconds: float) -> None:
+        super().__init__(unit.symbol or "no unit")
+        self.unit = unit
+        self.channels = tuple(channels)
+        self.plot = Plot(theme, seconds, least=1e-3, zooms=True)
+        self._curves = [
+            Curve(name, colour) for name, colour in zip(channels, _colours(channels), strict=True)
+        ]
+        self.plot.set_curves(self._curves)
+        self._theme = theme
+        self._legend = QLabel()
+        self._legend.setTextFormat(Qt.TextFormat.RichText)
+        self._legend.setWordWrap(True)
+        self.body.addWidget(self._legend)
+        self.body.addWidget(self.plot)
+        self.setMinimumHeight(theme.px(120))
+
+    def show_values(self, values: Sequence[float | None]) -> None:
+        """The newest value of each curve, behind its name."""
+        names = (
+            f'<span style="color:{_css(self._theme, curve.colour)}">━ {curve.channel} '
+            f"<b>{self.unit.text(value)}</b></span>"
+            for curve, value in zip(self._curves, values, strict=True)
+        )
+        set_text(self._legend, "&nbsp;&nbsp; ".join(names))
+
+
+def _colours(channels: Sequence[str]) -> list[str]:
+    others, taken = cycle(OTHERS), set()
+    colours: list[str] = []
+    for name in channels:
+        side = name.partition("_")[0]
+        if side in ("left", "right") and side not in taken:
+            taken.add(side)
+            colours.append(side)
+        else:
+            colours.append(next(others))
+    return colours
+
+
+def _css(theme: Theme, colour: str) -> str:
+    return colour if colour.startswith("#") else theme.colour(colour).name()

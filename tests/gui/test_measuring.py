@@ -1,0 +1,242 @@
+"""Signals are zoomed while they go on, and measured with two cursors, by mouse and by keys."""
+
+import csv
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from server_gui.core.desk.measuring import Measured, measure, nearest
+from server_gui.views.measuring import TITLES, Measuring
+from server_gui.views.signals import Signals
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.plot import Plot
+from tests.gui.fakes import Bench, telemetry
+
+RATE_HZ = 100
+START_NS = 1_000_000_000_000
+KNEE, FORCE = "left_knee.position", "left_insole.force"
+
+
+@pytest.fixture
+def signals(theme: Theme, bench: Bench) -> Iterator[Signals]:
+    """Ten seconds: the knee's angle rises by 1 rad/s, the force stays."""
+    add(bench, 0, 1000)
+    made = Signals(bench.desk, theme)
+    made.resize(900, 700)
+    made.show()
+    made.refresh()
+    made.choose([KNEE, FORCE])
+    QApplication.processEvents()
+    made.refresh()
+    yield made
+    made.close()
+
+
+def add(bench: Bench, first: int, rows: int) -> None:
+    numbers = range(first, first + rows)
+    columns: dict[str, list[float | None]] = {
+        KNEE: [number / RATE_HZ for number in numbers],
+        FORCE: [700.0] * rows,
+    }
+    bench.station.take([telemetry([START_NS + number * 10_000_000 for number in numbers], columns)])
+
+
+def cell(view: Measuring, row: int, title: str) -> str:
+    item = view.table.item(row, TITLES.index(title))
+    return "" if item is None else item.text()
+
+
+def title(signals: Signals) -> str:
+    signals._frame = 0
+    signals.refresh()
+    return " ".join(signals.measuring._title.text().split())
+
+
+def wheel(plot: Plot, at: QPointF, turns: int) -> None:
+    event = QWheelEvent(
+        at,
+        plot.viewport().mapToGlobal(at),
+        QPoint(0, 0),
+        QPoint(0, 120 * turns),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(plot.viewport(), event)
+
+
+def place(plot: Plot, share: float) -> QPoint:
+    """A place in the field of a plot: a share of its width, in the middle of its height."""
+    field = plot._marks.geometry()
+    return QPoint(field.x() + round(share * (field.width() - 1)), field.center().y())
+
+
+# Reading off
+
+
+def test_the_nearest_row_is_found() -> None:
+    times = np.array([-0.3, -0.2, -0.1, 0.0])
+    assert [nearest(times, at) for at in (-9.0, -0.26, -0.24, -0.1, 9.0)] == [0, 0, 1, 2, 3]
+    assert nearest(np.zeros(0), 0.0) is None
+
+
+def test_what_is_missing_is_missing_and_the_rest_is_measured() -> None:
+    values = np.array([1.0, math.nan, 3.0, 5.0])
+    found = measure(values, 0, 2, 0, 4)
+    assert (found.a, found.b, found.difference) == (1.0, 3.0, 2.0)
+    assert (found.low, found.high, found.mean) == (1.0, 5.0, 3.0)
+    assert found.sd == pytest.approx(math.sqrt(8 / 3))
+    assert measure(values, 0, 1, 0, 4).difference is None
+    assert measure(values, 1, 1, 1, 2) == Measured(None, None)
+
+
+# Zoom
+
+
+def test_the_wheel_zooms_every_plot_while_data_go_on(signals: Signals, bench: Bench) -> None:
+    first, second = (plot.plot for plot in signals.plots)
+    wheel(first, QPointF(place(first, 0.5)), 10)
+    left, right = first.window_s
+    assert -10.0 < left < -5.0 < right < 0.0
+    assert second.window_s == pytest.approx((left, right))
+    picture = first._lines.strip.pixels.copy()
+    add(bench, 1000, 100)
+    signals.refresh()
+    assert first.window_s == (left, right), "new rows moved what somebody has zoomed to"
+    assert not np.array_equal(picture, first._lines.strip.pixels), "new rows are not drawn"
+
+
+def test_the_zoom_shows_its_part_of_the_past(signals: Signals, bench: Bench) -> None:
+    plot = signals.plots[0].plot
+    plot.show_window(-6.0, -4.0)
+    signals.refresh()
+    strip = plot._lines.strip
+    newest_s = bench.station.rings.times(1.0)[-1]
+    assert strip._newest_s == pytest.approx(newest_s - 4.0)
+    assert strip._key[1].seconds == pytest.approx(2.0)  # type: ignore[attr-defined]
+    low, high = plot.getViewBox().viewRange()[1]
+    assert low < math.degrees(4.0)
+    assert high > math.degrees(5.98)
+
+
+def test_the_wheel_over_an_axis_zooms_only_that(signals: Signals) -> None:
+    plot = signals.plots[0].plot
+    axis = plot.mapFromScene(plot.getPlotItem().getAxis("left").sceneBoundingRect()).boundingRect().center()
+    wheel(plot, QPointF(axis), 5)
+    assert plot.window_s == (-10.0, 0.0)
+    assert not plot.follows
+
+
+def test_a_box_chooses_what_is_seen_and_fit_takes_it_back(signals: Signals) -> None:
+    plot = signals.plots[0].plot
+    signals.box.click()
+    viewport = plot.viewport()
+    begin, end = place(plot, 0.4) - QPoint(0, 20), place(plot, 0.6) + QPoint(0, 20)
+    QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=begin)
+    for share in (0.45, 0.5, 0.55):
+        QTest.mouseMove(viewport, place(plot, share))
+        QApplication.processEvents()
+    QTest.mouseMove(viewport, end)
+    signals.refresh()
+    assert plot._marks.isVisible(), "nobody sees the box"
+    QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=end)
+    assert plot.window_s == pytest.approx((-6.0, -4.0), abs=0.1)
+    signals.fit.click()
+    assert plot.window_s == (-10.0, 0.0)
+    assert plot.follows
+
+
+def test_an_export_has_what_is_in_sight(signals: Signals, tmp_path: Path) -> None:
+    signals.plots[0].plot.show_window(-6.0, -4.0)
+    signals.save_csv(tmp_path / "out.csv")
+    rows = list(csv.reader((tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()))[1:]
+    assert (float(rows[0][0]), float(rows[-1][0])) == (-6.0, -4.0)
+    assert (float(rows[0][1]), float(rows[-1][1])) == (3.99, 5.99)
+
+
+# Cursors
+
+
+def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
+    signals.cursors.click()
+    signals._move(0, -6.004)
+    signals._move(1, -4.0)
+    assert title(signals) == "A -6.000 s ▸ B -4.000 s Δt +2.000 s · 1/Δt 0.5 Hz"
+    assert cell(signals.measuring, 0, "Channel") == KNEE
+    assert [cell(signals.measuring, 0, name) for name in ("A", "B", "B − A", "Unit")] == [
+        f"{math.degrees(3.99):.5g}",
+        f"{math.degrees(5.99):.5g}",
+        f"{math.degrees(2.0):.5g}",
+        "°",
+    ]
+    assert cell(signals.measuring, 1, "B − A") == "0"
+
+
+def test_statistics_are_of_what_is_in_sight(signals: Signals) -> None:
+    signals.cursors.click()
+    signals.plots[0].plot.show_window(-2.0, -1.0)
+    title(signals)
+    low, high, mean = (cell(signals.measuring, 0, name) for name in ("Min", "Max", "Mean"))
+    assert (low, high, mean) == tuple(f"{math.degrees(angle):.5g}" for angle in (7.99, 8.99, 8.49))
+    assert cell(signals.measuring, 1, "SD") == "0"
+
+
+def test_cursors_are_moved_by_keys(signals: Signals) -> None:
+    signals.cursors.click()
+    assert signals.measuring.isVisible()
+    signals._move(1, -2.0)
+    signals._move(0, -5.0)
+    for key, modifier in (
+        (Qt.Key.Key_Right, Qt.KeyboardModifier.NoModifier),
+        (Qt.Key.Key_B, Qt.KeyboardModifier.NoModifier),
+        (Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier),
+        (Qt.Key.Key_Left, Qt.KeyboardModifier.NoModifier),
+    ):
+        QTest.keyClick(signals.measuring, key, modifier)
+    assert title(signals).startswith("A -4.990 s ▸ B -2.110 s Δt +2.880 s")
+
+
+def test_a_cursor_is_dragged_and_the_plot_stays(signals: Signals) -> None:
+    signals.cursors.click()
+    signals._move(0, -5.0)
+    plot = signals.plots[0].plot
+    viewport = plot.viewport()
+    QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.5))
+    QTest.mouseMove(viewport, place(plot, 0.3))
+    QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.3))
+    assert signals._at[0] == pytest.approx(-7.0, abs=0.1)
+    assert plot.window_s == (-10.0, 0.0)
+    assert plot.follows
+
+
+def test_a_paused_view_is_measured_as_it_stands(signals: Signals, bench: Bench) -> None:
+    signals.cursors.click()
+    signals._move(0, -1.0)
+    signals.pause.click()
+    title(signals)
+    before = cell(signals.measuring, 0, "A")
+    add(bench, 1000, 200)
+    title(signals)
+    assert cell(signals.measuring, 0, "A") == before
+    signals.pause.click()
+    title(signals)
+    assert cell(signals.measuring, 0, "A") == f"{math.degrees(10.99):.5g}"
+
+
+def test_without_data_nothing_is_measured(theme: Theme, bench: Bench) -> None:
+    made = Signals(bench.desk, theme)
+    made.show()
+    made.refresh()
+    made.cursors.click()
+    QTest.keyClick(made.measuring, Qt.Key.Key_Left)
+    made.refresh()
+    assert made.measuring.table.rowCount() == 0
+    made.close()
