@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLay
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.stopping import StopState
+from server_gui.views.foreseen import status
 from server_gui.views.marks import Mark, age_text, drives_mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
@@ -144,13 +145,16 @@ def _drives(station: Station) -> Words:
 
 
 def _status(station: Station) -> Words:
-    gait = station.processing.derived().gait
     if station.robot.is_stale():
         return Mark("ring", "old"), "Status not known", "no live data"
+    line = status(station)
+    if line is not None:
+        return line.mark, line.text, line.detail
+    gait, why = station.processing.derived().gait, f"by steps; not predicted: {station.predictions.problem}"
     if not gait.walking:
-        return Mark("ring", "dim"), "Not walking", "from gait events, not predicted"
+        return Mark("ring", "dim"), "Not walking", why
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Mark("diamond", "accent"), f"Walking  {cadence} steps/min", "from gait events, not predicted"
+    return Mark("diamond", "accent"), f"Walking  {cadence} steps/min", why
 
 
 def _link(station: Station) -> Words:

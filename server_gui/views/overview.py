@@ -13,6 +13,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.desk.walk import leg_phase
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.units import Unit
+from server_gui.views.foreseen import ACTIVITY, label_text, lines, model_phases
 from server_gui.views.joint_table import JointModel, JointTable
 from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
@@ -21,10 +22,12 @@ from server_gui.views.widgets.colour_bar import ColourBar
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.gait_ring import GaitRing
+from server_gui.views.widgets.lines import Lines
 from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
 
 SECONDS: Final = 10.0
+STATUS_LINES: Final = 4
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLAIN: Final = ("good", "#cc79a7")  # of what belongs to no side
@@ -76,7 +79,9 @@ class Overview(QWidget):
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
         self._status, self._ring = Card("Status"), GaitRing(theme)
-        self._status.body.addWidget(self._ring)
+        self.status_lines = Lines(theme, "What is predicted, and what devices say", STATUS_LINES)
+        self._status.body.addWidget(self._ring, 1)
+        self._status.body.addWidget(self.status_lines)
         self._posture, self._figure = Card("Posture: hip, knee, ankle"), StickFigure(theme)
         self._posture.body.addWidget(self._figure)
         self._maps = {side: PressureMap(theme, side) for side in SIDES}
@@ -105,7 +110,7 @@ class Overview(QWidget):
         slow = now_s - self._read_s >= READ_S
         if slow:
             self._read_s = now_s
-        self._refresh_status(station)
+        self._refresh_status(station, slow=slow)
         self._refresh_posture(station, slow=slow)
         self._refresh_pressure(station, slow=slow)
         for plot in self._plots:
@@ -135,19 +140,30 @@ class Overview(QWidget):
         card.body.addLayout(row)
         return card
 
-    def _refresh_status(self, station: Station) -> None:
+    def _refresh_status(self, station: Station, *, slow: bool) -> None:
         derived = station.processing.derived()
         live = not station.robot.is_stale()
-        now_ns = derived.stamp_ns
-        phases = {leg: leg_phase(derived, leg, now_ns) for leg in Leg}
-        gait = derived.gait
-        word = "Walking" if gait.walking else "Not walking"
-        below = "" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f} steps/min"
-        self._ring.show_phases(phases, word if live else "Not known", below, live=live)
-        sources = {
-            source.value.replace("_", " ") for source in derived.sources.values() if source is not None
-        }
-        self._status.set_note(f"by {', '.join(sorted(sources))}" if live and sources else _old(station))
+        phases = {leg: leg_phase(derived, leg, derived.stamp_ns) for leg in Leg}
+        word, below = self._words(station) if live else ("Not known", "")
+        self._ring.show_phases(phases, model_phases(station), word, below, live=live)
+        if slow:
+            sources = {one.value.replace("_", " ") for one in derived.sources.values() if one is not None}
+            self._status.set_note(
+                f"steps by {', '.join(sorted(sources))}" if live and sources else _old(station)
+            )
+            self.status_lines.show_lines(list(lines(station)))
+
+    def _words(self, station: Station) -> tuple[str, str]:
+        """What it does: by a model where one says so, else by the steps that were seen."""
+        gait = station.processing.derived().gait
+        cadence = "" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f} steps/min"
+        shown = station.predictions.by_task.get(ACTIVITY)
+        if shown is None or shown.is_stale():
+            return ("Walking" if gait.walking else "Not walking"), cadence
+        prediction = shown.predicted.prediction
+        return label_text(prediction.label), " · ".join(
+            filter(None, (f"p {prediction.probability:.2f}", cadence))
+        )
 
     def _refresh_posture(self, station: Station, *, slow: bool) -> None:
         values = station.robot.values

@@ -121,9 +121,9 @@ def test_a_monkey_at_the_window_breaks_nothing_and_stop_stays_in_reach(
         left -= 1
         day.frame(left)
         window.refresh()
-        if QApplication.activeModalWidget() is not None:
+        if (modal := QApplication.activeModalWidget()) is not None:
             raised.append(f"{monkey.last}: a modal dialog is in the way of STOP")
-            QApplication.activeModalWidget().close()
+            modal.close()
         if left > 0 and not raised:
             monkey.act()
 

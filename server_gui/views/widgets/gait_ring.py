@@ -1,4 +1,7 @@
-"""The gait-phase ring: where each leg is in its stride; left is the outer ring, right the inner."""
+"""The gait-phase ring: where each leg is in its stride; left is the outer ring, right the inner.
+
+A line across a ring is what the steps that were seen say, a dot in it what a model says.
+"""
 
 import math
 from collections.abc import Mapping
@@ -16,13 +19,17 @@ GAP_DEG: Final = 2.4  # between two phases
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
 
+Phases = dict[Leg, LegPhase | None]
+
+
 class GaitRing(QWidget):
     """Shows a word in the middle, what is known of it below, and each leg's phase around."""
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._theme = theme
-        self._phases: dict[Leg, LegPhase | None] = dict.fromkeys(Leg)
+        self._phases: Phases = dict.fromkeys(Leg)
+        self._modelled: Phases = dict.fromkeys(Leg)
         self._word, self._below, self._live = "", "", False
         self._key: tuple[object, ...] = ()
         self._drawn = QPixmap()
@@ -34,9 +41,10 @@ class GaitRing(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(230, 230)
 
-    def show_phases(self, phases: dict[Leg, LegPhase | None], word: str, below: str, *, live: bool) -> None:
-        """Draw these; what is not `live` is grey."""
+    def show_phases(self, phases: Phases, modelled: Phases, word: str, below: str, *, live: bool) -> None:
+        """Draw these, by steps and by a model; what is not `live` is grey."""
         self._phases, self._word, self._below, self._live = phases, word, below, live
+        self._modelled = modelled
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -54,6 +62,8 @@ class GaitRing(QWidget):
             now = self._phases[leg]
             if now is not None:
                 self._draw_needle(painter, ring, band, now.percent)
+            if (modelled := self._modelled[leg]) is not None:
+                self._draw_dot(painter, ring, band, modelled.percent)
         self._draw_words(painter, inner.adjusted(band, band, -band, -band))
         painter.end()
 
@@ -100,6 +110,13 @@ class GaitRing(QWidget):
             middle + direction * (radius - band * 0.6), middle + direction * (radius + band * 0.6)
         )
 
+    def _draw_dot(self, painter: QPainter, ring: QRectF, band: float, percent: float) -> None:
+        angle = math.radians(3.6 * percent)
+        place = ring.center() + QPointF(math.sin(angle), -math.cos(angle)) * (ring.width() / 2)
+        painter.setPen(QPen(self._theme.colour("card"), 1.5))
+        painter.setBrush(self._theme.colour("text"))
+        painter.drawEllipse(place, band * 0.3, band * 0.3)
+
     def _draw_words(self, painter: QPainter, box: QRectF) -> None:
         theme = self._theme
         line = box.height() / 5.2
@@ -107,8 +124,9 @@ class GaitRing(QWidget):
         rows = [(self._word, "text" if self._live else "old", 1.25 * size, True)]
         rows += [(self._below, "dim", 0.85 * size, False)]
         for leg in Leg:
-            now = self._phases[leg]
+            now, modelled = self._phases[leg] or self._modelled[leg], self._modelled[leg]
             said = f"{leg.value[0].upper()}  {now.phase} {now.percent:.0f} %" if now else ""
+            said += f" · model {modelled.percent:.0f} %" if modelled else ""
             rows.append((said, leg.value if self._live else "old", 0.85 * size, False))
         top = box.center().y() - line * 2
         for text, colour, factor, bold in rows:

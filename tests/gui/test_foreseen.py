@@ -1,0 +1,146 @@
+"""What models say is shown with how sure, by which model, how far to believe it, and when it is not known."""
+
+import dataclasses
+import time
+from collections.abc import Callable
+
+import pytest
+
+from gateway.client import ConnectionState
+from ml.registry.card import Source
+from ml.serving.trust import Trust
+from server_gui.core.desk.predictions import OFF, Shown
+from server_gui.core.desk.station import Station
+from server_gui.core.events import LinkChanged
+from server_gui.core.prediction.news import Ruled, Serves
+from server_gui.core.prediction.settings import Action, RuleSettings
+from server_gui.core.processing.gait_events import Leg
+from server_gui.views.foreseen import model_phases, status
+from server_gui.views.main_window import MainWindow
+from tests.gui.fakes import Bench, looked, walking
+from tests.gui.foreseen import predicted
+from tests.gui.test_app import wait
+
+HOUR_S = 3600.0
+WALKS = {"walk": 0.94, "turn": 0.04, "stand": 0.02}
+
+
+@pytest.fixture
+def station(bench: Bench) -> Station:
+    """A robot that walks, whose data are not stale within a test."""
+    bench.station.take([walking(300, -HOUR_S), looked()])
+    return bench.station
+
+
+def chip(window: MainWindow) -> str:
+    return window.header._chips["status"].toolTip()
+
+
+def shown(window: MainWindow, so: Callable[[], bool]) -> None:
+    def drawn() -> bool:
+        window.refresh()
+        return so()
+
+    wait(drawn, "shown")
+
+
+def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
+    window: MainWindow, station: Station
+) -> None:
+    station.foresee(predicted("walk", WALKS))
+    shown(window, lambda: chip(window) == "Walk  0.94\npredicted · next turn 0.04")
+    main, detail = window.overview.status_lines.texts[0]
+    assert main == "Does: Walk  0.94"
+    assert detail.endswith("activity-3fa2c1, 3 days old, simulated model")
+    assert "p 0.94" in window.overview._ring._below
+
+
+@pytest.mark.parametrize(
+    ("label", "novelty", "said"),
+    [
+        ("unknown", 0.2, "Unknown\npredicted · likeliest walk 0.41"),
+        ("abnormal", 1.7, "Abnormal\nnovelty 1.7 · predicted · likeliest walk 0.41"),
+    ],
+)
+def test_a_model_that_does_not_know_says_so(
+    window: MainWindow, station: Station, label: str, novelty: float, said: str
+) -> None:
+    station.foresee(predicted(label, {"walk": 0.41, "stand": 0.4}, novelty=novelty))
+    shown(window, lambda: chip(window) == said)
+
+
+def test_a_fall_stands_before_all_else(station: Station) -> None:
+    station.foresee(predicted("walk", WALKS))
+    station.foresee(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
+    line = status(station)
+    assert line is not None
+    assert line.text == "Walk  0.94"
+    station.foresee(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
+    line = status(station)
+    assert line is not None
+    assert (line.mark.shape, line.mark.colour, line.text) == ("square", "bad", "Fall  0.97")
+
+
+def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station) -> None:
+    drifted = Trust(600, 0.0, 0.0, 0.5, {"left_hip.position": 0.4})
+    station.foresee(predicted("walk", WALKS, trust=drifted, source=Source.RECORDED))
+    line = status(station)
+    assert line is not None
+    assert "DRIFTED: left_hip.position" in line.detail
+
+
+def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, station: Station) -> None:
+    station.foresee(predicted("walk", WALKS))
+    newest = station.predictions.by_task["activity"]
+    station.predictions.by_task["activity"] = dataclasses.replace(
+        newest, came_ns=time.monotonic_ns() - 5 * 10**9
+    )
+    shown(window, lambda: chip(window).startswith("No prediction now\nthe last "))
+    assert isinstance(newest, Shown)
+    assert window.overview._ring._word == "Walking"
+
+
+def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(
+    window: MainWindow, station: Station
+) -> None:
+    station.foresee(Serves("exo-01", {}, {"activity": "no model serves activity: gwrms models promote ID"}))
+    shown(
+        window,
+        lambda: chip(window).endswith("not predicted: no model serves activity: gwrms models promote ID"),
+    )
+    assert chip(window).startswith("Walking")
+    station.predictions.off = True
+    shown(window, lambda: ("Not predicted", OFF) in window.overview.status_lines.texts)
+
+
+def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, station: Station) -> None:
+    station.foresee(predicted("stride", {"stride": 0.9}, "gait_phase", values={"left": 0.25, "right": 0.75}))
+    phases = model_phases(station)
+    assert [(phase.percent, phase.phase) for phase in phases.values() if phase] == [
+        (25.0, "mid-stance"),
+        (75.0, "mid-swing"),
+    ]
+    window.refresh()
+    assert window.overview._ring._modelled == phases
+    assert window.overview._ring._phases[Leg.LEFT] is not None
+    station.foresee(predicted("unknown", {"stride": 0.2}, "gait_phase", values={"left": 0.25, "right": 0.75}))
+    assert model_phases(station) == dict.fromkeys(Leg)
+
+
+def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow, station: Station) -> None:
+    fall = predicted("fall", {"fall": 0.97, "steady": 0.03}, "falling")
+    rule = RuleSettings("falling", "fall", 0.9, action=Action.ALARM)
+    station.foresee(fall)
+    station.foresee(Ruled("exo-01", rule, began=True, cause=fall))
+    station.take([looked(state="fault", problem="i²t at 83 %")])
+    shown(window, lambda: len(window.overview.status_lines.texts) == 3)
+    texts = [main for main, _ in window.overview.status_lines.texts]
+    assert texts == ["Balance: Fall  0.97", "Rule alarm", "left_knee fault"]
+    assert window.overview.status_lines.texts[2][1] == "i²t at 83 %"
+
+
+def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: MainWindow, station: Station) -> None:
+    station.foresee(predicted("walk", WALKS))
+    station.take([LinkChanged(ConnectionState.WAITING, "no route", 0)])
+    assert status(station) is None
+    shown(window, lambda: "Does: Walk  0.94" not in [main for main, _ in window.overview.status_lines.texts])
