@@ -57,8 +57,8 @@ class _Model:
     learned: Learned
 
 
-def train(url: str, wish: Wish, cluster: str = "") -> Trained:
-    """Learn what is wished for, and judge it against what serves.
+def train(registry: Registry, wish: Wish, cluster: str = "") -> Trained:
+    """Learn what is wished for from the registry's store, and judge it against what serves.
 
     Raises:
         UnusableData: nothing can be learned; says what is missing.
@@ -68,7 +68,7 @@ def train(url: str, wish: Wish, cluster: str = "") -> Trained:
     """
     teach = _personal if wish.adapt_from else _general
     with threadpool_limits(1):  # the same bits on every computer; and networks as small as these learn faster
-        return teach(Registry(url), material(url, wish, cluster), wish)
+        return teach(registry, material(registry.url, wish, cluster), wish)
 
 
 def _general(registry: Registry, found: Material, wish: Wish) -> Trained:

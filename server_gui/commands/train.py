@@ -45,9 +45,8 @@ def main(argv: list[str]) -> int:
         arguments.pseudo_labels,
         arguments.adapt_from,
     )
-    store = url(arguments)
-    trained = train(store, wish, arguments.cluster)
-    registry = Registry(store)
+    registry = Registry(url(arguments))
+    trained = train(registry, wish, arguments.cluster)
     model = registry.publish(trained.learned.state(), trained.card)
     promoted = arguments.promote and trained.decision.better
     if promoted:
