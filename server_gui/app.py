@@ -23,6 +23,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.link import Link
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
+from server_gui.core.desk.ticks import Ticks
 from server_gui.core.events import Event, without_processes
 from server_gui.core.feed import Feed, Following
 from server_gui.core.fleet.collector import Collector, whole
@@ -76,6 +77,7 @@ class Followed:
     station: Station
     mailbox: Mailbox
     tasks: tuple["concurrent.futures.Future[None]", ...]
+    ticks: Ticks | None  # where single sources' samples are recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,7 @@ class App:
             self._elsewhere = None if self._collector else Elsewhere(settings.recorder.spool)
         self.desk.recording = self._recording(self._collector or self._elsewhere, why)
         self.network = self._collector.network if self._collector else Network()
+        self._by_source = self._collector is not None and settings.recorder.rate_hz == 0
         self._own = OwnRobot(self._own_ready, self._own_failed)
         self._desk_units(kept)
         self.theme = Theme(
@@ -158,7 +161,7 @@ class App:
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
         self._mailboxes[name] = mailbox
         tasks = (self.network.run(link.run()), self._follow_feed(name, address))
-        self._followed.append(Followed(station, mailbox, tasks))
+        self._followed.append(Followed(station, mailbox, tasks, Ticks() if self._by_source else None))
         self.desk.add(station)
         return station
 
@@ -172,7 +175,8 @@ class App:
     def tick(self) -> None:
         """Take what has come, and draw."""
         for followed in self._followed:
-            followed.station.take(followed.mailbox.drain())
+            events = followed.mailbox.drain()
+            followed.station.take(events if followed.ticks is None else followed.ticks.take(events))
             for task in followed.tasks:
                 if task.done() and not task.cancelled():
                     task.result()  # it ends only by a mistake of ours, which must not stay unseen

@@ -96,7 +96,7 @@ def _records(segment: Path) -> list[Record]:
 
 
 def _read(segment: Path, sql: str, *values: str) -> list[tuple[Any, ...]]:
-    """Nothing where the file has gone: who records may just have uploaded or removed it.
+    """Nothing where the file has gone, or holds nothing yet: who records may just be making or removing it.
 
     Raises:
         SpoolUnusable: it is there and cannot be read.
@@ -106,7 +106,7 @@ def _read(segment: Path, sql: str, *values: str) -> list[tuple[Any, ...]]:
         with contextlib.closing(sqlite3.connect(f"{segment.as_uri()}?mode=ro", uri=True)) as database:
             return database.execute(sql, values).fetchall()
     except sqlite3.Error as error:
-        if segment.exists():
+        if segment.exists() and "no such table" not in str(error):
             raise SpoolUnusable(f"the spool's file {segment} cannot be read: {error}") from error
         return []
 

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any, Final, Self
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 
 from ml.store import NoSuchTable, Store, sessions
@@ -15,6 +16,8 @@ from ml.store.tables import EVENTS
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.rows import Floats, Ints, Run
 from server_gui.core.settings import ServerSettings
+
+Bools = npt.NDArray[np.bool_]
 
 MOST_WAITING: Final = 400_000  # rows of the spool that are held in memory, the newest: above an hour of them
 US_NS: Final = 1_000  # the store keeps UTC to the microsecond
@@ -50,10 +53,10 @@ class Rows:
             for found in ([part.stamps_ns for part in parts], [part.utc_ns for part in parts])
         )
         order = np.lexsort((utc, stamps_ns))
+        columns = {name: np.concatenate([_column(part, name) for part in parts]) for name in names}
         if len(order):
-            again = (np.diff(stamps_ns[order]) == 0) & (np.diff(utc[order]) < US_NS)
-            order = order[np.append(True, ~again)]
-        columns = {name: np.concatenate([_column(part, name) for part in parts])[order] for name in names}
+            order = order[~_again(stamps_ns[order], columns, order)]
+        columns = {name: column[order] for name, column in columns.items()}
         return cls(np.maximum.accumulate(utc[order]), stamps_ns[order], columns)
 
 
@@ -148,6 +151,20 @@ def _rows(table: pa.Table) -> Rows:
     }
     in_ns = utc.cast(pa.int64()).to_numpy(zero_copy_only=False) * US_NS
     return Rows(in_ns, stamps.to_numpy(zero_copy_only=False).astype(np.int64), columns)
+
+
+def _again(stamps_ns: Ints, columns: Mapping[str, Floats], order: Ints) -> Bools:
+    """Which rows are there before already. Samples of two sources may have one stamp, and are two rows."""
+    same = np.append(False, np.diff(stamps_ns) == 0)
+    again = np.zeros(len(stamps_ns), np.bool_)
+    rows = np.flatnonzero(same | np.append(same[1:], False))
+    values = np.array([column[order[rows]] for column in columns.values()]).T
+    seen: set[tuple[int, bytes]] = set()
+    for row, held in zip(rows.tolist(), values, strict=True):
+        key = (int(stamps_ns[row]), held.tobytes())
+        again[row] = key in seen
+        seen.add(key)
+    return again
 
 
 def _column(part: Rows, name: str) -> Floats:

@@ -1,6 +1,5 @@
 """A recorded session played on a desk of its own: never among the live robots, and never taken for one."""
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -18,8 +17,8 @@ from server_gui.core.desk.answers import Deliver, when_done
 from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.desk import Desk, Shown
 from server_gui.core.desk.station import Station
+from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.events import Described, LinkChanged, Telemetry
-from server_gui.core.recording.rows import Floats
 from server_gui.core.robot import STALE_NS, Robot
 
 PIECE_NS: Final = 20_000_000_000  # that are read at once
@@ -177,7 +176,7 @@ class Playback:
             rows = rows.part(slice(int(np.searchsorted(rows.stamps_ns, newest, "right")), None))
         if not len(rows):
             return
-        columns = {name: _nullable(column) for name, column in rows.columns.items()}
+        columns = {name: nullable(column) for name, column in rows.columns.items()}
         batch = Batch(rows.stamps_ns.tolist(), columns, 0, 0, 0, 1, time.monotonic_ns())
         self.desk.stations[0].take([Telemetry(1, batch, None)])
         self._robot.row_ns, self._robot.stamp_ns = int(rows.utc_ns[-1]), int(rows.stamps_ns[-1])
@@ -193,7 +192,7 @@ class Playback:
         self._reading = place
         begin_ns = tape.first_ns + place * PIECE_NS
         when_done(
-            self._read(lambda: tape.read(begin_ns, begin_ns + PIECE_NS)),
+            self._read(lambda: drawable(tape.read(begin_ns, begin_ns + PIECE_NS))),
             self._deliver,
             lambda rows: self._fetched(tape, place, rows),
             lambda error: self._failed(tape, error),
@@ -217,10 +216,6 @@ def _rate(tape: Tape) -> float:
     """Rows a second, as far as the store knows."""
     seconds = tape.session.length.total_seconds()
     return tape.session.rows / seconds if seconds else 0.0
-
-
-def _nullable(column: Floats) -> list[float | None]:
-    return [None if math.isnan(value) else value for value in column.tolist()]
 
 
 def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:

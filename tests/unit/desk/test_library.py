@@ -187,3 +187,9 @@ def test_closing_does_not_wait_for_what_hangs() -> None:
         job.check()
     let_go.set()
     assert jobs.close(WAIT_S)
+
+
+def test_a_segment_that_is_just_being_made_is_no_problem(settings: ServerSettings) -> None:
+    record(settings.store.url, settings.recorder.spool, sent=False)
+    (settings.recorder.spool / "00000099.db").touch()
+    assert len(look(settings).sessions) == 1
