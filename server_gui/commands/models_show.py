@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from gateway.cli.text import NONE, table
+from gateway.cli.text import NONE, percent, table
 from ml.registry.card import Card, Metrics, age_days
 from server_gui.commands.cloud_reach import when
 
@@ -70,7 +70,9 @@ def _judged(classes: Sequence[str], metrics: Metrics) -> Iterator[str]:
         counts = zip(classes, metrics.confusion, strict=False)
         yield table(header, [(name, *map(str, row)) for name, row in counts], range(1, len(header)))
     if metrics.calibration:
-        bins = [(f"{one.said:.1%}", f"{one.right:.1%}", str(one.count)) for one in metrics.calibration]
+        bins = [
+            (percent(100 * one.said), percent(100 * one.right), str(one.count)) for one in metrics.calibration
+        ]
         yield table(("PROBABILITY SAID", "RIGHT", "DECISIONS"), bins, (0, 1, 2))
     if metrics.calibration_error is not None:
-        yield f"probabilities are off by {metrics.calibration_error:.1%} on average\n"
+        yield f"probabilities are off by {percent(100 * metrics.calibration_error)} on average\n"
