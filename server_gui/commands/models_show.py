@@ -53,9 +53,8 @@ def _judged(classes: Sequence[str], metrics: Metrics) -> Iterator[str]:
         rows = [(name, f"{value:.4g}") for name, value in metrics.figures.items()]
         yield table(("ON DATA NEVER SEEN", ""), rows, (1,))
     if metrics.per_class:
-        header = ("CLASS", "PRECISION", "RECALL", "F1", "DECISIONS")
         yield table(
-            header,
+            ("CLASS", "PRECISION", "RECALL", "F1", "DECISIONS"),
             [
                 (name, f"{one.precision:.3f}", f"{one.recall:.3f}", f"{one.f1:.3f}", str(one.support))
                 for name, one in metrics.per_class.items()
