@@ -60,8 +60,7 @@ class Recording:
         self._robot = Exoskeleton(
             Scenario.STAND if scenario == PRACTICE else Scenario(scenario), own, person=person
         )
-        if scenario == PRACTICE:
-            self._robot.follow(practice(self._robot, own))
+        self._entries = practice(self._robot, own) if scenario == PRACTICE else None
         self._write(
             {
                 "session": f"sim-{seed}-{person}",
@@ -79,6 +78,8 @@ class Recording:
     def run(self, seconds: float) -> None:
         """Let so much simulated time pass from switching on."""
         self._robot.power_on()
+        if self._entries is not None:
+            self._robot.follow(self._entries)
         self._robot.clock.run_until(round(seconds * SECOND_NS))
 
     def _record(self) -> None:

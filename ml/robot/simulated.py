@@ -89,7 +89,7 @@ def examples(task: Task, recipe: Recipe, sessions: list[Session], step: int) -> 
         UnusableData: a session lacks a channel, or all are shorter than the recipe's look-back.
 
     """
-    parts = [part for session in sessions for part in _decisions(task, recipe, session, step)]
+    parts = [part for session in sessions for part in _decisions(task, recipe, session, step) if len(part[0])]
     if not parts:
         raise UnusableData(f"no session is as long as {recipe.name} looks back")
     columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
