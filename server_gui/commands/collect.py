@@ -6,6 +6,7 @@ import gc
 import logging
 import os
 import sys
+import time
 from datetime import datetime
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from gateway.cli.text import NONE, age, say, size, table
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.door import ask
 from server_gui.core.fleet.statistics import LinkReport
+from server_gui.core.prediction.state import PredictingState, TaskReport
 from server_gui.core.settings import ServerSettings, SettingsError, add_robots, default_file, load
 from server_gui.terminal.ending import Ended, Ending
 
@@ -27,6 +29,7 @@ HEADER = (
     "dropped", "newest", "round trip", "clock",
 )  # fmt: skip
 RIGHT = range(5, len(HEADER))
+PREDICTED = ("robot", "task", "says", "probability", "age", "trust", "model")
 
 EPILOG = """What comes from a robot is safe in the spool on this computer first, and goes to the store a batch
 at a time; nothing is decimated, and what is missing is recorded as an event. Robots are followed each by
@@ -48,6 +51,9 @@ the server's file (without --config: ~/.config/gwrms/server.toml, if it is there
   channels = ["*"]                 # names or globs
   resources_s = 5                  # between looks at the robots' computers
   batch_s = 60                     # of recording that go to the store together
+
+  [prediction]
+  enabled = true                   # what models say of each robot is recorded too; docs/predicting.md
 
 examples
   gwrms collect --robot exo-01=192.0.2.7:7420 --operator Ada --notes "new insoles"
@@ -131,7 +137,28 @@ def status_text(report: CollectorReport) -> str:
     robots = report.robots.items()
     links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)
     problems = [f"{name}: {reason}\n" for name, link in robots for reason in link.quality.reasons]
-    return "\n".join([*lines, "", links, *problems])
+    return "\n".join([*lines, "", links, *problems, *_predicted(report.prediction)])
+
+
+def _predicted(state: PredictingState | None) -> list[str]:
+    """What models say of the robots, and what is wrong with models."""
+    if state is None:
+        return ["prediction is off\n"]
+    rows = [
+        (robot, *_task(name, known)) for robot, tasks in state.robots.items() for name, known in tasks.items()
+    ]
+    skipped = [f"{state.skipped} decisions were skipped: too much to do\n"] if state.skipped else []
+    return [
+        *([table(PREDICTED, rows, (3, 4))] if rows else []),
+        *skipped,
+        *(f"{one}\n" for one in state.problems),
+    ]
+
+
+def _task(name: str, known: TaskReport) -> tuple[str, ...]:
+    drifted = f": {', '.join(known.drifted)}" if known.drifted else ""
+    newest = age(time.time() - known.utc_s)
+    return name, known.label, f"{known.probability:.2f}", newest, f"{known.trust}{drifted}", known.model
 
 
 def _row(name: str, link: LinkReport) -> tuple[str, ...]:

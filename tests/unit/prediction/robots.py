@@ -1,6 +1,9 @@
 """What a robot's feed tells of its hips, a model that serves it, and what is predicted of that."""
 
+import asyncio
+import itertools
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,7 +23,8 @@ from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.predicting import Predicting
 from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
 from server_gui.core.settings import ServerSettings, StoreSettings
-from tests.unit.ml.serving.small import CHANNELS, MS, STEP_MS, Floats, learned
+from tests.fake_robot import FakeRobot
+from tests.unit.ml.serving.small import CHANNELS, MS, STEP_MS, Floats, hips, learned
 from tests.unit.recording.robots import description
 
 WAIT_S = 60.0
@@ -120,3 +124,29 @@ def served(predicting: Predicting, told: Told, robot: str = ROBOT, event: Descri
     """Introduce a robot, and wait until a model serves it, so that its first row is seen already."""
     predicting.take(robot, event or described())
     told.until(lambda: (robot, "activity") in predicting.models)
+
+
+class SteadyRobot(FakeRobot):
+    """A fake robot whose rows are 10 ms apart on its own clock, however busy the computer is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._now_ns = time.monotonic_ns()
+
+    def values(self) -> dict[str, float | None]:
+        positions = hips(STEP_MS / 1000, walks=True, seed=self._now_ns % 997, begin_s=self._now_ns / 1e9)
+        return super().values() | dict(zip(CHANNELS, positions[0].tolist(), strict=True))
+
+    async def _stream(self, writer: asyncio.StreamWriter, number: int, params: dict[str, Any]) -> None:
+        names = [name for name in self.values() if self._wanted(name, params.get("channels"))]
+        for seq in itertools.count():
+            await asyncio.sleep(ROWS * STEP_MS / 1000)
+            rows = [self._row(names) for _ in range(ROWS)]
+            columns = {name: [row[name] for _, row in rows] for name in names}
+            data = {"stream": number, "seq": seq, "dropped": 0, "stamp_ns": [stamp for stamp, _ in rows]}
+            self._send(writer, {"method": "stream.data", "params": data | {"columns": columns}})
+
+    def _row(self, names: Sequence[str]) -> tuple[int, dict[str, float | None]]:
+        self._now_ns += STEP_MS * MS
+        values = self.values()
+        return self._now_ns, {name: values[name] for name in names}
