@@ -1,7 +1,7 @@
 """What models say of a robot, in marks and words for header and overview; also that they do not know."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Final
 
@@ -55,8 +55,8 @@ def status(station: Station) -> Line | None:
     if falling is not None and not falling.is_stale():
         line = said(falling)
         if line.mark.colour == "bad":
-            return line
-    return said(shown[ACTIVITY]) if ACTIVITY in shown else None
+            return _as_predicted(line)
+    return _as_predicted(said(shown[ACTIVITY])) if ACTIVITY in shown else None
 
 
 def lines(station: Station) -> Iterator[Line]:
@@ -103,6 +103,11 @@ def model_text(shown: Shown) -> str:
     return f"{card.id}, {age}, {SOURCES[card.source]}"
 
 
+def _as_predicted(line: Line) -> Line:
+    """As it is said where other things stand beside it."""
+    return replace(line, detail=f"predicted · {line.detail}")
+
+
 def _detail(shown: Shown) -> str:
     """The runner-up, and what speaks against believing any of it."""
     prediction, trust = shown.predicted.prediction, shown.predicted.trust
@@ -112,7 +117,7 @@ def _detail(shown: Shown) -> str:
     else:
         others = [item for item in others if item[0] != prediction.label]
         runner = f"next {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
-    return " · ".join(filter(None, ("predicted", runner, _doubt(trust))))
+    return " · ".join(filter(None, (runner, _doubt(trust))))
 
 
 def _doubt(trust: Trust) -> str:

@@ -49,9 +49,8 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
 ) -> None:
     station.foresee(predicted("walk", WALKS))
     shown(window, lambda: chip(window) == "Walk  0.94\npredicted · next turn 0.04")
-    main, detail = window.overview.status_lines.texts[0]
-    assert main == "Does: Walk  0.94"
-    assert detail.endswith("activity-3fa2c1, 3 days old, simulated model")
+    model = "activity-3fa2c1, 3 days old, simulated model"
+    assert window.overview.status_lines.texts[0] == f"Does: Walk  0.94 · next turn 0.04 · {model}"
     assert "p 0.94" in window.overview._ring._below
 
 
@@ -59,7 +58,7 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     ("label", "novelty", "said"),
     [
         ("unknown", 0.2, "Unknown\npredicted · likeliest walk 0.41"),
-        ("abnormal", 1.7, "Abnormal\nnovelty 1.7 · predicted · likeliest walk 0.41"),
+        ("abnormal", 1.7, "Abnormal\npredicted · novelty 1.7 · likeliest walk 0.41"),
     ],
 )
 def test_a_model_that_does_not_know_says_so(
@@ -95,7 +94,7 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, statio
     station.predictions.by_task["activity"] = dataclasses.replace(
         newest, came_ns=time.monotonic_ns() - 5 * 10**9
     )
-    shown(window, lambda: chip(window).startswith("No prediction now\nthe last "))
+    shown(window, lambda: chip(window).startswith("No prediction now\npredicted · the last "))
     assert isinstance(newest, Shown)
     assert window.overview._ring._word == "Walking"
 
@@ -110,7 +109,7 @@ def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(
     )
     assert chip(window).startswith("Walking")
     station.predictions.off = True
-    shown(window, lambda: ("Not predicted", OFF) in window.overview.status_lines.texts)
+    shown(window, lambda: f"Not predicted · {OFF}" in window.overview.status_lines.texts)
 
 
 def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, station: Station) -> None:
@@ -134,13 +133,17 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow,
     station.foresee(Ruled("exo-01", rule, began=True, cause=fall))
     station.take([looked(state="fault", problem="i²t at 83 %")])
     shown(window, lambda: len(window.overview.status_lines.texts) == 3)
-    texts = [main for main, _ in window.overview.status_lines.texts]
-    assert texts == ["Balance: Fall  0.97", "Rule alarm", "left_knee fault"]
-    assert window.overview.status_lines.texts[2][1] == "i²t at 83 %"
+    texts = window.overview.status_lines.texts
+    assert [text.partition(" · ")[0] for text in texts] == [
+        "Balance: Fall  0.97",
+        "Rule alarm",
+        "left_knee fault",
+    ]
+    assert texts[2].endswith("i²t at 83 %")
 
 
 def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: MainWindow, station: Station) -> None:
     station.foresee(predicted("walk", WALKS))
     station.take([LinkChanged(ConnectionState.WAITING, "no route", 0)])
     assert status(station) is None
-    shown(window, lambda: "Does: Walk  0.94" not in [main for main, _ in window.overview.status_lines.texts])
+    shown(window, lambda: not any("Walk" in text for text in window.overview.status_lines.texts))

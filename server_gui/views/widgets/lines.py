@@ -1,4 +1,4 @@
-"""A few lines, each a mark, what it says and a dim detail; as many as there is something to say."""
+"""A few lines, each a mark and what it says; as many as there is something to say."""
 
 from collections.abc import Sequence
 
@@ -23,31 +23,26 @@ class Lines(QWidget):
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(6)
         grid.setVerticalSpacing(1)
-        grid.setColumnStretch(1, 4)
-        grid.setColumnStretch(2, 5)
-        self._rows = [(MarkIcon(theme, 10), ElidedLabel(), ElidedLabel("dim")) for _ in range(most)]
-        for row, widgets in enumerate(self._rows):
-            for column, widget in enumerate(widgets):
-                grid.addWidget(
-                    widget, row, column, Qt.AlignmentFlag.AlignVCenter if column == 0 else Qt.AlignmentFlag(0)
-                )
+        grid.setColumnStretch(1, 1)
+        self._rows = [(MarkIcon(theme, 10), ElidedLabel()) for _ in range(most)]
+        for row, (icon, label) in enumerate(self._rows):
+            grid.addWidget(icon, row, 0, Qt.AlignmentFlag.AlignVCenter)
+            grid.addWidget(label, row, 1)
 
     @property
-    def texts(self) -> list[tuple[str, str]]:
+    def texts(self) -> list[str]:
         """What it says."""
-        return [(main.text(), detail.text()) for _, main, detail in self._rows if not main.isHidden()]
+        return [label.text() for _, label in self._rows if not label.isHidden()]
 
     def show_lines(self, lines: Sequence[Line]) -> None:
         """Show these."""
-        for place, widgets in enumerate(self._rows):
-            icon, main, detail = widgets
+        texts = [f"{line.text} · {line.detail}" if line.detail else line.text for line in lines]
+        for place, (icon, label) in enumerate(self._rows):
             known = place < len(lines)
-            for widget in widgets:
-                widget.setVisible(known)
+            icon.setVisible(known)
+            label.setVisible(known)
             if known:
                 icon.show_mark(lines[place].mark)
-                set_text(main, lines[place].text)
-                set_text(detail, lines[place].detail)
-        tip = "\n".join(f"{line.text}: {line.detail}" if line.detail else line.text for line in lines)
-        if tip != self.toolTip():
-            self.setToolTip(tip)
+                set_text(label, texts[place])
+        if self.toolTip() != "\n".join(texts):
+            self.setToolTip("\n".join(texts))
