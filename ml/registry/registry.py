@@ -53,6 +53,7 @@ class Registry:
         data = archive.dump(state)
         card = msgspec.structs.replace(card, id="", sha256={SKOPS: hashlib.sha256(data).hexdigest()})
         card = msgspec.structs.replace(card, id=content_id(card))
+        decoded(encoded(card))  # what cannot be read again, such as NaN, is refused now
         _check(card, state)
         for named in card.tables:
             upkeep.pin(Store.existing(named.store), named.location, named.version, card.id)

@@ -13,7 +13,7 @@ import pytest
 
 from ml.errors import UnusableModel
 from ml.registry import archive
-from ml.registry.card import Card, Source, TableVersion, content_id, encoded
+from ml.registry.card import Card, Metrics, Source, TableVersion, content_id, encoded
 from ml.registry.pointers import Pointers
 from ml.registry.registry import CARD, FOLDER, SKOPS, Registry
 from ml.robot.learned import Learned
@@ -129,6 +129,12 @@ def test_a_card_of_another_model_is_not_published(
     with pytest.raises(UnusableModel, match=said):
         published(in_folder, **changes)
     assert in_folder.entries() == []
+
+
+def test_a_card_that_could_not_be_read_again_is_not_published(in_folder: Registry) -> None:
+    with pytest.raises(UnusableModel, match="macro_f1|figures"):
+        published(in_folder, metrics=Metrics({"macro_f1": float("nan")}))
+    assert not in_folder.damaged()
 
 
 # --- what is refused when it is loaded; what serves stays
