@@ -21,7 +21,7 @@ SOURCES: Final = {
     Source.RECORDED: "from recordings",
     Source.MIXED: "recordings and simulator",
 }
-TITLES: Final = {ACTIVITY: "Does", FALLING: "Balance"}
+TITLES: Final = {ACTIVITY: "Does", FALLING: "Balance", GAIT_PHASE: "Stride"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,10 @@ def said(shown: Shown) -> Line:
         return Line(Mark("triangle", "warn", ABNORMAL), word, f"novelty {prediction.novelty:.1f} · {detail}")
     if prediction.label == UNKNOWN:
         return Line(Mark("ring", "dim", UNKNOWN), word, detail)
+    if prediction.values:
+        word = " · ".join(
+            f"{name[0].upper()} {100 * value:.0f} %" for name, value in prediction.values.items()
+        )
     falls = prediction.task == FALLING and prediction.label != STEADY
     mark = Mark("square", "bad", prediction.label) if falls else Mark("diamond", "accent", prediction.label)
     return Line(mark, f"{word}  {prediction.probability:.2f}", detail)

@@ -27,7 +27,7 @@ from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
 
 SECONDS: Final = 10.0
-STATUS_LINES: Final = 4
+STATUS_LINES: Final = 5
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLAIN: Final = ("good", "#cc79a7")  # of what belongs to no side

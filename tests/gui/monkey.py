@@ -43,8 +43,9 @@ class Monkey:
 
     def act(self) -> None:
         """One thing, in an open menu where there is one; in no dialog that could change files of others."""
-        for dialog in self._window.findChildren(QFileDialog):
-            dialog.close()
+        for dialog in QApplication.topLevelWidgets():
+            if isinstance(dialog, QFileDialog):
+                dialog.close()
         widget = QApplication.activePopupWidget() or self._anywhere()
         acts, shares = zip(*self._acts, strict=True)
         (act,) = self._random.choices(acts, shares)

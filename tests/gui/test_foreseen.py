@@ -122,6 +122,9 @@ def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, s
     window.refresh()
     assert window.overview._ring._modelled == phases
     assert window.overview._ring._phases[Leg.LEFT] is not None
+    shown(
+        window, lambda: window.overview.status_lines.texts[0].startswith("Stride: L 25 % · R 75 %  0.90 · ")
+    )
     station.foresee(predicted("unknown", {"stride": 0.2}, "gait_phase", values={"left": 0.25, "right": 0.75}))
     assert model_phases(station) == dict.fromkeys(Leg)
 

@@ -124,9 +124,8 @@ class GaitRing(QWidget):
         rows = [(self._word, "text" if self._live else "old", 1.25 * size, True)]
         rows += [(self._below, "dim", 0.85 * size, False)]
         for leg in Leg:
-            now, modelled = self._phases[leg] or self._modelled[leg], self._modelled[leg]
+            now = self._phases[leg] or self._modelled[leg]
             said = f"{leg.value[0].upper()}  {now.phase} {now.percent:.0f} %" if now else ""
-            said += f" · model {modelled.percent:.0f} %" if modelled else ""
             rows.append((said, leg.value if self._live else "old", 0.85 * size, False))
         top = box.center().y() - line * 2
         for text, colour, factor, bold in rows:
