@@ -10,7 +10,7 @@ import pyarrow as pa
 from gateway.cli.text import size
 from ml.store import Store, StoreError, sessions
 from ml.store.sessions import Session
-from server_gui.core.cloud import parts, transfer, verify
+from server_gui.core.cloud import parts, spooled, transfer, verify
 from server_gui.core.cloud.chosen import Choice, Recording, choose
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
@@ -18,7 +18,7 @@ from server_gui.core.cloud.tabular import write_csv, write_parquet
 from server_gui.core.fleet.collector import connect
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import ServerSettings, StoreSettings
+from server_gui.core.settings import ServerSettings
 
 FORMATS: Final[dict[str, Callable[[Path, Recording], int]]] = {
     "csv": write_csv,
@@ -28,17 +28,23 @@ FORMATS: Final[dict[str, Callable[[Path, Recording], int]]] = {
 PROBLEMS_TOLD: Final = 3
 
 
-def export(store: StoreSettings, session: Session, choice: Choice, kind: str, file: Path) -> Work:
-    """A session, or a part of it, as a file of one of `FORMATS`; there whole or not at all."""
+def export(settings: ServerSettings, session: Session, choice: Choice, kind: str, file: Path) -> Work:
+    """What the store has of a session, or a part of it, as one of `FORMATS`; there whole or not at all."""
 
     def work(job: Job) -> str:
-        opened = Store.existing(store.url)
+        waiting = sum(map(len, spooled.runs(settings.recorder.spool, session)))
+        if not session.uploaded:
+            raise StoreError(
+                f"{session.session} waits for upload: bring it into the store first, with Upload now"
+            )
+        opened = Store.existing(settings.store.url)
         known = sessions.find(opened, session.session, session.robot)
         job.expect(known.rows, "rows")
         chosen = choose(opened, known, choice)
         counted = dataclasses.replace(chosen, tables=_counted(chosen.tables, job))
         count = FORMATS[kind](file, counted)
-        return f"{file}: {count} {'messages' if kind == 'mcap' else 'rows'}"
+        more = f"; {waiting} newer rows wait for upload and are not in it" if waiting else ""
+        return f"{file}: {count} {'messages' if kind == 'mcap' else 'rows'}{more}"
 
     return work
 

@@ -174,5 +174,5 @@ class Player(QWidget):
         if tape is None:
             return
         begin, end = (None, None) if span is None else map(as_time, span)
-        work = export(self._archive.settings.store, tape.session, Choice(begin=begin, end=end), kind, file)
+        work = export(self._archive.settings, tape.session, Choice(begin=begin, end=end), kind, file)
         self._archive.jobs.add(f"Export {file.name}", work)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from datetime import timedelta
 from pathlib import Path
 
+import msgspec
 import pyarrow.parquet as pq
 import pytest
 
@@ -101,7 +102,7 @@ def test_a_span_is_exported_in_the_background(
 ) -> None:
     session = find(recorded.store, recorded.session)
     file = tmp_path / f"walk.{kind}"
-    job = over(jobs.add("export", work.export(settings.store, session, Choice(), kind, file)))
+    job = over(jobs.add("export", work.export(settings, session, Choice(), kind, file)))
     assert job.state is JobState.DONE, job.said
     assert (job.done, job.total, job.unit) == (BATCHES * ROWS, BATCHES * ROWS, "rows")
     assert file.stat().st_size > 100
@@ -109,7 +110,7 @@ def test_a_span_is_exported_in_the_background(
         assert pq.read_table(file).num_rows == BATCHES * ROWS
         assert session.first is not None
         none = Choice(end=session.first - timedelta(seconds=1))
-        over(jobs.add("export", work.export(settings.store, session, none, kind, file)))
+        over(jobs.add("export", work.export(settings, session, none, kind, file)))
         assert pq.read_table(file).num_rows == 0
 
 
@@ -145,7 +146,7 @@ def test_a_job_is_cancelled_and_leaves_nothing_behind(
         return ""
 
     first = jobs.add("first", hold)
-    second = jobs.add("export", work.export(settings.store, session, Choice(), "csv", tmp_path / "walk.csv"))
+    second = jobs.add("export", work.export(settings, session, Choice(), "csv", tmp_path / "walk.csv"))
     assert running.wait(WAIT_S)
     second.cancel()
     holding.set()
@@ -193,3 +194,19 @@ def test_a_segment_that_is_just_being_made_is_no_problem(settings: ServerSetting
     record(settings.store.url, settings.recorder.spool, sent=False)
     (settings.recorder.spool / "00000099.db").touch()
     assert len(look(settings).sessions) == 1
+
+
+def test_what_waits_for_upload_is_not_silently_left_out_of_an_export(
+    settings: ServerSettings, jobs: Jobs, tmp_path: Path
+) -> None:
+    record(settings.store.url, settings.recorder.spool, sent=False)
+    waits = look(settings).sessions[0]
+    job = over(jobs.add("export", work.export(settings, waits, Choice(), "csv", tmp_path / "walk.csv")))
+    assert job.state is JobState.FAILED
+    assert "waits for upload" in job.said
+    both = msgspec.structs.replace(waits, uploaded=True)
+    over(jobs.add("upload", work.upload(settings)))
+    copied = tmp_path / "spool" / "00000001.uploaded.db"
+    copied.rename(tmp_path / "spool" / "00000001.db")
+    job = over(jobs.add("export", work.export(settings, both, Choice(), "csv", tmp_path / "walk.csv")))
+    assert job.said.endswith(f"{BATCHES * ROWS} newer rows wait for upload and are not in it")
