@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel
 from server_gui.core.processing.units import Unit
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plot import Curve, Plot
+from server_gui.views.widgets.plot import Curve, Plot, css
 
 # Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
 OTHERS: Final = ("#009e73", "#cc79a7", "#d55e00", "#f0e442", "#8f8fd6", "#7fb36b")
@@ -39,7 +39,7 @@ class UnitPlot(Card):
     def show_values(self, values: Sequence[float | None]) -> None:
         """The newest value of each curve, behind its name."""
         names = (
-            f'<span style="color:{_css(self._theme, curve.colour)}">━ {curve.channel} '
+            f'<span style="color:{css(self._theme, curve.colour)}">━ {curve.channel} '
             f"<b>{self.unit.text(value)}</b></span>"
             for curve, value in zip(self._curves, values, strict=True)
         )
@@ -57,7 +57,3 @@ def _colours(channels: Sequence[str]) -> list[str]:
         else:
             colours.append(next(others))
     return colours
-
-
-def _css(theme: Theme, colour: str) -> str:
-    return colour if colour.startswith("#") else theme.colour(colour).name()

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from msgspec import UNSET, UnsetType
+from msgspec.structs import replace
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Batch, ClockOffset, ConnectionState
@@ -17,10 +18,12 @@ from gateway.messages import (
     ComponentInfo,
     CpuUse,
     Description,
+    DiskUse,
     GatewayUse,
     GuardInfo,
     LayoutInfo,
     MemoryUse,
+    NetworkUse,
     ParameterInfo,
     ParameterValue,
     ParameterValues,
@@ -29,6 +32,7 @@ from gateway.messages import (
     ResourceSnapshot,
     Snapshot,
     StopInfo,
+    Throttling,
 )
 from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.desk import Desk
@@ -249,7 +253,12 @@ def resources(processes: Sequence[ProcessUse] | None = None) -> Resources:
         GatewayUse(0.7, 15 << 20),
     )
     if processes is not None:
-        snapshot = ResourceSnapshot(
-            snapshot.stamp_ns, snapshot.cpu, snapshot.memory, snapshot.gateway, list(processes)
+        snapshot = replace(
+            snapshot,
+            processes=list(processes),
+            disk=DiskUse(20480.0, 4096.0),
+            network=NetworkUse(1024.0, 65536.0),
+            thermal={"cpu": 61.5, "board": None, "gpu": 48.0},
+            throttling=Throttling(0, {"fan": 0.0}, [1.0, 0.8]),
         )
     return Resources(snapshot, 1_500_000, time.monotonic_ns())

@@ -1,14 +1,17 @@
 """Resources: asked for only while they are looked at; the table keeps what people have done to it."""
 
+import re
 import time
 from collections.abc import Iterator
 
 import pytest
+from msgspec.structs import replace
 from PySide6.QtCore import Qt
 
 from gateway.client import ConnectionState
-from gateway.messages import BudgetInfo, ClientCost, GatewayCost, ProcessUse
+from gateway.messages import BudgetInfo, ClientCost, GatewayCost, ProcessUse, Throttling
 from server_gui.core.events import Costs, LinkChanged
+from server_gui.views.computer import held_back
 from server_gui.views.processes import CPU, MEMORY, NAME
 from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
@@ -103,6 +106,52 @@ def test_who_causes_what_monitoring_costs_is_told_until_the_link_drops(view: Res
 def client(who: str, cpu_percent: float | None) -> ClientCost:
     rate = None if cpu_percent is None else 12288.0
     return ClientCost(who, cpu_percent, rate, rate, rate, 0, [])
+
+
+def test_disk_network_heat_and_who_uses_the_cpu_are_shown_over_time(view: Resources, bench: Bench) -> None:
+    bench.station.take([resources()])
+    for percent in (10.0, 40.0):
+        show(view, bench, use("gait_ctrl", 1, percent), use("<b>", 2, 5.0), use("idle", 3, None))
+    assert bench.station.processing.resource.devices.recent().shape == (2, 6)
+    told = {
+        card: "".join(card.legend.text().split("&nbsp;"))
+        for card in (view.devices, view.temperature, view.top)
+    }
+    assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.devices]) == [
+        ("disk read", "20.0"),
+        ("written", "4.0"),
+        ("network in", "1.0"),
+        ("out", "64.0"),
+    ]
+    assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.temperature]) == [("hottest °C", "61.5")]
+    assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.top]) == [
+        ("gait_ctrl", "40.0"),
+        ("&lt;b&gt;", "5.0"),
+    ]
+
+
+def test_what_holds_the_cores_back_is_told(bench: Bench) -> None:
+    seen = resources([]).snapshot
+    assert held_back(None) == ""
+    assert held_back(seen) == "slowest core at 80 % of its frequency"
+    hot = Throttling(3, {"processor": 0.4, "fan": 0.0}, [None])
+    assert (
+        held_back(replace(seen, throttling=hot))
+        == "▲ too hot 3× since its start · ▲ processor holds back 40 %"
+    )
+    assert held_back(replace(seen, throttling=Throttling(None, {}, []))) == "nothing holds the cores back"
+
+
+def test_who_leaks_is_said(view: Resources, bench: Bench) -> None:
+    for minute in range(60):
+        for part in range(2):
+            seen = resources([use("gait_ctrl", 1, 1.0, (50 + minute) * MIB)]).snapshot
+            stamp_ns = round((minute * 60 + part * 30) * 1e9)
+            bench.station.processing.resource.take(replace(seen, stamp_ns=stamp_ns))
+    bench.station.robot.apply(resources())
+    for _ in range(6):
+        view.refresh()
+    assert "▲ gait_ctrl (1) grows by 60.0 MiB an hour" in view.facts.text()
 
 
 def test_a_first_look_has_no_percentages_and_says_so(view: Resources, bench: Bench) -> None:

@@ -2,18 +2,19 @@
 
 import collections
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from msgspec import UNSET
 
 from gateway.messages import ProcessUse, ResourceSnapshot
-from server_gui.core.processing.history import COARSE_S, History
+from server_gui.core.processing.history import COARSE_S, Floats, History
 from server_gui.core.processing.trend import Slope, theil_sen
 
 PROCESSES = 256  # that are followed at a time; the longest unseen goes
 TOP_S = 60.0  # the window of the top consumers
+PERCENTAGES = 120  # of CPU that are kept of each process
 LEAK_MINUTES = 120  # of a process's memory that are judged
 LEAK_FEWEST = 20  # minutes before anything is said, after the first ones
 WARM_UP_MINUTES = 5  # programs grow while they start
@@ -28,6 +29,8 @@ SERIES = (
     "gateway_cpu_percent",
     "gateway_rss",
 )
+
+DEVICES = ("disk_read", "disk_written", "received", "sent", "hottest")  # B/s; °C
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +69,8 @@ class ResourceProcessing:
 
     def __init__(self) -> None:
         self.history = History(SERIES)
+        self.devices = History(DEVICES)  # of looks that were asked for them
+        self._looks: collections.deque[float] = collections.deque(maxlen=PERCENTAGES)  # at processes, s
         self._processes: collections.OrderedDict[tuple[int, str], _Process] = collections.OrderedDict()
         self._now_s = 0.0
 
@@ -84,7 +89,11 @@ class ResourceProcessing:
                 gateway.rss_bytes,
             ),
         )
+        self._take_devices(snapshot)
         if snapshot.processes is not UNSET:
+            if self._looks and self._now_s < self._looks[-1]:
+                self._looks.clear()  # the robot's clock has begun anew
+            self._looks.append(self._now_s)
             for process in snapshot.processes:
                 self._seen(process)
 
@@ -101,6 +110,20 @@ class ResourceProcessing:
         if by == "cpu":
             return sorted(seen, key=lambda one: -(one.cpu_percent or 0.0))[:limit]
         return sorted(seen, key=lambda one: -one.memory_bytes)[:limit]
+
+    def over_time(self, consumers: Sequence[Consumer]) -> tuple[Floats, list[Floats]]:
+        """Times (s) of the last looks at processes, and the CPU of each of these, NaN where not known."""
+        times = np.array(self._looks, np.float64)
+        return times, [self._processes[one.pid, one.name].percentages(self._looks) for one in consumers]
+
+    def _take_devices(self, snapshot: ResourceSnapshot) -> None:
+        disk, network, thermal = snapshot.disk, snapshot.network, snapshot.thermal
+        if disk is UNSET or network is UNSET or thermal is UNSET:
+            return
+        hottest = max((value for value in thermal.values() if value is not None), default=None)
+        disks = disk.read_bytes_per_s, disk.write_bytes_per_s
+        networks = network.received_bytes_per_s, network.sent_bytes_per_s
+        self.devices.append(self._now_s, (*disks, *networks, hottest))
 
     def leaks(self) -> list[Leak]:
         """The processes that surely leak, the fastest first."""
@@ -123,7 +146,7 @@ class _Process:
 
     def __init__(self, pid: int, name: str) -> None:
         self._pid, self._name = pid, name
-        self._cpu: collections.deque[tuple[float, float]] = collections.deque(maxlen=120)
+        self._cpu: collections.deque[tuple[float, float]] = collections.deque(maxlen=PERCENTAGES)
         self._minutes: collections.deque[tuple[float, float]] = collections.deque(maxlen=LEAK_MINUTES)
         self._minute: list[int] = []
         self._minute_s = 0.0
@@ -147,6 +170,11 @@ class _Process:
         if self._begun > WARM_UP_MINUTES:
             self._minutes.append((self._minute_s, statistics.median(self._minute)))
         self._minute.clear()
+
+    def percentages(self, times: Iterable[float]) -> Floats:
+        """Its CPU at these looks."""
+        known = dict(self._cpu)
+        return np.array([known.get(at_s, np.nan) for at_s in times], np.float64)
 
     def is_here(self, now_s: float) -> bool:
         return 0.0 <= now_s - self._seen_s <= TOP_S

@@ -250,5 +250,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         )
 
 
+def css(theme: Theme, name: str) -> str:
+    """A curve's colour for texts."""
+    return _colour(theme, name).name()
+
+
 def _colour(theme: Theme, name: str) -> QColor:
     return QColor(name) if name.startswith("#") else theme.colour(name)

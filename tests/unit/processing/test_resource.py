@@ -29,6 +29,26 @@ def look(second: float, *processes: ProcessUse, cpu: float | None = 10.0) -> Res
 # --- usage over time
 
 
+def test_the_cpu_of_processes_is_told_at_the_looks_that_saw_them() -> None:
+    resource = ResourceProcessing()
+    resource.take(look(0, ProcessUse(1, "old", 50.0, MIB)))
+    resource.take(look(1, ProcessUse(1, "old", 60.0, MIB), ProcessUse(2, "new", 20.0, MIB)))
+    resource.take(look(2, ProcessUse(1, "old", None, MIB), ProcessUse(2, "new", 30.0, MIB)))
+    top = resource.top(2)
+    times, columns = resource.over_time(top)
+    assert [one.name for one in top] == ["old", "new"]
+    assert times.tolist() == [0.0, 1.0, 2.0]
+    np.testing.assert_array_equal(columns, [[50.0, 60.0, np.nan], [np.nan, 20.0, 30.0]])
+
+
+def test_a_robot_that_was_started_again_begins_its_looks_anew() -> None:
+    resource = ResourceProcessing()
+    for second in (100, 101, 5):
+        resource.take(look(second, ProcessUse(1, "p", 1.0, MIB)))
+    times, (column,) = resource.over_time(resource.top(1))
+    assert (times.tolist(), column.tolist()) == ([5.0], [1.0])
+
+
 def test_usage_is_kept_second_by_second_and_then_minute_by_minute() -> None:
     resource = ResourceProcessing()
     for second in range(3601):

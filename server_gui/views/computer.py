@@ -1,0 +1,55 @@
+"""What is known of the robot's computer, in words: load, temperatures, what monitoring costs, who leaks."""
+
+from typing import Final
+
+from msgspec import UNSET
+
+from gateway.messages import GatewayCost, ResourceSnapshot
+from server_gui.core.desk.station import Station
+
+MIB: Final = 1 << 20
+KIB: Final = 1 << 10
+CLIENTS: Final = 4  # those that cost the most
+
+
+def facts(station: Station, seen: ResourceSnapshot) -> str:
+    """A line each."""
+    load = " ".join(f"{one:.2f}" for one in seen.cpu.load)
+    lines = [f"Load over 1, 5 and 15 minutes: {load}", f"Gateway: {seen.gateway.rss_bytes / MIB:.1f} MiB"]
+    table = station.processes
+    if table is not None and table.thermal is not UNSET:
+        known = [f"{name} {value:.0f} °C" for name, value in table.thermal.items() if value is not None]
+        lines.append(f"Temperatures: {', '.join(known) or 'this computer tells none'}")
+    lines += _costs(station.cost)
+    if seen.memory.swap_used:
+        lines.append(f"Swapped out: {seen.memory.swap_used / MIB:.0f} MiB")
+    lines += [f"▲ {leak.text}" for leak in station.processing.resource.leaks()]
+    return "\n".join(lines)
+
+
+def held_back(seen: ResourceSnapshot | None) -> str:
+    """How far the cores are held back because it is too hot, or for power."""
+    if seen is None or seen.throttling is UNSET:
+        return ""
+    told = seen.throttling
+    said = [f"▲ too hot {told.events}× since its start"] if told.events else []
+    said += [f"▲ {name} holds back {100 * share:.0f} %" for name, share in told.cooling.items() if share]
+    slowest = min((share for share in told.frequency if share is not None), default=None)
+    if slowest is not None:
+        said.append(f"slowest core at {100 * slowest:.0f} % of its frequency")
+    return " · ".join(said) or "nothing holds the cores back"
+
+
+def _costs(cost: GatewayCost | None) -> list[str]:
+    """Who causes what the gateway takes, the most first."""
+    if cost is None or cost.wake_ups_per_s is None:
+        return []
+    lines = [f"Monitoring wakes the computer {cost.wake_ups_per_s:.0f} times a second; for"]
+    known = [one for one in cost.clients if one.cpu_percent is not None]
+    clients = sorted(known, key=lambda one: -(one.cpu_percent or 0.0))
+    for one in clients[:CLIENTS]:
+        sent_bytes = one.sent_bytes_per_s or 0.0
+        lines.append(f"   {one.who}: {one.cpu_percent or 0.0:.1f} % of a core, {sent_bytes / KIB:.0f} KiB/s")
+    if cost.budget is not None and cost.budget.shed > 1:
+        lines.append(f"▲ To keep to its budget the robot sends one row of {cost.budget.shed}")
+    return lines

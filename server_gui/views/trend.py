@@ -1,0 +1,75 @@
+"""One card of something over the last minutes: curves, and their names with the newest values."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
+
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plot import Curve, Plot, css
+
+Floats = npt.NDArray[np.float64]
+SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest that holds what there is
+
+
+class Trend(Card):
+    """`least` is the smallest range that is shown, in the unit of `scale` times what comes."""
+
+    def __init__(self, theme: Theme, title: str, least: float, scale: float = 1.0) -> None:
+        super().__init__(title)
+        self._theme = theme
+        self._scale = scale
+        self._shown: tuple[object, ...] = ()
+        self._rows = object()  # another one where what is drawn is no longer only added to
+        self.plot = Plot(theme, SPANS_S[0], least)
+        self.legend = QLabel()
+        self.legend.setTextFormat(Qt.TextFormat.RichText)
+        self.legend.setWordWrap(True)
+        self.body.addWidget(self.legend)
+        self.body.addWidget(self.plot, 1)
+        self._resize()
+        theme.scaled.connect(self._resize)
+
+    def show_rows(
+        self,
+        source: object,
+        times: Floats,
+        curves: Sequence[Curve],
+        columns: Sequence[Floats],
+        *,
+        live: bool,
+    ) -> None:
+        """A column a curve over the times (s, rising); nothing where there are none."""
+        if not len(times):
+            return
+        span = next((seconds for seconds in SPANS_S if times[-1] - times[0] < seconds), SPANS_S[-1])
+        if self.plot.seconds != span:
+            self.plot.set_seconds(span)
+        if (source, tuple(curves)) != self._shown:
+            self._shown, self._rows = (source, tuple(curves)), object()
+            self.plot.set_curves(curves)
+        self.plot.draw(self._rows, times, columns, live=live, scale=self._scale)
+        self._say(curves, columns)
+
+    def _resize(self) -> None:
+        self.setMinimumHeight(self._theme.px(110))
+
+    def _say(self, curves: Sequence[Curve], columns: Sequence[Floats]) -> None:
+        said = []
+        for curve, values in zip(curves, columns, strict=True):
+            known = values[~np.isnan(values)]
+            newest = f"<b>{known[-1] * self._scale:.1f}</b>" if len(known) else "–"
+            colour = css(self._theme, curve.colour)
+            text = f"━ {curve.channel} {newest}".replace(" ", "&nbsp;")
+            said.append(f'<span style="color:{colour}">{text}</span>')
+        set_text(self.legend, "&nbsp; ".join(said))
+
+
+def since_restart(rows: Floats) -> Floats:
+    """The rows since the robot's clock has begun anew; the time is their first column."""
+    restarts = np.flatnonzero(np.diff(rows[:, 0]) < 0)
+    return rows[restarts[-1] + 1 :] if len(restarts) else rows
