@@ -3,8 +3,10 @@
 Where the window records, each robot is followed by a collector, which keeps what comes before it is shown.
 """
 
+import collections
 import concurrent.futures
 import contextlib
+import functools
 import os
 import signal
 import sys
@@ -30,6 +32,8 @@ from server_gui.core.fleet.collector import Collector, whole
 from server_gui.core.fleet.elsewhere import Elsewhere
 from server_gui.core.mailbox import Mailbox
 from server_gui.core.network import Network
+from server_gui.core.prediction.news import Foreseen
+from server_gui.core.prediction.predicting import Predicting
 from server_gui.core.processing.units import Units
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings import RecordingSettings, ServerSettings, name_of
@@ -50,6 +54,7 @@ FOLLOWING: Final = Following(
     journal_s=2.0,
 )
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
+FORESEEN: Final = 4096  # what may wait for a window that hangs
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 
 
@@ -107,6 +112,7 @@ class App:
         self._following = following
         self._followed: list[Followed] = []
         self._mailboxes: dict[str, Mailbox] = {}
+        self._foreseen: collections.deque[Foreseen] = collections.deque(maxlen=FORESEEN)
         self._poster = Poster()
         self._collector, self._elsewhere, why = None, None, "the window was started to show only"
         if record is not None:
@@ -114,6 +120,9 @@ class App:
             self._elsewhere = None if self._collector else Elsewhere(settings.recorder.spool)
         self.desk.recording = self._recording(self._collector or self._elsewhere, why)
         self.network = self._collector.network if self._collector else Network()
+        self._foresees = settings.prediction.enabled
+        here = self._foresees and self._collector is None  # else the collector does it
+        self._predicting = Predicting(settings, self._foreseen.extend) if here else None
         self._by_source = self._collector is not None and settings.recorder.rate_hz == 0
         self._own = OwnRobot(self._own_ready, self._own_failed)
         self._desk_units(kept)
@@ -136,6 +145,8 @@ class App:
 
     def __enter__(self) -> "App":
         (self._collector or self.network).__enter__()
+        if self._predicting is not None:
+            self._predicting.__enter__()
         for name, robot in self._robots.items():
             self.follow(name, robot.where)
         self._timer.start()
@@ -148,6 +159,8 @@ class App:
         if self._elsewhere is not None:
             self._elsewhere.close()
         (self._collector or self.network).__exit__(*exc)
+        if self._predicting is not None:
+            self._predicting.__exit__(*exc)
 
     @property
     def hangs(self) -> bool:
@@ -159,6 +172,7 @@ class App:
         mailbox = Mailbox()
         link = Link(self.network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
+        station.predictions.off = not self._foresees
         self._mailboxes[name] = mailbox
         tasks = (self.network.run(link.run()), self._follow_feed(name, address))
         self._followed.append(Followed(station, mailbox, tasks, Ticks() if self._by_source else None))
@@ -180,6 +194,9 @@ class App:
             for task in followed.tasks:
                 if task.done() and not task.cancelled():
                     task.result()  # it ends only by a mistake of ours, which must not stay unseen
+        stations = {station.name: station for station in self.desk}
+        for foreseen in [self._foreseen.popleft() for _ in range(len(self._foreseen))]:
+            stations[foreseen.robot].foresee(foreseen)
         if self._collector is not None:
             self._collector.wait(0.0)
         self.desk.recording.look()
@@ -192,7 +209,9 @@ class App:
         following = shown_and_recorded(settings.recorder)
         nobody = replace(settings, robots={})  # each is told when the window follows it
         try:
-            return Collector(nobody, record.operator, record.notes, following, self._show), ""
+            return Collector(
+                nobody, record.operator, record.notes, following, self._show, self._foreseen.extend
+            ), ""
         except SpoolUnusable as error:
             return None, str(error)
 
@@ -203,7 +222,13 @@ class App:
     def _follow_feed(self, name: str, address: Address) -> "concurrent.futures.Future[None]":
         if self._collector is not None:
             return self._collector.follow(name, address)
-        return self.network.run(Feed(address, self._mailboxes[name].put, self._following).run())
+        return self.network.run(Feed(address, functools.partial(self._shown, name), self._following).run())
+
+    def _shown(self, robot: str, event: Event) -> None:
+        """What is not recorded, in the network's thread."""
+        if self._predicting is not None:
+            self._predicting.take(robot, event)
+        self._mailboxes[robot].put(event)
 
     def _show(self, robot: str, event: Event) -> None:
         """What was kept is shown; in the network's thread. The table of processes has a look of its own."""

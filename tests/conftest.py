@@ -32,8 +32,9 @@ def _descriptors() -> set[str]:
 
 @pytest.fixture(autouse=True)
 def records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test sees the records that another one's gateway has kept, nor those of this computer's user."""
+    """No test sees what another one's gateway or server has kept, nor that of this computer's user."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     monkeypatch.delenv("STATE_DIRECTORY", raising=False)
 
 
