@@ -7,8 +7,11 @@ import pytest
 
 from ml.store import Store
 from ml.store.sessions import NoSuchSession, channels, find, happenings, labels, sessions, telemetry
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import send
 from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, record
-from tests.unit.recording.robots import stamp_ns, value
+from tests.unit.recording.robots import batch, stamp_ns, value
 
 KNEE = "left_knee.position"
 
@@ -25,6 +28,25 @@ def test_a_session_is_found_with_everything_that_is_known_of_it(store_url: str, 
     }
     assert [event["kind"] for event in happenings(recorded.store, session)] == ["gap", "marker"]
     assert [row["label"] for row in labels(recorded.store, session)] == ["walk"]
+
+
+def test_a_channels_samples_are_what_it_has_and_no_other_robots_channels(
+    folder_url: str, tmp_path: Path
+) -> None:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool:
+        with Recorder(spool) as recorder:
+            for seq in range(4):
+                recorder.record("exo-01", 1, batch(seq, missing=("left_knee.velocity",) if seq else ()))
+                recorder.record("exo-02", 1, batch(seq, channels=("trunk.tilt_forward",)))
+        store = Store(folder_url)
+        send(spool, 1, store)
+    found = {each.robot: channels(store, each) for each in sessions(store)}
+    assert {each.name: each.samples for each in found["exo-01"]} == {
+        "left_knee.position": 4,
+        "left_knee.velocity": 1,
+        "trunk.tilt_forward": 4,
+    }
+    assert [each.name for each in found["exo-02"]] == ["trunk.tilt_forward"]
 
 
 def test_telemetry_comes_in_times_order_whatever_the_files(folder_url: str, tmp_path: Path) -> None:
