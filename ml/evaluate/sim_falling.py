@@ -14,12 +14,10 @@ from ml.evaluate.folds import Split
 from ml.evaluate.outcome import Outcome
 from ml.evaluate.search import Search
 from ml.evaluate.sim import (
-    NO_FEET,
     NOISE,
     SETTINGS,
     WHOLE,
     WHY,
-    Variant,
     disturbed,
     in_folds,
     people,
@@ -36,6 +34,7 @@ SURE: Final = 0.9  # of a near fall or a fall together …
 DECISIONS: Final = 2  # … in so many decisions one after the other is an alarm
 LONGEST_MS: Final = 1500.0  # after a stumble's beginning, in which an alarm is its own
 NEVER: Final = -1
+RECIPE: Final = recipe_of(FALLING_TASK, WHOLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,41 +47,38 @@ class Event:
 
 
 def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
-    """Folds of people, by people; then a robot without insoles, and other people's noise."""
+    """Folds of people, by people; then other people's noise."""
     sessions = people(path)
-    whole = examples(FALLING_TASK, recipe_of(FALLING_TASK, WHOLE), sessions, STEP)
+    whole = examples(FALLING_TASK, RECIPE, sessions, STEP)
     names = np.array([FALLING_TASK.fold.get(label, "") for label in whole.label])
     if not np.isin(("near_fall", "fall"), names).all():
         raise UnusableData(
             f"{path} needs both stumbles and falls: gwrms sim-record --scenario practice has them"
         )
-    likely = _judged(WHOLE, whole, whole, names)
+    likely = _judged(whole, whole, names)
     figures = _figures(whole, names, likely)
-    for variant in (NOISE, NO_FEET):
-        recipe = recipe_of(FALLING_TASK, variant)
-        seen = examples(FALLING_TASK, recipe, disturbed(sessions) if variant.noisy else sessions, STEP)
-        other = _figures(seen, names, _judged(variant, whole if variant.noisy else seen, seen, names))
-        figures |= {f"{variant.name}{name}": other[name] for name in ("sensitivity", "false_alarms_per_hour")}
+    noisy = examples(FALLING_TASK, RECIPE, disturbed(sessions), STEP)
+    other = _figures(noisy, names, _judged(whole, noisy, names))
+    figures |= {f"{NOISE.name}{name}": other[name] for name in ("sensitivity", "false_alarms_per_hour")}
     by_subject = {
         str(one): _figures(*_of(whole, names, likely, whole.subject == one))
         for one in np.unique(whole.subject)
     }
-    classes = FALLING_TASK.classes(recipe_of(FALLING_TASK, WHOLE))
+    classes = FALLING_TASK.classes(RECIPE)
     known = names != ""
     truth = (names[known, None] == np.array(classes)).argmax(axis=1)
     counts = metrics.confusion(truth, likely[known].argmax(axis=1), len(classes))
     return Outcome(figures, len(by_subject), by_subject, "subject", classes, counts, SETTINGS, (WHY,))
 
 
-def _judged(variant: Variant, taught: Examples, seen: Examples, names: npt.NDArray[np.str_]) -> Any:
+def _judged(taught: Examples, seen: Examples, names: npt.NDArray[np.str_]) -> Any:
     """(n, 3) probabilities of steady, near fall and fall, of people not learned from."""
-    recipe = recipe_of(FALLING_TASK, variant)
     taken = (names != STEADY) | (np.arange(len(names)) % STEADY_SHARE == 0)
 
     def fold(split: Split) -> Any:
         train, held_out = split
         rows = train[taken[train]]
-        learned = learn(FALLING_TASK, recipe, taught.features[rows], names[rows], taught.subject[rows])
+        learned = learn(FALLING_TASK, RECIPE, taught.features[rows], names[rows], taught.subject[rows])
         return learned.judge(seen.features[held_out]).probabilities
 
     likely = np.zeros((len(names), len(FALLING_TASK.support)))

@@ -1,6 +1,6 @@
 """Blocks of features, one for each group of sensors and task: windows at 50 Hz → columns.
 
-For activity and falls a robot's left and right count without their names; for the phase they are everything.
+For activity a robot's left and right count without their names; for the phase they are everything.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ml.features.blocks import bins, flat, moments
-from ml.features.falling import FALLING
+from ml.features.falling import BEFORE, FALLING
 from ml.features.signals import length
 from ml.features.windows import Samples
 
@@ -63,25 +63,12 @@ def trunk_phase(trunk: Samples) -> Samples:
     return bins(trunk[:, [0, 1, 2, 3, 5, 7]], 5, 20)
 
 
-def joints_falling(pair: Samples) -> Samples:
-    return _sudden(pair)
-
-
-def feet_falling(pair: Samples) -> Samples:
-    return _sudden(pair / KILO)
-
-
 def trunk_falling(trunk: Samples) -> Samples:
-    """How light the body is, how fast it turns and tips over, from which posture."""
-    leaning = np.abs(trunk[:, 6:])
-    return np.concatenate(
-        [
-            FALLING.compute(trunk[:, :6]),
-            *(moments(leaning, samples) for samples in SHORT_LENGTHS),
-            bins(trunk[:, [0, 2, 4]], 5, 10),
-        ],
-        axis=1,
-    )
+    """How light the body is, how fast it turns and tips over, from which posture; a usual lean is no news."""
+    leaning = trunk[:, 6:] - trunk[:, 6:, :BEFORE].mean(axis=-1, keepdims=True)
+    leaning[:, 1] = np.abs(leaning[:, 1])
+    tilts = (moments(leaning, samples) for samples in SHORT_LENGTHS)
+    return np.concatenate([FALLING.compute(trunk[:, :6]), *tilts, bins(leaning, 5, 10)], axis=1)
 
 
 def _activity(pair: Samples) -> Samples:
@@ -90,13 +77,6 @@ def _activity(pair: Samples) -> Samples:
     return np.concatenate(
         [*(moments(signals, samples) for samples in LENGTHS), bins(ends, 10, 10), flat(ends[..., -1:])],
         axis=1,
-    )
-
-
-def _sudden(pair: Samples) -> Samples:
-    signals = _unnamed(pair)
-    return np.concatenate(
-        [*(moments(signals, samples) for samples in SHORT_LENGTHS), bins(signals, 5, 10)], axis=1
     )
 
 
@@ -128,6 +108,6 @@ BLOCKS: Final[Mapping[str, Mapping[str, Block]]] = MappingProxyType(
             "trunk": trunk_activity,
         },
         "gait_phase": {**dict.fromkeys(_JOINTS, joints_phase), "feet": feet_phase, "trunk": trunk_phase},
-        "falling": {**dict.fromkeys(_JOINTS, joints_falling), "feet": feet_falling, "trunk": trunk_falling},
+        "falling": {"trunk": trunk_falling},  # legs differ more between people than falls do
     }
 )

@@ -4,7 +4,7 @@ Probabilities, the threshold below which it abstains and the limit of what it kn
 left out; then it learns from all.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -26,7 +26,7 @@ FOLDS: Final = 3
 LEAST_ROWS: Final = 20  # of each class
 HIDDEN: Final = (64,)
 BATCH: Final = 256
-PENALTY: Final = 1e-2
+PENALTY: Final[Mapping[str, float]] = {"activity": 0.01, "gait_phase": 0.01, "falling": 1.0}
 EPOCHS: Final = 12
 ONLY_TO_LEARN: Final = ("_optimizer", "_random_state")  # of a network: no part of what it says
 TEMPERATURES: Final = np.geomspace(0.3, 6.0, 60)
@@ -73,7 +73,7 @@ def _classes(
         _enough(name, int((truth == name).sum()))
     targets = (truth[rows, None] == np.array(classes)).argmax(axis=1)
     model, unseen, limits = _taught(
-        features[rows], targets, group[rows], lambda: _classifier(seed), len(classes), seed
+        features[rows], targets, group[rows], lambda: _classifier(task, seed), len(classes), seed
     )
     temperature = _temperature(unseen, targets)
     probabilities = softmax(unseen / temperature)
@@ -91,7 +91,7 @@ def _phases(
     steps = ~np.isnan(truth[:, 0])
     _enough("steps", int(steps.sum()))
     model, unseen, limits = _taught(
-        features[rows], pointers(truth), group[rows], lambda: _regressor(seed), 4, seed
+        features[rows], pointers(truth), group[rows], lambda: _regressor(task, seed), 4, seed
     )
     phases, lengths = on_circle(unseen.astype(np.float32))
     error = np.abs((phases - np.where(steps[:, None], truth, 0.0) + 0.5) % 1.0 - 0.5)
@@ -151,12 +151,14 @@ def _columns(network: Any, found: Rows, columns: int) -> Floats:
     return every
 
 
-def _classifier(seed: int) -> Any:
-    return MLPClassifier(HIDDEN, alpha=PENALTY, max_iter=EPOCHS, random_state=seed)
+def _classifier(task: Task, seed: int) -> Any:
+    return MLPClassifier(HIDDEN, alpha=PENALTY[task.name], max_iter=EPOCHS, random_state=seed)
 
 
-def _regressor(seed: int) -> Any:
-    return MLPRegressor(hidden_layer_sizes=HIDDEN, alpha=PENALTY, max_iter=EPOCHS, random_state=seed)
+def _regressor(task: Task, seed: int) -> Any:
+    return MLPRegressor(
+        hidden_layer_sizes=HIDDEN, alpha=PENALTY[task.name], max_iter=EPOCHS, random_state=seed
+    )
 
 
 def _temperature(unseen: Floats, targets: npt.NDArray[np.int_]) -> float:

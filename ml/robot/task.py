@@ -45,7 +45,7 @@ class Task:
 
     def recipe(self, channels: Set[str]) -> Recipe | None:
         """The richest recipe that these channels allow; None where this robot cannot."""
-        groups = present(channels)
+        groups = [group for group in present(channels) if group in BLOCKS[self.name]]
         return self._recipe(groups) if self._classes(groups) else None
 
     def classes(self, recipe: Recipe) -> tuple[str, ...]:
@@ -64,7 +64,7 @@ class Task:
     def _groups(self, name: str) -> tuple[str, ...]:
         task, _, text = name.partition("/")
         groups = tuple(text.split("+"))
-        in_order = tuple(group for group in GROUPS if group in groups)
+        in_order = tuple(group for group in GROUPS if group in groups and group in BLOCKS[self.name])
         if task != self.name or groups != in_order or not self._classes(groups):
             raise UnusableModel(
                 f"{name!r} is no recipe of {self.name}: expected {self.name}/ and groups of sensors in this"

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from ml.errors import UnusableData
-from ml.evaluate import BENCHMARKS
+from ml.evaluate import BENCHMARKS, sim, sim_activity, sim_phase
 from ml.robot import familiar, learn
 from server_gui.commands.evaluate import main
 from tests.unit.ml_robot.recorded import written
@@ -15,8 +15,12 @@ from tests.unit.ml_robot.recorded import written
 
 @pytest.fixture(autouse=True)
 def small_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(learn, "EPOCHS", 40)  # there are few rows to learn from
-    monkeypatch.setattr(familiar, "PROTOTYPES", 32)
+    monkeypatch.setattr(learn, "EPOCHS", 30)  # there are few rows to learn from
+    monkeypatch.setattr(learn, "FOLDS", 2)
+    monkeypatch.setattr(familiar, "PROTOTYPES", 16)
+    monkeypatch.setattr(familiar, "COMPONENTS", 8)
+    monkeypatch.setattr(sim_activity, "VARIANTS", (sim.NO_TRUNK,))
+    monkeypatch.setattr(sim_phase, "VARIANTS", (sim.HIPS,))
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +46,7 @@ def test_activity_of_clockwork_people_is_known(file: Path, capsys: pytest.Captur
     assert found["abnormal_found_fraction"] > 0.8 > 0.1 > found["abnormal_false_fraction"]
     assert 0.3 < found["noise_macro_f1"] <= found["macro_f1"] + 0.05
     assert found["calibration_error"] < 0.1
-    assert {"no_feet_macro_f1", "no_trunk_macro_f1", "only_hips_trunk_macro_f1", "accuracy"} <= set(found)
+    assert found["no_trunk_macro_f1"] > 0.8
 
 
 def test_phase_of_clockwork_people_is_known(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,7 +64,7 @@ def test_falls_of_clockwork_people_are_foreseen(file: Path, capsys: pytest.Captu
     assert found["stumble_sensitivity"] > 0.9
     assert 300.0 < found["median_lead_ms"] < 1200.0
     assert found["false_alarms_per_hour"] < 200.0  # in three minutes of steady life: a handful
-    assert {"noise_sensitivity", "no_feet_false_alarms_per_hour"} <= set(found)
+    assert {"noise_sensitivity", "noise_false_alarms_per_hour"} <= set(found)
 
 
 def test_two_people_are_too_few_to_judge_by(tmp_path: Path) -> None:
