@@ -10,7 +10,8 @@ EPILOG = """keys
   F12, Ctrl+Space   STOP the robot that is looked at: quick stop on every drive. It is software over a
                     network, not a safety-rated emergency stop
   Ctrl+F            find a parameter
-  Alt+O, S, R       overview, signals, resources
+  Alt+O, S, R, C, L overview, signals, resources, recordings, cloud
+  Space             in a recording: play, or stand still; I and O begin and end a span
 
 What comes is recorded as gwrms collect records it, into the same spool and store, as long as the window is
 open. Where a collector owns the spool already, the window only shows, and says who records.
