@@ -6,81 +6,115 @@ whole and in sight, nothing is wider than the screen, and the picture is not bla
 
 import concurrent.futures
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QApplication
 
 from gateway.messages import ProcessUse
-from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, looked, resources, walking
+from tests.gui.foreseen import predicted
+from tests.gui.test_archive import (  # noqa: F401  # fixtures
+    Shown,
+    archive,
+    play,
+    posted,
+    record,
+    settings,
+    shown,
+    window,
+)
 
 FOLDER = Path(__file__).parents[2] / "build" / "screenshots"
-SCREENS = {"1366x768": (1366, 768), "4k": (3840, 2160)}
+SMALL, LARGE = ("1366x768", 1366, 768), ("4k", 3840, 2160)
 LIGHTLY = 80  # compressed, of 0 (most) to 100
 
 
+Save = Callable[[QImage, str], None]
+
+
 @pytest.fixture
-def writers() -> Iterator[concurrent.futures.Executor]:
+def save() -> Iterator[Save]:
+    """Saves pictures beside what goes on."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        yield pool
+        saving: list[concurrent.futures.Future[bool]] = []
+        yield lambda image, name: saving.append(pool.submit(_save, image, FOLDER / name))
+        assert all(future.result() for future in saving)
+
+
+def _save(image: QImage, path: Path) -> bool:
+    return image.save(str(path), quality=LIGHTLY)
 
 
 def busy(bench: Bench) -> None:
-    """A robot that walks, another with a fault, staged edits, processes."""
+    """A robot that walks and has a fault, another without data, predictions, staged edits, processes."""
     bench.add("exo-02", 7421)
     processes = [
-        ProcessUse(800 + number, f"process-{number}", 21.4 / (number + 1), 47 << 20) for number in range(30)
+        ProcessUse(800 + place, f"process-{place}", 21.4 / (place + 1), 47 << 20) for place in range(30)
     ]
-    bench.look_again(
-        [looked(state="fault", problem="i²t at 83 % of its limit"), resources(processes), resources()]
-    )
+    faulty = looked(state="fault", problem="i²t at 83 % of its limit")
+    bench.look_again([faulty, resources(processes), resources()])
     bench.station.edits.stage("gait.step_length", 0.43, bench.station.robot.parameters["gait.step_length"])
+
+
+def live(bench: Bench) -> None:
+    """What a robot that walks has just told."""
+    bench.station.take([walking(1000)])
+    bench.station.foresee(predicted("walk", {"walk": 0.94, "turn": 0.04, "stand": 0.02}))
+    bench.station.foresee(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
 
 
 def colours(image: QImage) -> set[int]:
     return {image.pixel(x, y) for x in range(0, image.width(), 7) for y in range(0, image.height(), 7)}
 
 
-def save(image: QImage, path: Path) -> None:
-    image.save(str(path), b"PNG", LIGHTLY)
-
-
-def title_of(window: MainWindow, tab: int) -> str:
-    return re.sub(r"\W", "", window.tabs.tabText(tab)).lower()
+def title_of(title: str) -> str:
+    return re.sub(r"\W", "", title).lower()
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("look", Look)
-@pytest.mark.parametrize("scale", [0.8, 2.0])
+@pytest.mark.usefixtures("shown")
+@pytest.mark.parametrize(
+    ("look", "scale", "screens"),
+    [
+        (Look.DARK, 0.8, (SMALL,)),
+        (Look.LIGHT, 0.8, (SMALL, LARGE)),
+        (Look.DARK, 2.0, (SMALL, LARGE)),
+        (Look.LIGHT, 2.0, (SMALL,)),
+    ],
+)
 def test_every_tab_is_whole_on_every_screen(
-    window: MainWindow,
+    request: pytest.FixtureRequest,
     bench: Bench,
     theme: Theme,
-    writers: concurrent.futures.Executor,
+    save: Save,
     look: Look,
     scale: float,
+    screens: tuple[tuple[str, int, int], ...],
 ) -> None:
+    page: Shown = request.getfixturevalue("shown")
     busy(bench)
+    record(request.getfixturevalue("settings"))
+    play(page, request.getfixturevalue("archive"))
     theme.set(look, scale)
-    for screen, (width, height) in SCREENS.items():
-        window.resize(width, height)
-        for tab in range(window.tabs.count()):
-            window.tabs.setCurrentIndex(tab)
-            bench.station.take([walking(600)])
-            bench.draw(window)
-            image = window.grab().toImage()
-            name = f"{title_of(window, tab)}-{look.value}-{scale:.0%}-{screen}.png".replace("%", "")
-            writers.submit(save, image, FOLDER / name)
-            assert (window.width(), window.height()) == (width, height), name
+    for screen, width, height in screens:
+        page.window.resize(width, height)
+        for tab in range(page.window.tabs.count()):
+            page.window.tabs.setCurrentIndex(tab)
+            live(bench)
+            page.draw()
+            image = page.window.grab().toImage()
+            name = f"{title_of(page.window.tabs.tabText(tab))}-{look.value}-{scale:.0%}-{screen}.png".replace(
+                "%", ""
+            )
+            save(image, name)
+            assert (page.window.width(), page.window.height()) == (width, height), name
             assert len(colours(image)) > 60, name
             assert theme.colour("window").rgb() in colours(image), name
-        stop = window.header.stop
-        assert window.rect().contains(stop.mapTo(window, stop.rect().topLeft()))
-        assert window.rect().contains(stop.mapTo(window, stop.rect().bottomRight()))
+        stop = page.window.header.stop
+        assert page.window.rect().contains(stop.mapTo(page.window, stop.rect().topLeft()))
+        assert page.window.rect().contains(stop.mapTo(page.window, stop.rect().bottomRight()))
         assert stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
-    QApplication.processEvents()

@@ -14,7 +14,7 @@ from server_gui.core.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, described, looked, resources, walking
+from tests.gui.fakes import Bench, described, looked, walking
 
 TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
 
@@ -98,37 +98,6 @@ def test_the_layout_is_kept_and_can_be_reset(window: MainWindow, bench: Bench, t
     again.reset_layout()
     assert not again.docks[2].isHidden()
     again.close()
-
-
-def test_the_window_fits_small_and_large_screens_with_stop_whole_and_in_sight(
-    window: MainWindow, bench: Bench, theme: Theme
-) -> None:
-    bench.station.take([walking(100), looked()])
-    stop = window.header.stop
-    for width, height, scale in ((1366, 768, 0.8), (1366, 768, 1.0), (1920, 1080, 2.0), (3840, 2160, 2.0)):
-        if theme.scale != scale:
-            theme.set(scale=scale)
-        window.resize(width, height)
-        bench.draw(window)
-        assert (window.width(), window.height()) == (width, height)
-        assert window.rect().contains(stop.mapTo(window, stop.rect().topLeft()))
-        assert window.rect().contains(stop.mapTo(window, stop.rect().bottomRight()))
-        assert stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
-
-
-def test_every_tab_is_drawn_dark_and_light(window: MainWindow, bench: Bench, theme: Theme) -> None:
-    bench.station.take([walking(600), looked(), resources([])])
-    for look in Look:
-        theme.set(look=look)
-        for tab in range(window.tabs.count()):
-            window.tabs.setCurrentIndex(tab)
-            bench.draw(window)
-            image = window.grab().toImage()
-            seen = {
-                image.pixel(x, y) for x in range(0, image.width(), 5) for y in range(0, image.height(), 5)
-            }
-            assert len(seen) > 60
-            assert theme.colour("window").rgb() in seen
 
 
 @pytest.mark.parametrize("look", Look)
