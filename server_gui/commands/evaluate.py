@@ -13,12 +13,14 @@ EPILOG = f"""benchmarks
 {chr(10).join(f"  {one.name:<16} {one.asks}" for one in BENCHMARKS.values())}
 
 The recordings are .npz files of their own; docs/prediction.md says where they come from and what is in them.
+Those of sim-… are synthetic: gwrms sim-record writes them.
 Subjects are never on both sides, seeds are fixed and features look back only. Settings are fixed in the code;
 --search chooses them again in every fold, by the training subjects alone, which takes many times as long.
 
 examples
   gwrms evaluate --benchmark ipol-status --data gait.npz
   gwrms evaluate --benchmark sisfall-prefall --data falls.npz --json --report falls.html
+  gwrms evaluate --benchmark sim-activity --data sim.jsonl.gz
 
 exit status
   0 evaluated, whether or not the goals were reached; 1 the file cannot be used; 2 usage"""
@@ -72,7 +74,7 @@ def _answer(benchmark: Benchmark, outcome: Outcome, seconds: float) -> dict[str,
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms evaluate",
-        description="How well what we predict holds for people that no model has seen: on real recordings.",
+        description="How well what we predict holds for people, real or simulated, that no model has seen.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -80,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--benchmark", required=True, choices=BENCHMARKS, metavar="NAME", help="one of those below"
     )
-    parser.add_argument("--data", required=True, type=Path, metavar="FILE.npz", help="the recordings")
+    parser.add_argument("--data", required=True, type=Path, metavar="FILE", help="the recordings")
     parser.add_argument(
         "--json", action="store_true", help="the figures as one JSON object, in the last line"
     )
