@@ -19,6 +19,7 @@ from server_gui.core.desk.desk import Desk, Shown
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.events import Described, LinkChanged, Telemetry
+from server_gui.core.prediction.news import Serves
 from server_gui.core.robot import STALE_NS, Robot
 
 PIECE_NS: Final = 20_000_000_000  # that are read at once
@@ -26,6 +27,7 @@ PIECES: Final = 8  # that are kept
 LEAD_NS: Final = 12_000_000_000  # of the past that are shown after a jump
 LATE_S: Final = 0.5  # a frame that took longer does not make the recording jump
 SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+NOT_PREDICTED: Final = "a recording: see gwrms predict --session"
 KINDS: Final = {"cell_0": "insole", "force": "insole", "tilt_forward": "imu", "position": "joint"}
 
 
@@ -168,7 +170,9 @@ class Playback:
         """To views, a jump is as if the robot's computer had started anew."""
         self._jumps += 1
         self._robot.row_ns = self._robot.stamp_ns = None
-        self.desk.stations[0].take([Described(_description(tape, self._jumps, self._words))])
+        station = self.desk.stations[0]
+        station.take([Described(_description(tape, self._jumps, self._words))])
+        station.predictions.take(Serves(station.name, {}, {"": NOT_PREDICTED}))
 
     def _feed(self, rows: Rows) -> None:
         newest = self._robot.stamp_ns

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem
+from PySide6.QtWidgets import QHeaderView, QSizePolicy, QTreeWidget, QTreeWidgetItem
 
 from gateway.cli.text import size
 from ml.store.objects import Object
@@ -33,7 +33,10 @@ class Browser(QTreeWidget):
         self.setAlternatingRowColors(True)
         self.setUniformRowHeights(True)
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self.itemExpanded.connect(self._opened)
+        theme.changed.connect(self._restyle)
+        self._restyle()
 
     def refresh(self) -> None:
         """Show what the newest look has found."""
@@ -53,6 +56,9 @@ class Browser(QTreeWidget):
             if parts[0].robot is None:
                 self._folder(top, f"{table}/", None)
             top.setExpanded(table in opened and parts[0].robot is not None)
+
+    def _restyle(self) -> None:
+        self.setMinimumHeight(self._theme.px(110))
 
     def _folder(self, item: QTreeWidgetItem, folder: str, robot: str | None) -> None:
         _numbers(item)

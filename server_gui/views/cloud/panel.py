@@ -25,7 +25,7 @@ from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.recording import Recording
 from server_gui.views.cloud.browser import Browser
 from server_gui.views.cloud.jobs_table import JobsTable, under_way
-from server_gui.views.marks import Mark, age_text
+from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.files import ask_folder
@@ -156,7 +156,7 @@ class Cloud(QWidget):
         library = self._archive.library
         if library.looked_s is None:
             return Mark("ring", "dim", "looking"), "Looking for the first time …"
-        age = age_text(time.monotonic() - library.looked_s)
+        age = f"{time.monotonic() - library.looked_s:.0f} s"
         if library.found.problem is not None:
             return Mark(
                 "triangle", "warn", "away"

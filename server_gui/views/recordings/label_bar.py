@@ -48,6 +48,7 @@ class LabelBar(QWidget):
         left.addLayout(self._span_row())
         left.addLayout(self._label_row())
         left.addWidget(self.said)
+        left.addStretch(1)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.addLayout(left, 3)

@@ -133,6 +133,7 @@ class SessionsPage(QWidget):
         split.addWidget(self._card)
         split.setStretchFactor(0, 3)
         split.setStretchFactor(1, 2)
+        split.setSizes([600, 400])
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addLayout(self._mark_row())
@@ -222,7 +223,7 @@ class SessionsPage(QWidget):
 
     def _restyle(self) -> None:
         self.table.verticalHeader().setDefaultSectionSize(self._theme.px(21))
-        self.details.setMinimumWidth(self._theme.px(220))
+        self.details.setMinimumWidth(self._theme.px(120))
 
 
 def _cells(session: Session) -> tuple[str, ...]:

@@ -216,6 +216,7 @@ class Timeline(QWidget):
 
 def clock_text(seconds: float, digits: int = 0) -> str:
     """Since the beginning: m:ss, or h:mm:ss."""
+    seconds = round(seconds, digits)
     whole = int(seconds)
     part = "" if not digits else f"{seconds - whole:.{digits}f}"[1:]
     hours, minutes = divmod(whole // 60, 60)
