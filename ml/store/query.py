@@ -30,6 +30,10 @@ _KIND: Final = re.compile(r"^(\w+ )*Error: ")
 _READING: Final = "reading the Arrow source failed: IOError: "
 _DOTTED: Final = re.compile(r'Referenced table "(\w+)" not found')
 
+# Of rows of `labels`, as ml/store/labels.py has it.
+_HOLDING: Final = """SELECT * FROM every QUALIFY NOT coalesce(removed, false) AND 1 = row_number() OVER (
+    PARTITION BY robot, session, utc, ended, label, author, source ORDER BY written DESC NULLS LAST)"""
+
 
 class QueryError(StoreError):
     """The SQL cannot be run; the message says why and where in it."""
@@ -47,8 +51,8 @@ class Result:
 def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
     """Run one SELECT over the tables `telemetry`, `sessions`, …, each as one view, whatever its shards.
 
-    Files, row groups and columns that the query does not need are not read. With `robot` the views hold that
-    robot's rows only, and only its shard is opened.
+    Of `labels` those that hold. Files, row groups and columns that the query does not need are not read. With
+    `robot` the views hold that robot's rows only, and only its shard is opened.
 
     Raises:
         QueryError: it is no SELECT, or cannot be run.
@@ -63,7 +67,8 @@ def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
         for name in _asked(sql):
             with translated(f"{store.url}/{name} cannot be read"):
                 rows = connection.from_arrow(reading.dataset(store, TABLES[name], robot))
-            (rows if robot is None else rows.filter(_is("robot", robot))).create_view(name)
+            rows = rows if robot is None else rows.filter(_is("robot", robot))
+            (rows.query("every", _HOLDING) if "removed" in rows.columns else rows).create_view(name)
         for setting in _SETTINGS:
             connection.execute(f"SET {setting}")
         with _said(store):

@@ -9,6 +9,7 @@ import pytest
 
 from ml.store import Store, StoreUnreachable
 from ml.store.labels import Label, Source, holding
+from ml.store.query import query
 from ml.store.sessions import NoSuchSession, happenings
 from ml.store.tables import LABELS
 from server_gui.core.fleet.collector import Collector
@@ -137,6 +138,9 @@ def test_a_label_is_taken_back_and_can_be_given_again(labelling: Labelling, sett
     labelling.add_all([label()])
     assert held(labelling) == [label(), label("sit", 30, 40)]
     assert rows(settings) == 4  # nothing was altered, all of it can be read again
+    labelling.remove(label("sit", 30, 40))
+    with query(Store(settings.store.url), "SELECT label FROM labels WHERE robot = 'exo-01'") as found:
+        assert [row for batch in found.batches for row in batch.to_pylist()] == [{"label": "walk"}]
 
 
 @pytest.mark.timeout(120)
