@@ -88,7 +88,8 @@ class Exoskeleton:
         if CONTROLLER not in self.without:
             self.controller.power_on(100 * MILLISECOND_NS)
         self.clock.every(PERIOD_NS, self._measure)
-        self._go_on()
+        if self._next_entry is None:  # nobody has said otherwise before
+            self._go_on()
 
     @property
     def simulated_drives(self) -> list[JointDrive]:

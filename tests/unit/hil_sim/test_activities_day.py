@@ -62,6 +62,17 @@ def test_the_robot_follows_a_timetable_of_anybodys() -> None:
     assert robot.controller.dictionary[0x2001, 0].value == 500
 
 
+def test_a_timetable_from_before_switching_on_loses_nothing() -> None:
+    robot = Exoskeleton()
+    robot.follow([Entry(Activity.STAND, 3.0), Entry(Activity.WALK)])
+    robot.power_on()
+    wanted = []
+    robot.measured.append(lambda: wanted.append(robot.controller.dictionary.number((0x2005, 0))))
+    robot.clock.run_until(4_000_000_000)
+    assert wanted.count(int(Activity.STAND)) == pytest.approx(300, abs=2)
+    assert wanted[-1] == Activity.WALK
+
+
 def test_a_robot_whose_controller_was_reset_goes_on_with_its_scenario() -> None:
     robot = Exoskeleton(Scenario.STAIRS_UP)
     robot.power_on()
