@@ -37,19 +37,24 @@ class Curves(QWidget):
         super().__init__(parent)
         self.strip = raster.Strip()
         self._image = QImage()
+        self._pixels = self.strip.pixels  # that the picture is of: it does not keep its memory itself
         self._behind = QColor()
         self._live = True
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
-    def show_strip(self, drawn: bool, behind: QColor, *, live: bool) -> None:
+    def set_behind(self, colour: QColor) -> None:
+        """What is behind the lines, also where nothing was drawn yet."""
+        self._behind = colour
+        self.update()
+
+    def show_strip(self, drawn: bool, *, live: bool) -> None:
         """Show the strip as it is now; `drawn`: it has become another."""
-        if not drawn and (behind, live) == (self._behind, self._live):
+        if not drawn and live == self._live:
             return
-        self._behind, self._live = behind, live
-        height, width = self.strip.pixels.shape
-        # The picture does not keep its memory itself; the strip does.
-        self._image = QImage(self.strip.pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32)
+        self._live, self._pixels = live, self.strip.pixels
+        height, width = self._pixels.shape
+        self._image = QImage(self._pixels.data, width, height, 4 * width, QImage.Format.Format_RGB32)
         self._image.setDevicePixelRatio(self.devicePixelRatioF())
         self.update()
 
@@ -57,7 +62,7 @@ class Curves(QWidget):
         painter = QPainter(self)
         painter.fillRect(self.rect(), self._behind)
         painter.setOpacity(1.0 if self._live else OLD)
-        ratio, seam, (height, width) = self.devicePixelRatioF(), self.strip.seam, self.strip.pixels.shape
+        ratio, seam, (height, width) = self.devicePixelRatioF(), self.strip.seam, self._pixels.shape
         for begin, end, at in ((seam, width, 0), (0, seam, width - seam)):
             painter.drawImage(QPointF(at / ratio, 0), self._image, QRect(begin, 0, end - begin, height))
         painter.end()
@@ -158,7 +163,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         width, height = (max(1, round(side * ratio)) for side in (self._lines.width(), self._lines.height()))
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
-        self._lines.show_strip(drawn, self._theme.colour("card"), live=live)
+        self._lines.show_strip(drawn, live=live)
         self._mark()
 
     def follow_again(self) -> None:
@@ -243,6 +248,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setStyle(tickLength=-4)
             if width is not None:
                 axis.setWidth(theme.px(width))
+        self._lines.set_behind(theme.colour("card"))
         self._inks = raster.Inks(
             tuple(_colour(theme, curve.colour).rgba() for curve in self._curves),
             tuple(curve.dashed for curve in self._curves),
