@@ -4,8 +4,9 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 from PySide6.QtCore import QByteArray, QSettings, Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent
+from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
+    QApplication,
     QDockWidget,
     QMainWindow,
     QMenu,
@@ -24,6 +25,7 @@ from server_gui.views.cloud.panel import Cloud
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
+from server_gui.views.help import Help
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.recordings.panel import Recordings
@@ -37,7 +39,15 @@ from server_gui.views.widgets.scrolled import scrolled
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 SLOW: Final = 6  # frames between two looks at what people read
-CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²")  # quantities with more than one unit worth choosing
+CHOICES: Final = (
+    "rad",
+    "rad/s",
+    "m",
+    "Pa",
+    "m/s²",
+    "s",
+    "A",
+)  # quantities with more than one unit worth choosing
 
 
 class View(Protocol):
@@ -77,6 +87,7 @@ class MainWindow(QMainWindow):
         self.events = EventsPanel(desk, theme)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
         self.resources, self.audit = Resources(desk, theme), Audit(desk, theme)
+        self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
@@ -91,6 +102,7 @@ class MainWindow(QMainWindow):
             self._views += (self.recordings, self.cloud)
             self.tabs.addTab(scrolled(self.recordings), "Re&cordings")
             self.tabs.addTab(scrolled(self.cloud), "C&loud")
+        self._offer_help()
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
@@ -133,6 +145,13 @@ class MainWindow(QMainWindow):
         for dock in self.docks:
             dock.show()
 
+    def show_help(self) -> None:
+        """What the manual says of the panel that has the keyboard, or of the tab."""
+        tab = self.tabs.tabText(self.tabs.currentIndex()).replace("&", "")
+        self.help.show_section("Parameters" if _within(self.parameters) else tab)
+        self._manual.show()
+        self._manual.raise_()
+
     def _look_at_recordings(self) -> None:
         self.tabs.setCurrentIndex(self._live)
 
@@ -154,6 +173,8 @@ class MainWindow(QMainWindow):
             self._dock("Parameters", self.parameters, areas.RightDockWidgetArea),
             self._dock("Events", self.events, areas.BottomDockWidgetArea),
         ]
+        self._manual = self._dock("Help", self.help, areas.RightDockWidgetArea)
+        self._manual.hide()
         self._size_docks()
         self._theme.scaled.connect(self._size_docks)
 
@@ -170,10 +191,17 @@ class MainWindow(QMainWindow):
         self.addDockWidget(area, dock)
         return dock
 
+    def _offer_help(self) -> None:
+        self.help_button.setAccessibleName("Help")
+        self.help_button.setToolTip("What the manual says of this (F1)")
+        self.help_button.clicked.connect(self.show_help)
+        self.tabs.setCornerWidget(self.help_button)
+        QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
+
     def _view_menu(self) -> QMenu:
         menu = QMenu(self)
         menu.setToolTipsVisible(True)
-        for dock in self.docks:
+        for dock in (*self.docks, self._manual):
             menu.addAction(dock.toggleViewAction())
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
@@ -205,6 +233,12 @@ class MainWindow(QMainWindow):
             self.restoreGeometry(geometry)
         if isinstance(state, QByteArray):
             self.restoreState(state, LAYOUT)
+
+
+def _within(panel: QWidget) -> bool:
+    """Whether the keyboard is in it."""
+    focused = QApplication.focusWidget()
+    return focused is not None and panel.isAncestorOf(focused)
 
 
 def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:

@@ -113,10 +113,8 @@ def test_disk_network_heat_and_who_uses_the_cpu_are_shown_over_time(view: Resour
     for percent in (10.0, 40.0):
         show(view, bench, use("gait_ctrl", 1, percent), use("<b>", 2, 5.0), use("idle", 3, None))
     assert bench.station.processing.resource.devices.recent().shape == (2, 6)
-    told = {
-        card: "".join(card.legend.text().split("&nbsp;"))
-        for card in (view.devices, view.temperature, view.top)
-    }
+    cards = (view.devices, view.temperature, view.top)
+    told = {card: card.legend.text().replace("&nbsp;", " ") for card in cards}
     assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.devices]) == [
         ("disk read", "20.0"),
         ("written", "4.0"),

@@ -1,0 +1,77 @@
+"""Help: every view has its section of the manual, by F1 and by a button, in the manual's own words."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QDockWidget
+
+from server_gui.core import manual
+from server_gui.views.main_window import MainWindow
+
+DOCS = Path(__file__).parents[2] / "docs" / "window.md"
+
+
+def test_the_sections_are_the_documents_own_without_pictures_and_links() -> None:
+    sections, document = manual.sections(), DOCS.read_text(encoding="utf-8")
+    assert [f"## {title}" for title in sections] == [
+        line for line in document.splitlines() if line.startswith("## ") and line != "## How it is made"
+    ]
+    assert "quick stop on every drive of the robot that is looked at" in sections["Always in sight"]
+    assert all("](" not in text for text in sections.values())
+
+
+def test_every_tab_and_panel_has_its_section(window: MainWindow) -> None:
+    titles = {window.tabs.tabText(place).replace("&", "") for place in range(window.tabs.count())}
+    assert titles | {"Parameters", "Recordings", "Cloud"} <= manual.sections().keys()
+
+
+def test_f1_tells_of_the_tab_or_of_the_panel_that_has_the_keyboard(window: MainWindow) -> None:
+    assert not window.help.isVisible()
+    for place in range(window.tabs.count()):
+        window.tabs.setCurrentIndex(place)
+        window.tabs.setFocus()
+        QTest.keyClick(window.tabs, Qt.Key.Key_F1)
+        assert window.help.isVisible()
+        assert window.help.choice.currentText() == window.tabs.tabText(place).replace("&", "")
+    window.parameters.filters.words.setFocus()
+    QTest.keyClick(window.parameters.filters.words, Qt.Key.Key_F1)
+    assert window.help.choice.currentText() == "Parameters"
+    assert "the robot column shows six" in " ".join(window.help.text.toPlainText().split())
+
+
+def test_the_button_beside_the_tabs_does_the_same_and_stop_stays_in_sight(window: MainWindow) -> None:
+    window.tabs.setCurrentIndex(1)
+    window.help_button.click()
+    QApplication.processEvents()
+    assert window.help.choice.currentText() == "Signals"
+    assert window.header.stop.isVisible()
+    assert QApplication.activeModalWidget() is None
+
+
+def test_a_reset_layout_has_no_help(window: MainWindow) -> None:
+    window.help_button.click()
+    window.reset_layout()
+    assert not window.help.isVisible()
+    assert all(dock.isVisible() for dock in window.findChildren(QDockWidget) if dock.windowTitle() != "Help")
+
+
+@pytest.mark.timeout(180)
+def test_the_manual_is_in_what_is_installed(tmp_path: Path) -> None:
+    built = subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        cwd=DOCS.parents[1],
+        env=os.environ | {"PYTHONPATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as files:
+        assert files.read(f"server_gui/{manual.SHIPPED}") == DOCS.read_bytes()
