@@ -1,7 +1,7 @@
 """Which sessions a model learns from, by which it is judged, and which sensors it takes."""
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Sequence, Set
 from typing import Final
 
 from ml.errors import UnusableData
@@ -12,27 +12,24 @@ from ml.training.dataset import Part
 HELD_OUT_SHARE: Final = 0.25  # of wearers, or sessions, where nobody says which
 
 
-def recipe_for(task: Task, channels: Mapping[str, Set[str]]) -> Recipe:
-    """The richest recipe that at least half of the sessions have the channels for.
-
-    `channels` are those with values, by session.
+def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
+    """The richest recipe that at least half of the sessions have the channels for; `channels` are theirs.
 
     Raises:
         UnusableData: no session has enough.
 
     """
-    offered = {recipe.name: recipe for there in channels.values() if (recipe := task.recipe(there))}
-    having = {
-        name: sum(there >= set(recipe.channels) for there in channels.values())
-        for name, recipe in offered.items()
-    }
-    enough = [recipe for name, recipe in offered.items() if 2 * having[name] >= len(channels)]
-    found = enough or list(offered.values())
-    if not found:
+    offered = {recipe.name: recipe for there in channels if (recipe := task.recipe(there))}
+    if not offered:
         raise UnusableData(
             f"no session has the channels that {task.name} takes (docs/prediction.md lists them)"
         )
-    return max(found, key=lambda recipe: (len(recipe.channels), recipe.name))
+    having = {
+        name: sum(there >= set(recipe.channels) for there in channels) for name, recipe in offered.items()
+    }
+    most = max(having.values())
+    enough = [offered[name] for name, count in having.items() if count >= min(most, len(channels) / 2)]
+    return max(enough, key=lambda recipe: (len(recipe.channels), recipe.name))
 
 
 def held_out(groups: Iterable[str], wanted: Sequence[str] = ()) -> frozenset[str]:

@@ -14,7 +14,7 @@ from ml.store import sessions as stored
 from ml.store.errors import translated
 from ml.store.labels import holding
 from ml.store.sessions import Session, among
-from ml.store.tables import LABELS, TELEMETRY
+from ml.store.tables import LABELS, SESSIONS, TELEMETRY
 from ml.training.dataset import Ask, LeftOut, Part, versions
 from ml.training.extract import extract
 
@@ -63,26 +63,22 @@ class Material:
         chosen = [each for each in self.sessions if (each.robot, each.session) in wanted]
         return replace(self, sessions=chosen)
 
-    def channels(self) -> dict[str, Set[str]]:
-        """Those that the robot said it has, or else those with values, by session."""
-        return {
-            each.session: set(each.units) or {channel.name for channel in stored.channels(self.store, each)}
+    def channels(self) -> list[Set[str]]:
+        """Of each session those that the robot said it has, or else those with values."""
+        return [
+            set(each.units) or {channel.name for channel in stored.channels(self.store, each)}
             for each in self.sessions
-        }
+        ]
 
     def tables(self) -> tuple[TableVersion, ...]:
         """What a model is made from, for ever."""
-        robots = {each.robot for each in self.sessions}
-        unused = {
-            location
-            for location in self.versions
-            if location.startswith(f"{TELEMETRY.name}/")
-            and location not in {TELEMETRY.location(robot, self.store.about.shards) for robot in robots}
-        }
+        shards = self.store.about.shards
+        wanted = {LABELS.name, SESSIONS.name}
+        wanted |= {TELEMETRY.location(each.robot, shards) for each in self.sessions}
         return tuple(
             TableVersion(self.store.url, location, version)
             for location, version in self.versions.items()
-            if location not in unused
+            if location in wanted
         )
 
 

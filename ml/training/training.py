@@ -96,7 +96,7 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     people = judge("held-out people", learned, judges, other, its)
     fixed = judge("regression set", learned, regression, other, its)
     if not regression:
-        remarks.append("there is no regression set (gwrms label SESSION --regression): none was judged by")
+        remarks.append("there is no regression set to judge by (gwrms label SESSION --regression)")
     card = _card(found, learned, lessons, [*judges, *regression], people.new)
     return _trained(learned, card, serving, people, fixed, left_out, remarks)
 
@@ -115,11 +115,11 @@ def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
     serving = _serving(registry, found.task, wish.robot, base.learned.recipe) or base
     its = _its_parts(found, serving, base.learned.recipe, walk.later)
     later = judge("later walking", learned, walk.later, serving.learned, its)
-    before = judge("later walking", learned, walk.later, base.learned, walk.later)
+    old, new = (judge("alone", each, walk.later, None, ()).new for each in (base.learned, learned))
     card = _card(found, learned, walk.early, walk.later, later.new)
     card = replace(card, robot=wish.robot, parent=base.name, source=_both(card.source, base.card.source))
     nothing = Judged("regression set", 0, Metrics(), None)
-    return _trained(learned, card, serving, later, nothing, left_out, [_cut(before)])
+    return _trained(learned, card, serving, later, nothing, left_out, [_cut(old, new)])
 
 
 def told(left_out: LeftOut) -> str:
@@ -127,14 +127,11 @@ def told(left_out: LeftOut) -> str:
     return f"{left_out.ask.session} of {left_out.ask.robot}: {left_out.why}"
 
 
-def _cut(judged: Judged) -> str:
-    new, old = (
-        judged.new.figures["rmse_percent"],
-        judged.serving.figures["rmse_percent"] if judged.serving else 0.0,
-    )
+def _cut(old: Metrics, new: Metrics) -> str:
+    before, after = (metrics.figures["rmse_percent"] for metrics in (old, new))
     return (
-        f"adapting cuts the error of the later walking by {100.0 * (1.0 - new / old):.0f} %: "
-        f"from {old:.2f} to {new:.2f} % of the cycle"
+        f"adapting cuts the error of the later walking by {100.0 * (1.0 - after / before):.0f} %: "
+        f"from {before:.2f} to {after:.2f} % of the cycle"
     )
 
 

@@ -116,7 +116,7 @@ def test_too_few_people_are_said_so(groups: list[str], wanted: list[str], words:
 def test_one_poor_robot_does_not_make_all_models_poor() -> None:
     rich = {f"{side}_{joint}.position" for side in ("left", "right") for joint in ("hip", "knee", "ankle")}
     poor = {name for name in rich if "ankle" not in name}
-    assert recipe_for(ACTIVITY, {"a": rich, "b": rich, "c": poor}).name == "activity/hips+knees+ankles"
-    assert recipe_for(ACTIVITY, {"a": rich, "b": poor, "c": poor}).name == "activity/hips+knees"
+    assert recipe_for(ACTIVITY, [rich, rich, poor]).name == "activity/hips+knees+ankles"
+    assert recipe_for(ACTIVITY, [rich, poor, poor]).name == "activity/hips+knees"
     with pytest.raises(UnusableData, match="no session has the channels that activity takes"):
-        recipe_for(ACTIVITY, {"a": {"left_knee.position"}})
+        recipe_for(ACTIVITY, [{"left_knee.position"}])
