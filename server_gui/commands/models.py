@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from gateway.cli.reach import choose
-from gateway.cli.text import NONE, say, say_json, table, warn
+from gateway.cli.text import NONE, did_you_mean, say, say_json, table, warn
 from ml.errors import UnusableModel
 from ml.registry.card import Card, age_days
 from ml.registry.pointers import Pointer
@@ -22,6 +22,7 @@ from ml.store import StoreError
 from ml.store.store import checked_url
 from server_gui.commands.cloud_reach import add_url, parser, url, when
 from server_gui.commands.models_show import told
+from server_gui.core.settings import load
 
 USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL] [--json]
 
@@ -138,6 +139,10 @@ def promote(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
     model = _named(registry, arguments.model)
+    known = load(arguments.config).robots
+    if arguments.robot and arguments.robot not in known:
+        close = did_you_mean(arguments.robot, known)
+        warn("models", f"the server's file has no robot {arguments.robot!r}{close}")
     done = registry.promote(model, arguments.robot, who=arguments.who, why=arguments.why)
     return _tell(arguments, registry.card(model).task, done)
 

@@ -24,18 +24,19 @@ class Desk:
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self.url = (folder / "store").as_uri()
         self.registry = Registry(self.url, NOWHERE)
-        self._config = folder / "server.toml"
-        self._config.write_text(f'[store]\nurl = "{self.url}"\n')
+        config = folder / "server.toml"
+        self.where = ("--config", str(config))
+        config.write_text(f'[robots]\nexo-01 = "192.0.2.7:7420"\n[store]\nurl = "{self.url}"\n')
         self._capsys = capsys
 
     def run(self, *words: str, status: int = 0) -> str:
         """What it prints, or where `status` is another one, what it complains of."""
-        assert main(["models", *words, "--config", str(self._config)]) == status
+        assert main(["models", *words, *self.where]) == status
         said = self._capsys.readouterr()
         return said.err if status else said.out
 
     def ask(self, *words: str) -> Any:
-        assert main(["models", *words, "--config", str(self._config), "--json"]) == 0
+        assert main(["models", *words, *self.where, "--json"]) == 0
         return json.loads(self._capsys.readouterr().out)
 
     def publish(self, seed: int = 0, **changes: Any) -> Card:
@@ -73,6 +74,16 @@ def test_models_are_listed_with_what_they_serve(desk: Desk) -> None:
         (own.id, False, ["exo-01"]),
     ]
     assert desk.ask("ls", "--task", "activity")["models"] == []
+
+
+def test_a_robot_that_the_servers_file_does_not_name_is_pointed_out(
+    desk: Desk, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = desk.publish().id
+    assert main(["models", "promote", model, "--robot", "exo-02", *desk.where]) == 0
+    assert "has no robot 'exo-02'; did you mean exo-01?" in capsys.readouterr().err
+    assert main(["models", "promote", model, "--robot", "exo-01", *desk.where]) == 0
+    assert not capsys.readouterr().err
 
 
 def test_a_rollback_brings_back_what_served_before(desk: Desk) -> None:
