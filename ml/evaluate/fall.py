@@ -85,7 +85,7 @@ def evaluate(path: Path, search: Search) -> Outcome:
     """Five folds of subjects; the threshold of each by inner folds of its training subjects."""
     recordings = sisfall.read(path)
     data = decisions(recordings)
-    splits = list(_grouped(recordings, data))
+    splits = list(grouped(recordings, data))
     work = folds.over(lambda split: _fold(data, split, search), splits)
     first = np.full(len(recordings), NEVER)
     for (_, held_out), (alarms, _) in zip(splits, work, strict=True):
@@ -94,7 +94,7 @@ def evaluate(path: Path, search: Search) -> Outcome:
     return _outcome(recordings, first, told([settings for _, settings in work], search))
 
 
-def _grouped(recordings: list[sisfall.Recording], data: Decisions) -> Iterator[folds.Split]:
+def grouped(recordings: list[sisfall.Recording], data: Decisions) -> Iterator[folds.Split]:
     """Folds of the decisions, by folds of the recordings."""
     for train, held_out in folds.grouped(np.array([recording.subject for recording in recordings]), FOLDS):
         yield (

@@ -7,6 +7,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -17,8 +18,10 @@ from ml.registry.card import age_days
 from ml.store import Store, sessions
 from ml.store.sessions import Session
 from server_gui.commands.cloud_reach import parser
+from server_gui.commands.rehearse import rehearse
 from server_gui.core.prediction.live import Live
 from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
+from server_gui.core.prediction.rehearsals import BENCHMARKS
 from server_gui.core.prediction.replay import Replayed, replay
 from server_gui.core.settings import ServerSettings, SettingsError, load, name_of
 from server_gui.terminal.ending import Ended, Ending
@@ -50,11 +53,17 @@ def main(argv: list[str]) -> int:
     """Run `gwrms predict`."""
     made = _parser()
     arguments = made.parse_args(argv)
+    if not (arguments.robot or arguments.session or arguments.benchmark):
+        made.error("say --robot NAME, or --session SESSION")
+    if bool(arguments.benchmark) != bool(arguments.data) or (arguments.benchmark and not arguments.rules):
+        made.error("--rules, --benchmark NAME and --data FILE.npz go together")
+    if arguments.rules and not (arguments.session or arguments.benchmark):
+        made.error("--rules are tried over recordings: say --session SESSION, or --benchmark NAME")
     settings = _settings(arguments)
+    if arguments.rules:
+        return rehearse(settings, arguments)
     if arguments.session:
-        return _session(settings, arguments)
-    if not arguments.robot:
-        made.error("say --robot NAME or --session SESSION")
+        return _sessions(settings, arguments)
     return _live(settings, _addresses(settings, arguments.robot), arguments)
 
 
@@ -165,16 +174,17 @@ def fields(one: Foreseen) -> dict[str, Any]:
 # --- over a session
 
 
-def _session(settings: ServerSettings, arguments: argparse.Namespace) -> int:
+def _sessions(settings: ServerSettings, arguments: argparse.Namespace) -> int:
     store = Store.existing(settings.store.url)
-    session = sessions.find(store, arguments.session)
-    found = replay(store, session, settings.prediction, arguments.model)
-    if arguments.json:
-        _say_replayed(session, found)
-        return 0
-    say(f"session {session.session} of {session.robot}, {session.length.total_seconds():.0f} s\n\n")
-    for one in found:
-        say(replay_told(one) + "\n")
+    for name in arguments.session:
+        session = sessions.find(store, name)
+        found = replay(store, session, settings.prediction, arguments.model)
+        if arguments.json:
+            _say_replayed(session, found)
+            continue
+        say(f"session {session.session} of {session.robot}, {session.length.total_seconds():.0f} s\n\n")
+        for one in found:
+            say(replay_told(one) + "\n")
     return 0
 
 
@@ -202,7 +212,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--seconds", type=float, metavar="N", help="live: end after so long")
     made.add_argument(
-        "--session", metavar="SESSION", help="over a recording: its name, or how that alone begins"
+        "--session",
+        action="append",
+        default=[],
+        metavar="SESSION",
+        help="over a recording: its name, or how that alone begins; again for more",
     )
     made.add_argument(
         "--model",
@@ -210,6 +224,18 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         metavar="ID",
         help="over a recording: not what serves, but this; again for more",
+    )
+    made.add_argument(
+        "--rules",
+        action="store_true",
+        help="over recordings: what the rules of the server's file would have done",
+    )
+    made.add_argument(
+        "--benchmark", choices=BENCHMARKS, metavar="NAME", help=f"with --rules: {', '.join(BENCHMARKS)}"
+    )
+    made.add_argument("--data", type=Path, metavar="FILE.npz", help="the benchmark's recordings")
+    made.add_argument(
+        "--falls", type=Path, metavar="FILE.npz", help="for ipol-falls: what falls are learned from"
     )
     made.add_argument(
         "--url", metavar="URL", help="the store of models and recordings (default: of the server's file)"

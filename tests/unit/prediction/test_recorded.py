@@ -1,0 +1,97 @@
+"""A robot that is recorded is predicted: what is said is kept, and comes again from the recording."""
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from ml.store import Store, sessions
+from ml.store.tables import PREDICTIONS
+from server_gui.commands import predict
+from server_gui.commands.collect import status_text
+from server_gui.core.fleet.collector import Collector, CollectorReport
+from server_gui.core.prediction.settings import Action, PredictionSettings, RuleSettings
+from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
+from tests.unit.prediction.robots import SteadyRobot, publish
+
+WAIT_S = 30.0
+ENOUGH = 30  # decisions
+WALKING = RuleSettings("activity", "walk", 0.8, for_ms=200, action=Action.STOP)
+
+
+@pytest.fixture
+def robot() -> Iterator[SteadyRobot]:
+    with SteadyRobot() as robot:
+        yield robot
+
+
+@pytest.fixture
+def server(robot: SteadyRobot, tmp_path: Path, folder_url: str) -> ServerSettings:
+    return ServerSettings(
+        {"exo-fake": RobotSettings(robot.address)},
+        StoreSettings(folder_url),
+        RecordingSettings(spool=tmp_path / "spool", batch_s=1.0),
+        PredictionSettings(poll_s=1.0),
+        (WALKING,),
+    )
+
+
+def until(collector: Collector, condition: Callable[[CollectorReport], object]) -> CollectorReport:
+    deadline_s = time.monotonic() + WAIT_S
+    while not condition(report := collector.report().result(WAIT_S)):
+        assert time.monotonic() < deadline_s, report
+        collector.wait(0.05)
+    return report
+
+
+def judged(report: CollectorReport) -> int:
+    return 0 if report.prediction is None else report.prediction.judged
+
+
+def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
+    server: ServerSettings, robot: SteadyRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = publish(server.store.url)
+    with Collector(server) as collector:
+        report = until(collector, lambda report: judged(report) >= ENOUGH and robot.called("robot.stop"))
+        told = msgspec.json.decode(msgspec.json.encode(report), type=CollectorReport)
+    assert "activity  walk" in status_text(told)
+    assert model in status_text(told)
+
+    store = Store(server.store.url)
+    (session,) = sessions.sessions(store)
+    rows = sessions.happenings(store, session, PREDICTIONS)
+    assert len(rows) >= ENOUGH
+    assert {(row["model"], row["task"]) for row in rows} == {(model, "activity")}
+    assert Counter(row["label"] for row in rows).most_common(1)[0][0] == "walk"
+
+    # the rule has stopped it, and the recording says so and when
+    stop = robot.called("robot.stop")[0]
+    assert stop["reason"].startswith(f"rule {WALKING.name} (stop) holds: walk")
+    events = {
+        row["text"].partition(" ")[0]: row
+        for row in sessions.happenings(store, session)
+        if row["kind"] == "rule"
+    }
+    assert events.keys() == {"rule", "stop"}
+    assert "left_knee confirmed" in events["stop"]["text"]
+    assert json.loads(events["stop"]["data"])["after_ms"] > 0
+
+    # again, over the recording
+    config = tmp_path / "server.toml"
+    config.write_text(f'[store]\nurl = "{server.store.url}"\n')
+    assert predict.main(["--session", session.session, "--config", str(config), "--json"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    again = {line["stamp_ns"]: line for line in lines if "stamp_ns" in line}
+    for row in rows:
+        line = again[row["stamp_ns"]]
+        assert (line["label"], line["probability"]) == (row["label"], row["probability"])
+        assert line["probabilities"] == json.loads(row["probabilities"])
+    assert lines[-1]["live"] == {"decisions": len(rows), "same": len(rows)}
+    assert lines[-1]["quality"] is None
+    assert predict.main(["--session", session.session, "--config", str(config)]) == 0
+    assert f"said live: {len(rows)}, of which {len(rows)} are the same here" in capsys.readouterr().out
