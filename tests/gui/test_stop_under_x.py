@@ -44,6 +44,13 @@ class Shown:
     def touch(self, name: str) -> None:
         (self.folder / name).touch()
 
+    def click(self, name: str, *, times: int = 1) -> None:
+        """Click what busy_window.py calls so, once it can be."""
+        self.touch(f"{name}.where")
+        wait((self.folder / f"{name}.at").exists, f"could click {name}")
+        x, y = (self.folder / f"{name}.at").read_text(encoding="utf-8").split()
+        self.xdotool("mousemove", x, y, "click", "--repeat", str(times), "--delay", "60", "1")
+
     @property
     def stops(self) -> int:
         return len(self.robot.called("robot.stop"))
@@ -116,3 +123,16 @@ def test_keys_and_click_stop_also_while_the_window_is_held_up(shown: Shown) -> N
     shown.xdotool("key", "F12")
     wait(lambda: shown.stops == 4, "stopped while the window was held up")
     assert not (shown.folder / "free").exists(), "the window was not held up any more"
+
+
+def test_a_value_is_edited_reviewed_and_written_with_mouse_and_keys(shown: Shown) -> None:
+    wait(lambda: len(shown.robot.called("parameter.read")) > 1, "read the parameters")
+    shown.click("field", times=2)
+    shown.xdotool("type", "430")
+    shown.xdotool("key", "Return")
+    shown.click("review")
+    assert shown.robot.called("parameter.write") == [], "nothing is written before it was reviewed"
+    shown.click("write")
+    wait(lambda: len(shown.robot.called("parameter.write")) == 1, "wrote it")
+    assert shown.robot.called("parameter.write")[0]["changes"] == {"gait.step_length": 0.43}
+    assert shown.robot.parameters["gait.step_length"] == 0.43

@@ -67,8 +67,8 @@ class ParametersPanel(QWidget):
         station = self._desk.selected
         staged = 0 if station is None else len(station.difference(self._desk.shown.units))
         editing = self.pages.currentIndex() == 0
-        self._review_button.setText(f"Review {staged} …" if staged else "Review …")
-        self._review_button.setEnabled(bool(staged) and editing)
+        self.review_button.setText(f"Review {staged} …" if staged else "Review …")
+        self.review_button.setEnabled(bool(staged) and editing)
         self._discard.setEnabled(bool(staged))
         self.undo.setEnabled(station is not None and bool(station.writing.undo) and editing)
         for button in (self._compare, self._save, self.store_button):
@@ -151,8 +151,8 @@ class ParametersPanel(QWidget):
     def _buttons(self) -> QGridLayout:
         self.undo, self._discard = QPushButton("Undo …"), QPushButton("Discard edits")
         self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
-        self._review_button = QPushButton("Review …")
-        self._review_button.setObjectName("primary")
+        self.review_button = QPushButton("Review …")
+        self.review_button.setObjectName("primary")
         self._compare, self._save = QPushButton("Compare …"), QPushButton("Save …")
         self._compare.setToolTip(
             "Compare with a .toml or .dcf file, and load edits from it. Nothing is written"
@@ -165,7 +165,7 @@ class ParametersPanel(QWidget):
         grid = QGridLayout()
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
-        grid.addWidget(self._review_button, 0, 2)
+        grid.addWidget(self.review_button, 0, 2)
         grid.addWidget(self._compare, 1, 0)
         grid.addWidget(self._save, 1, 1)
         grid.addWidget(self.store_button, 1, 2)
@@ -190,7 +190,7 @@ class ParametersPanel(QWidget):
         self.control.release.connect(lambda: self._with(Station.release_control))
         self._discard.clicked.connect(lambda: self._with(lambda station: station.edits.drop()))
         self.undo.clicked.connect(self._undo_latest)
-        self._review_button.clicked.connect(self.begin_review)
+        self.review_button.clicked.connect(self.begin_review)
         self.review.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.review.write.connect(self._write)
         self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
