@@ -17,7 +17,7 @@ def extract(asks: Sequence[Ask], cluster: str = "") -> list[Part | LeftOut]:
     """A result for each that is asked for, in this order; `cluster` is a Dask scheduler's address.
 
     Raises:
-        UnusableData: the cluster does not answer, or gives up.
+        UnusableData: there is no Dask here, or the cluster does not answer, or gives up.
         StoreError, UnusableModel: as `part`.
 
     """
@@ -25,8 +25,10 @@ def extract(asks: Sequence[Ask], cluster: str = "") -> list[Part | LeftOut]:
 
 
 def _on(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:
-    from distributed import KilledWorker
-
+    try:
+        from distributed import KilledWorker
+    except ModuleNotFoundError as error:
+        raise UnusableData("a cluster needs Dask: pip install 'gwrms[cluster]'") from error
     try:
         return asyncio.run(_gathered(cluster, asks))
     except KilledWorker as error:
