@@ -1,8 +1,10 @@
-"""Evaluation: benchmarks on recordings of real people, who are never on both sides.
+"""Evaluation: benchmarks on recordings of people, real or simulated, who are never on both sides.
 
 benchmarks.py               their names, questions and goals
 status.py, phase.py, adapt.py, fall.py, terrain.py    one each
 ipol.py, sisfall.py, arrays.py    how recordings are read and checked
+sim_activity.py, sim_phase.py, sim_falling.py    those on simulated people, one each
+sim.py                      what these share: folds, missing sensors, noise
 strides.py                  decisions within strides, for phase.py and adapt.py
 folds.py, search.py, metrics.py   splits, tuning on training subjects alone, figures
 outcome.py, report.py       what was found, and a page about it
