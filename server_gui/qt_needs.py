@@ -4,7 +4,7 @@ import ctypes
 import importlib.metadata
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
 from typing import Final
 
 # library → Debian's and Ubuntu's package
@@ -44,6 +44,16 @@ def check(environment: Mapping[str, str] = os.environ) -> None:
     check_display(environment, platform)
     wanted = ALWAYS if platform == "offscreen" else ALWAYS | WINDOW
     check_libraries(wanted, _is_there)
+
+
+def prefer_x(environment: MutableMapping[str, str] = os.environ) -> None:
+    """On Wayland, open the window by its X server where it has one.
+
+    STOP keys are then taken in a thread of their own also while the window is busy. Wayland itself tells
+    keys to nobody but the window.
+    """
+    if environment.get("WAYLAND_DISPLAY") and environment.get("DISPLAY"):
+        environment.setdefault("QT_QPA_PLATFORM", "xcb;wayland")
 
 
 def check_version(qt: str, python: tuple[int, int]) -> None:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from server_gui.core.settings import add_robots, load, name_of
-from server_gui.qt_needs import check
+from server_gui.qt_needs import check, prefer_x
 
 EPILOG = """keys
   F12, Ctrl+Space   STOP the robot that is looked at: quick stop on every drive. It is software over a
@@ -27,6 +27,7 @@ def main(argv: list[str]) -> int:
     """Run `gwrms gui`."""
     arguments = _parser().parse_args(argv)
     settings = add_robots(load(arguments.config), dict(arguments.robot))
+    prefer_x()
     check()
     from server_gui.app import Record, run
     from server_gui.views.theme import Look

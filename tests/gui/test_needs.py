@@ -37,6 +37,22 @@ def test_without_a_display_other_ways_are_named() -> None:
     qt_needs.check_display({}, "offscreen")
 
 
+@pytest.mark.parametrize(
+    ("environment", "platform"),
+    [
+        ({"WAYLAND_DISPLAY": "wayland-0", "DISPLAY": ":0"}, "xcb;wayland"),
+        ({"WAYLAND_DISPLAY": "wayland-0"}, None),
+        ({"DISPLAY": ":0"}, None),
+        ({"WAYLAND_DISPLAY": "wayland-0", "DISPLAY": ":0", "QT_QPA_PLATFORM": "wayland"}, "wayland"),
+    ],
+)
+def test_on_wayland_its_x_server_is_taken_unless_somebody_says_otherwise(
+    environment: dict[str, str], platform: str | None
+) -> None:
+    qt_needs.prefer_x(environment)
+    assert environment.get("QT_QPA_PLATFORM") == platform
+
+
 def test_a_wrong_address_is_refused_before_anything_is_opened() -> None:
     with pytest.raises(SettingsError, match="is not a robot's address"):
         main(["--robot", "exo-01=host:port"])
