@@ -91,10 +91,8 @@ class Tape:
             stored = {each.name: each.unit for each in sessions.channels(store, session)}
             events = _once([*sessions.happenings(store, session), *events])
         first_ns, last_ns = _extent(session, waiting)
-        known = {name: unit or "" for name, unit in stored.items()}
-        units = {name: str(unit) for name, unit in session.units.items()} | known
-        there = {name: units.get(name, "") for name in dict.fromkeys([*stored, *waiting.columns])}
-        return cls(session, there, events, first_ns, last_ns, waiting, tuple(stored), settings.store.url)
+        units = _units(session, {**dict.fromkeys(waiting.columns), **stored})
+        return cls(session, units, events, first_ns, last_ns, waiting, tuple(stored), settings.store.url)
 
     def read(self, begin_ns: int, end_ns: int) -> Rows:
         """The rows from `begin_ns` up to before `end_ns`; blocks. Raises `StoreError`."""
@@ -104,6 +102,12 @@ class Tape:
             found = sessions.telemetry(store, self.session, self._stored, as_time(begin_ns), as_time(end_ns))
             parts += [_rows(table) for table in found]
         return Rows.joined(parts)
+
+
+def _units(session: Session, held: Mapping[str, str | None]) -> dict[str, str]:
+    """The unit of each channel that is there, in the robot's order; what the store says goes before."""
+    told = {name: str(unit) for name, unit in session.units.items() if name in held}
+    return told | {name: unit or told.get(name, "") for name, unit in held.items()}
 
 
 def _of(session: Session, rows: Iterable[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
