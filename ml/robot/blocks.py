@@ -26,27 +26,26 @@ Block = Callable[[Samples], Samples]
 
 def joints_activity(pair: Samples) -> Samples:
     """Left and right joint (rad): how far, how unlike, how fast, over every length; and their curves."""
-    return _activity(pair)
+    signals = _unnamed(pair)
+    ends = np.stack([pair.max(axis=1), pair.min(axis=1)], axis=1)
+    return np.concatenate(
+        [*(moments(signals, samples) for samples in LENGTHS), bins(ends, 10, 10), flat(ends[..., -1:])],
+        axis=1,
+    )
 
 
 def feet_activity(pair: Samples) -> Samples:
     """Both insoles (N): load and how it is shared."""
-    return _activity(pair / KILO)
+    return joints_activity(pair / KILO)
 
 
 def trunk_activity(trunk: Samples) -> Samples:
     """Acceleration, angular velocity, tilt: how it moves, how far it has turned, how it leans."""
     signals = trunk.copy()
-    sideways = [1, 3, 5, 7]
+    sideways = [1, 3, 5, 7]  # acceleration to the left, roll and yaw rate, tilt to the side: whichever way
     signals[:, sideways] = np.abs(trunk[:, sideways])
-    return np.concatenate(
-        [
-            *(moments(signals, samples) for samples in LENGTHS),
-            bins(signals, 10, 10),
-            _turned(trunk[:, 5]),
-        ],
-        axis=1,
-    )
+    lengths = (moments(signals, samples) for samples in LENGTHS)
+    return np.concatenate([*lengths, bins(signals, 10, 10), _turned(trunk[:, 5])], axis=1)
 
 
 def joints_phase(pair: Samples) -> Samples:
@@ -69,15 +68,6 @@ def trunk_falling(trunk: Samples) -> Samples:
     leaning[:, 1] = np.abs(leaning[:, 1])
     tilts = (moments(leaning, samples) for samples in SHORT_LENGTHS)
     return np.concatenate([FALLING.compute(trunk[:, :6]), *tilts, bins(leaning, 5, 10)], axis=1)
-
-
-def _activity(pair: Samples) -> Samples:
-    signals = _unnamed(pair)
-    ends = np.stack([pair.max(axis=1), pair.min(axis=1)], axis=1)
-    return np.concatenate(
-        [*(moments(signals, samples) for samples in LENGTHS), bins(ends, 10, 10), flat(ends[..., -1:])],
-        axis=1,
-    )
 
 
 def _unnamed(pair: Samples) -> Samples:

@@ -123,6 +123,10 @@ def _taught(
     unseen = np.zeros((len(features), columns))
     far = np.zeros((2, len(features)))
     for train, held_out in GroupKFold(min(FOLDS, people)).split(features, groups=group):
+        if len(np.unique(targets[train])) < 2:
+            raise UnusableData(
+                "each class has examples of too few people: without some of them one class alone is left"
+            )
         parts = _parts(features[train], targets[train], network, seed)
         inputs = scaled(parts["scale"], features[held_out])
         unseen[held_out] = _columns(parts["network"], outputs(parts["network"], inputs), columns)

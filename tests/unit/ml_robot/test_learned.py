@@ -131,6 +131,11 @@ SPOILED: dict[str, tuple[Task, Spoiled, str]] = {
         ),
         "1 examples of sit: 20 are needed",
     ),
+    "each class by somebody else": (
+        ACTIVITY,
+        lambda all_: all_._replace(truth=np.where(all_.group == "person 1", "walk", "sit")),
+        "one class alone is left",
+    ),
     "not a number": (
         ACTIVITY,
         lambda all_: all_._replace(features=np.where(all_.features > 0.5, np.nan, all_.features)),
