@@ -129,7 +129,8 @@ class App:
         self.theme = Theme(
             qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100
         )
-        self._archive = Archive(settings, self.desk, self._poster.deliver)
+        operator = "" if record is None else record.operator
+        self._archive = Archive(settings, self.desk, self._poster.deliver, operator)
         self._ended = True
         self.window = MainWindow(self.desk, self.theme, kept, self._archive)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))

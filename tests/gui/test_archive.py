@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLineEdit,
     QPushButton,
+    QTabWidget,
     QTreeWidgetItem,
     QWidget,
 )
@@ -29,7 +30,9 @@ from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.views.cloud.panel import Cloud
 from server_gui.views.main_window import MainWindow
+from server_gui.views.recordings.panel import Recordings
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, walking
@@ -87,18 +90,37 @@ def window(
     qt.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
-class Shown:
-    """The window, drawn with whatever its threads have posted."""
+class Tabs(QTabWidget):
+    """The two tabs without the rest of the window, which takes its time to be made."""
 
-    def __init__(self, window: MainWindow, bench: Bench, posted: list[Callable[[], None]]) -> None:
+    def __init__(self, archive: Archive, bench: Bench, theme: Theme) -> None:
+        super().__init__()
+        self.recordings = Recordings(archive, bench.desk.recording, theme)
+        self.cloud = Cloud(archive, bench.desk.recording, theme)
+        self.tabs = self
+        self.addTab(self.recordings, "Recordings")
+        self.addTab(self.cloud, "Cloud")
+        self.resize(900, 700)
+
+    def refresh(self) -> None:
+        view = self.currentWidget()
+        if isinstance(view, Recordings | Cloud):
+            view.refresh()
+
+
+class Shown:
+    """The window, or its two tabs, drawn with whatever threads have posted."""
+
+    def __init__(self, window: MainWindow | Tabs, posted: list[Callable[[], None]]) -> None:
         self.window = window
-        self._bench = bench
         self._posted = posted
 
     def draw(self) -> None:
         while self._posted:
             self._posted.pop(0)()
-        self._bench.draw(self.window)
+        for _ in range(7):
+            self.window.refresh()
+        QApplication.processEvents()
 
     def until(self, so: Callable[[], object], what: str) -> None:
         def drawn() -> bool:
@@ -116,8 +138,20 @@ class Shown:
 
 
 @pytest.fixture
-def shown(window: MainWindow, bench: Bench, posted: list[Callable[[], None]]) -> Shown:
-    return Shown(window, bench, posted)
+def whole(window: MainWindow, posted: list[Callable[[], None]]) -> Shown:
+    return Shown(window, posted)
+
+
+@pytest.fixture
+def shown(
+    qt: QApplication, theme: Theme, bench: Bench, archive: Archive, posted: list[Callable[[], None]]
+) -> Iterator[Shown]:
+    tabs = Tabs(archive, bench, theme)
+    tabs.show()
+    yield Shown(tabs, posted)
+    tabs.close()
+    tabs.deleteLater()
+    qt.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def cell(shown: Shown, column: int) -> str:
@@ -168,40 +202,38 @@ def test_nothing_recorded_yet_says_what_to_do(shown: Shown, archive: Archive) ->
 
 
 def test_recordings_can_be_looked_at_without_a_robot(
-    shown: Shown, bench: Bench, settings: ServerSettings, archive: Archive
+    whole: Shown, window: MainWindow, bench: Bench, settings: ServerSettings, archive: Archive
 ) -> None:
     record(settings)
     bench.desk.select(None)
-    shown.draw()
-    assert shown.window.empty.isVisible()
-    next(
-        button for button in shown.window.empty.findChildren(QPushButton) if "recordings" in button.text()
-    ).click()
-    page = shown.window.recordings.list
-    shown.until(lambda: page.sessions.rowCount(), "listed it")
+    whole.draw()
+    assert window.empty.isVisible()
+    next(button for button in window.empty.findChildren(QPushButton) if "recordings" in button.text()).click()
+    page = window.recordings.list
+    whole.until(lambda: page.sessions.rowCount(), "listed it")
     assert page.isVisible()
-    shown.open("Overview")
-    assert shown.window.empty.isVisible()
+    whole.open("Overview")
+    assert window.empty.isVisible()
 
 
 def test_playback_is_marked_and_never_mixed_with_what_is_live(
-    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
+    whole: Shown, window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:
     record(settings)
     bench.station.take([walking(50)])
     live = dict(bench.station.robot.values)
-    play(shown, archive)
+    play(whole, archive)
     tape = archive.playback.tape
     assert tape is not None
-    player = shown.window.recordings.player
+    player = window.recordings.player
     archive.playback.seek(tape.first_ns + 5 * 10**9)
-    shown.until(lambda: not archive.playback.is_loading, "jumped")
-    shown.until(lambda: "PLAYBACK, not live: exo-01" in player.banner.text(), "said what it is")
+    whole.until(lambda: not archive.playback.is_loading, "jumped")
+    whole.until(lambda: "PLAYBACK, not live: exo-01" in player.banner.text(), "said what it is")
     assert bench.desk.selected is bench.station
     assert bench.station.robot.values == live
     played = archive.playback.desk.stations[0]
     assert played.robot.values["left_knee.position"] != live["left_knee.position"]
-    QTest.mousePress(shown.window.header.stop, Qt.MouseButton.LeftButton)
+    QTest.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
     assert bench.first.named("stop") == [], "the app does that"
     bench.station.stop("test")
     bench.first.answer(Stopped({"left_knee": "confirmed"}, True))
@@ -401,15 +433,16 @@ def test_everything_that_can_be_reached_has_a_name(
 
 
 def test_the_controls_of_the_player_stay_in_sight_at_every_size(
-    shown: Shown, archive: Archive, settings: ServerSettings, theme: Theme
+    whole: Shown, window: MainWindow, archive: Archive, settings: ServerSettings, theme: Theme
 ) -> None:
     record(settings)
-    play(shown, archive)
-    window, player = shown.window, shown.window.recordings.player
-    for width, height, scale in ((1366, 768, 0.8), (1366, 768, 1.0), (1920, 1080, 1.0), (1920, 1080, 2.0)):
-        theme.set(Look.LIGHT, scale)
+    play(whole, archive)
+    player = window.recordings.player
+    for width, height, scale in ((1366, 768, 1.0), (1920, 1080, 2.0)):
+        if scale != theme.scale:
+            theme.set(Look.LIGHT, scale)
         window.resize(width, height)
-        shown.draw()
+        whole.draw()
         assert (window.width(), window.height()) == (width, height)
         for control in (player.timeline, player.play, player.labels.give):
             assert window.tabs.rect().contains(control.mapTo(window.tabs, control.rect().bottomLeft()))

@@ -18,12 +18,12 @@ WHO = "recordings"  # what the news name instead of a robot
 class Archive:
     """For the window's thread; `close` ends its own."""
 
-    def __init__(self, settings: ServerSettings, desk: Desk, deliver: Deliver) -> None:
+    def __init__(self, settings: ServerSettings, desk: Desk, deliver: Deliver, author: str = "") -> None:
         self.settings = settings
         self.library = Library(settings, deliver)
         self._reading = Background("playback")
         self.playback = Playback(self._reading.do, deliver, desk.shown)
-        self.labels = SessionLabels(settings, self._reading.do, deliver)
+        self.labels = SessionLabels(settings, self._reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
         self.tape: Tape | None = None  # of the session that is chosen
         self.problem = ""  # why there is none

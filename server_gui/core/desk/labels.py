@@ -22,8 +22,8 @@ Do = Callable[[Callable[[], Any]], "Future[Any]"]  # does it in a thread
 class SessionLabels:
     """For the window's thread; `do` works in another one. `revision` rises with each change."""
 
-    def __init__(self, settings: ServerSettings, do: Do, deliver: Deliver) -> None:
-        self.author = getpass.getuser()
+    def __init__(self, settings: ServerSettings, do: Do, deliver: Deliver, author: str = "") -> None:
+        self.author = author or getpass.getuser()
         self.session: Session | None = None
         self.labels: tuple[Label, ...] = ()
         self.said = ""  # what came of the latest

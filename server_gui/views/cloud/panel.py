@@ -175,7 +175,7 @@ class Cloud(QWidget):
             return
         uploader = report.uploader
         lines = [
-            f"{uploader.waiting} batches wait, {size(uploader.backlog_bytes)} with what is being recorded",
+            f"{_waiting(uploader.waiting)}, {size(uploader.backlog_bytes)} with what is being recorded",
             f"{uploader.uploaded} uploaded since recording began",
             f"spool {report.spool}, {size(report.disk_free_bytes)} free on its disk",
         ]
@@ -209,6 +209,10 @@ class Cloud(QWidget):
         """The store, or these sessions of it, in the background."""
         what = wanted[0].session if wanted else "the store"
         self._archive.jobs.add(f"Download {what}", download(self._archive.settings.store.url, folder, wanted))
+
+
+def _waiting(batches: int) -> str:
+    return "1 batch waits" if batches == 1 else f"{batches or 'no'} batches wait"
 
 
 def _value() -> QLabel:
