@@ -71,11 +71,20 @@ class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StoreSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """`[store]`; `shards` and `several_writers` count when the store is first used (docs/scale.md)."""
+    """`[store]`; `shards` and `several_writers` count when the store is first used (docs/scale.md).
+
+    `compact_h` is how often a collector puts its small files together; 0 leaves that to others.
+    """
 
     url: str = field(default_factory=default_url)
     shards: Annotated[int, Meta(ge=1, le=1000)] = 1
     several_writers: bool = True
+    compact_h: Annotated[float, Meta(ge=0, le=8760)] = 1.0
+
+    @property
+    def compact_s(self) -> float | None:
+        """The same in seconds; None where a collector is not to, or must not: it would be a second writer."""
+        return self.compact_h * 3600.0 if self.compact_h and self.several_writers else None
 
 
 class RecordingSettings(Struct, frozen=True, forbid_unknown_fields=True):

@@ -24,6 +24,7 @@ from server_gui.core.fleet.foreseeing import Foresee, Foreseeing
 from server_gui.core.fleet.statistics import LinkReport
 from server_gui.core.network import Network
 from server_gui.core.prediction.state import PredictingState
+from server_gui.core.recording.compacting import Compacting
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
@@ -83,7 +84,9 @@ class Collector:
         recorder = settings.recorder
         self._spool = Spool(recorder.spool)
         self.network = Network()
-        self._uploader = Uploader(self._spool, lambda: connect(settings.store), self._wanted)
+        store, every_s = settings.store, settings.store.compact_s
+        compacting = None if every_s is None else Compacting(store.url, self._spool.folder, every_s)
+        self._uploader = Uploader(self._spool, lambda: connect(store), self._wanted, compacting)
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
         robots = {name: robot.where for name, robot in settings.robots.items()}
         following = following or whole(recorder)

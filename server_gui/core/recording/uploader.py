@@ -11,6 +11,7 @@ from typing import Final, Self
 from gateway.client.backoff import Backoff
 from ml.store.errors import StoreError
 from ml.store.store import Store
+from server_gui.core.recording.compacting import Compacting
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
@@ -37,16 +38,22 @@ class Uploader:
     """Empties a spool into a store; use it as a context manager, which joins its thread.
 
     `wanted` is asked before each segment: uploading may wait for a quiet hour, or for `now`. The store is
-    made by `connect` in the uploader's thread, and anew after whatever went wrong.
+    made by `connect` in the uploader's thread, and anew after whatever went wrong. Where it is `compacting`,
+    that too begins when it is wanted and nothing waits.
     """
 
     def __init__(
-        self, spool: Spool, connect: Callable[[], Store], wanted: Callable[[], bool] = lambda: True
+        self,
+        spool: Spool,
+        connect: Callable[[], Store],
+        wanted: Callable[[], bool] = lambda: True,
+        compacting: Compacting | None = None,
     ) -> None:
         self.state = UploaderState()
         self._spool = spool
         self._connect = connect
         self._wanted = wanted
+        self._compacting = compacting
         self._store: Store | None = None
         self._ending = threading.Event()
         self._asked = threading.Event()
@@ -97,8 +104,15 @@ class Uploader:
             if self._empty(asked):
                 asked = False
                 backoff.reset()
+                self._compact()
             self._turned.set()
             self._asked.wait(backoff.next_s())
+        if self._compacting is not None:
+            self._compacting.close()
+
+    def _compact(self) -> None:
+        if self._compacting is not None and self.state.uploaded and self._wanted():
+            self._compacting.look()
 
     def _empty(self, asked: bool) -> bool:
         """Upload what waits; False where that failed."""

@@ -49,6 +49,7 @@ def test_the_whole_file_is_read(tmp_path: Path) -> None:
         "exo-02": Address("exo-02.local", 7420),
     }
     assert (settings.store.url, settings.store.shards) == ("s3://bucket/prefix", 10)
+    assert settings.store.compact_s == 3600.0
     assert settings.recorder == RecordingSettings(
         tmp_path / "spool", Upload.IDLE, 200.0, ("*_knee.*", "trunk.*"), 2.0, 30.0
     )
@@ -144,3 +145,10 @@ def test_the_readmes_file_is_one(tmp_path: Path) -> None:
     settings = load(written(tmp_path, block))
     assert set(settings.robots) == {"exo-01", "exo-02"}
     assert (settings.store.url, settings.recorder.upload) == ("s3://exoskeletons/lab", Upload.IDLE)
+
+
+@pytest.mark.parametrize("line", ["compact_h = 0", "several_writers = false"])
+def test_a_store_that_others_compact_or_that_takes_no_second_writer_is_left_alone(
+    tmp_path: Path, line: str
+) -> None:
+    assert load(written(tmp_path, f"[store]\n{line}\n")).store.compact_s is None
