@@ -136,8 +136,8 @@ def status_text(report: CollectorReport) -> str:
     ]
     robots = report.robots.items()
     links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)
-    problems = [f"{name}: {reason}\n" for name, link in robots for reason in link.quality.reasons]
-    return "\n".join([*lines, "", links, *problems, *_predicted(report.prediction)])
+    problems = "".join(f"{name}: {reason}\n" for name, link in robots for reason in link.quality.reasons)
+    return "\n".join([*lines, "", links, *([problems] if problems else []), *_predicted(report.prediction)])
 
 
 def _predicted(state: PredictingState | None) -> list[str]:

@@ -28,6 +28,8 @@ from server_gui.commands.cloud_reach import (
     spool,
     when,
 )
+from server_gui.commands.sessions_gait import gait
+from server_gui.commands.sessions_use import compare, resources
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.chosen import Choice, choose
 from server_gui.core.cloud.mcap import write_mcap
@@ -36,13 +38,15 @@ from server_gui.core.cloud.tabular import write_csv, write_parquet
 FORMATS: Final = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
 HEADER: Final = ("SESSION", "ROBOT", "BEGAN (UTC)", "LENGTH", "ROWS", "SIZE", "", "OPERATOR", "NOTES")
 USAGE = (
-    "usage: gwrms sessions ls | show SESSION | export SESSION --out FILE    (--help after each says more)\n"
+    "usage: gwrms sessions ls | show SESSION | export SESSION --out FILE | resources SESSION |\n"
+    "       compare BEFORE[,…] AFTER[,…] | gait SESSION    (--help after each says more)\n"
 )
 
 
 def main(argv: list[str]) -> int:
     """Run `gwrms sessions`."""
-    return choose_command(argv, {"ls": ls, "show": show, "export": export}, USAGE)
+    commands = {"ls": ls, "show": show, "export": export, "gait": gait}
+    return choose_command(argv, commands | {"resources": resources, "compare": compare}, USAGE)
 
 
 # --- ls

@@ -23,6 +23,12 @@ class SessionUse:
     version: str
     processes: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)
 
+    @property
+    def minutes(self) -> int:
+        """How many minutes were looked at."""
+        series = (minutes for measures in self.processes.values() for minutes in measures.values())
+        return max(map(len, series), default=0)
+
     @classmethod
     def of(cls, version: str, looks: Iterable[tuple[float, Sequence[Mapping[str, object]]]]) -> "SessionUse":
         """From looks: time in s, and the processes as the store's table `resources` has them.
@@ -31,7 +37,7 @@ class SessionUse:
         """
         minutes: dict[str, dict[str, dict[int, list[float]]]] = {}
         for time_s, processes in looks:
-            for name, sums in _by_name(processes).items():
+            for name, sums in by_name(processes).items():
                 for measure, value in sums.items():
                     kept = minutes.setdefault(name, {}).setdefault(measure, {})
                     kept.setdefault(int(time_s // BLOCK_S), []).append(value)
@@ -115,7 +121,8 @@ def _versions(sessions: Sequence[SessionUse]) -> str:
     return ", ".join(sorted({use.version for use in sessions}))
 
 
-def _by_name(processes: Sequence[Mapping[str, object]]) -> dict[str, dict[str, float]]:
+def by_name(processes: Sequence[Mapping[str, object]]) -> dict[str, dict[str, float]]:
+    """What the processes of each name use together."""
     sums: dict[str, dict[str, float]] = {}
     for process in processes:
         kept = sums.setdefault(str(process["name"]), {})
