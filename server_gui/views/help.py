@@ -24,12 +24,15 @@ class Help(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addWidget(self.choice)
         everything.addWidget(self.text, 1)
-        theme.changed.connect(lambda: self._show(self.choice.currentText()))
-        self._show(self.choice.currentText())
+        theme.changed.connect(self._show_again)
+        self._show_again()
 
     def show_section(self, title: str) -> None:
         """Show what the manual says of this; the first section where it says nothing."""
         self.choice.setCurrentIndex(max(0, self.choice.findText(title)))
+
+    def _show_again(self) -> None:
+        self._show(self.choice.currentText())
 
     def _show(self, title: str) -> None:
         self.text.setMarkdown(f"## {title}\n\n{self._sections[title]}")
