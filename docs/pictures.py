@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -67,7 +68,8 @@ def sees_it_walk(one: Newcomer) -> None:
     one.window.empty.start.click()
     one.wait(lambda: bool(one.app.desk.stations), "started it")
     one.wait(lambda: one.station.processing.derived().gait.walking, "walked")
-    one.wait(lambda: len(one.station.rings.times(10.0)) > 900, "walked for ten seconds")
+    one.wait(lambda: len(one.station.predictions.by_task) == 3, "was predicted")
+    one.wait(lambda: np.ptp(one.station.rings.times(10.0)) > 9.9, "walked for ten seconds")
     one.keep("overview")
 
 

@@ -70,7 +70,8 @@ def lines(station: Station) -> Iterator[Line]:
         if task in predictions.by_task:
             shown = predictions.by_task[task]
             line = said(shown)
-            yield Line(line.mark, f"{title}: {line.text}", f"{line.detail} · {model_text(shown)}")
+            told = filter(None, (line.detail, model_text(shown)))
+            yield Line(line.mark, f"{title}: {line.text}", " · ".join(told))
     if predictions.problem:
         yield Line(Mark("ring", "old", "no model"), "Not predicted", predictions.problem)
     for rule in predictions.rules:
@@ -109,7 +110,7 @@ def model_text(shown: Shown) -> str:
 
 def _as_predicted(line: Line) -> Line:
     """As it is said where other things stand beside it."""
-    return replace(line, detail=f"predicted · {line.detail}")
+    return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 
 
 def _detail(shown: Shown) -> str:

@@ -202,14 +202,20 @@ def info(name: str) -> ParameterInfo:
     )
 
 
-def looked(values: Mapping[str, float] = HELD, state: str = "ok", problem: str | None = None) -> Looked:
-    """The parameters as the robot holds them, and its left knee in this state."""
+def looked(
+    values: Mapping[str, float] = HELD,
+    state: str = "ok",
+    problem: str | None = None,
+    at_ns: int | None = None,
+) -> Looked:
+    """The parameters as the robot holds them (at `at_ns`, by default now), its left knee in this state."""
     held = {
         name: ParameterValue(value, info(name).unit, info(name).min, info(name).max, 0)
         for name, value in values.items()
     }
     quality: dict[str, QualityInfo] = {"left_knee": {"state": state, "age_ms": 1.0, "problem": problem}}
-    return Looked(Snapshot(0, {}, {}, quality), ParameterValues(held), time.monotonic_ns())
+    at_ns = time.monotonic_ns() if at_ns is None else at_ns
+    return Looked(Snapshot(0, {}, {}, quality), ParameterValues(held), at_ns)
 
 
 def walking(rows: int = 400, age_s: float = 0.0, cells: int = 16, rate_hz: float = 100.0) -> Telemetry:

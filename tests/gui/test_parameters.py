@@ -160,19 +160,23 @@ def test_a_trial_counts_down_and_is_seen_to_go_back(panel: ParametersPanel, benc
     assert row(panel, "gait.step_length")[SAID] == "◔ trial"
     trial = bench.station.writing.trial
     assert trial is not None
-    bench.station.take([looked()])
-    bench.station.end_trial_if_over(trial.until_ns + 3_000_000_000)
+    over_ns = trial.until_ns + 3_000_000_000
+    bench.station.end_trial_if_over(over_ns)
+    assert bench.station.writing.trial is trial, "nobody has looked since its end"
+    bench.station.take([looked(at_ns=over_ns)])
+    bench.station.end_trial_if_over(over_ns)
     panel.refresh()
     assert not panel.trial.isVisible()
     assert "the robot has taken it back" in panel.banner.text()
 
 
 def test_a_trial_that_is_over_and_still_in_force_is_said_to_be(bench: Bench) -> None:
-    bench.station.take([looked({**HELD, "gait.step_length": 0.43})])
     bench.station.writing.done(
         Written(7, {"gait.step_length": 0.4}, {"gait.step_length": 0.43}, trial_s=0.001)
     )
-    bench.station.end_trial_if_over(time.monotonic_ns() + 60_000_000_000)
+    over_ns = time.monotonic_ns() + 60_000_000_000
+    bench.station.take([looked({**HELD, "gait.step_length": 0.43}, at_ns=over_ns)])
+    bench.station.end_trial_if_over(over_ns)
     assert "other values are held" in bench.station.writing.text
 
 

@@ -295,9 +295,12 @@ class Station:
         self.tell(NewsKind.PARAMETER, how)
 
     def end_trial_if_over(self, now_ns: int) -> None:
-        """A trial whose time is over has gone back when the robot holds the old values again, not before."""
-        trial = self.writing.trial
-        if trial is None or now_ns - trial.until_ns < OVERDUE_S * 1e9:
+        """A trial whose time is over has gone back when the robot holds the old values again, not before.
+
+        Only values that were read after its end count: a link, or this window, may be slow.
+        """
+        trial, read_ns = self.writing.trial, self.robot.parameters_at_ns
+        if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
             return
         held = self.robot.parameters
         back = all(name in held and held[name].value == value for name, value in trial.before.items())
