@@ -71,7 +71,7 @@ def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
     old = held_out.serving.figures[figure]
     gain = new - old if task.fold else old - new
     reasons = [
-        f"{figure} on held-out people: {new:.4g}, the serving model's {old:.4g}"
+        f"{figure} on {held_out.name}: {new:.4g}, the serving model's {old:.4g}"
         + ("" if gain > 0 else ": not better")
     ]
     losses = [loss for each in (held_out, regression) if each is not None for loss in _losses(task, each)]
@@ -83,7 +83,7 @@ def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
     better = new > idle if task.fold else new < idle
     told = (
-        f"{figure} on held-out people: {new:.4g}; saying always the same has {idle:.4g}; nothing serves yet"
+        f"{figure} on {held_out.name}: {new:.4g}; saying always the same has {idle:.4g}; nothing serves yet"
     )
     return Decision(better, (told,))
 
