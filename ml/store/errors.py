@@ -62,6 +62,11 @@ _ADVICE: Final = {
     StoreRefused: "check AWS_PROFILE, or AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, and what they may do",
     StoreUnreachable: "check the network, AWS_ENDPOINT_URL and that the service runs",
 }
+_ADVICE_OF_DISKS: Final = {
+    "No space left on device": "make room there",
+    "Permission denied": "whoever runs this must be allowed to write there",
+    "Read-only file system": "mount it for writing, or take another folder",
+}
 LIBRARY_ERRORS: Final = (DeltaError, obstore.exceptions.BaseError, OSError, ValueError)
 
 
@@ -76,9 +81,9 @@ def translated(doing: str) -> Iterator[None]:
     except (StoreError, CommitFailedError):
         raise
     except LIBRARY_ERRORS as error:
-        kind = _kind(error)
-        advice = f"; {_ADVICE[kind]}" if kind in _ADVICE else ""
-        raise kind(f"{doing}: {_reason(error)}{advice}") from None
+        kind, reason = _kind(error), _reason(error)
+        advice = _ADVICE_OF_DISKS.get(reason) or _ADVICE.get(kind)
+        raise kind("; ".join(filter(None, (f"{doing}: {reason}", advice)))) from None
 
 
 def _kind(error: Exception) -> type[StoreError]:

@@ -11,6 +11,7 @@ from typing import ClassVar
 import pytest
 
 from ml.store import Store, StoreError, StoreRefused, StoreUnreachable, UnsafeStore
+from ml.store.errors import translated
 from ml.store.objects import Objects
 from ml.store.tables import EVENTS
 from tests.stores import SeaweedFS
@@ -169,3 +170,16 @@ def test_keys_are_in_no_object_of_ours(backend: SeaweedFS | None, store_url: str
         content = objects.read(name.rpartition(store_url.rpartition("/")[2])[2].lstrip("/")) or b""
         assert b"tests-key" not in content
         assert b"tests-secret" not in content
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device"), "No space left on device; make room there"),
+        (PermissionError(13, "Permission denied"), "Permission denied; whoever runs this must be allowed"),
+        (OSError(111, "Connection refused"), "Connection refused; check the network"),
+    ],
+)
+def test_advice_is_about_what_is_wrong(error: OSError, said: str) -> None:
+    with pytest.raises(StoreError, match=said), translated("the store cannot be written"):
+        raise error
