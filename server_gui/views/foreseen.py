@@ -16,6 +16,7 @@ from server_gui.views.marks import Mark
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
+LEAST: Final = 0.01  # what is less probable is not worth a word
 SOURCES: Final = {
     Source.SIMULATED: "simulated model",
     Source.RECORDED: "from recordings",
@@ -114,15 +115,15 @@ def _as_predicted(line: Line) -> Line:
 
 
 def _detail(shown: Shown) -> str:
-    """The runner-up, and what speaks against believing any of it."""
+    """What speaks against believing it, and the runner-up, where there is one."""
     prediction, trust = shown.predicted.prediction, shown.predicted.trust
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if prediction.label in (UNKNOWN, ABNORMAL):
         runner = f"likeliest {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
     else:
-        others = [item for item in others if item[0] != prediction.label]
+        others = [item for item in others if item[0] != prediction.label and item[1] >= LEAST]
         runner = f"next {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
-    return " · ".join(filter(None, (runner, _doubt(trust))))
+    return " · ".join(filter(None, (_doubt(trust), runner)))
 
 
 def _doubt(trust: Trust) -> str:

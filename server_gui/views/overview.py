@@ -98,7 +98,7 @@ class Overview(QWidget):
             grid.addWidget(self._plots[column], 1, column)
             grid.setColumnStretch(column, (10, 9, 11)[column])
         grid.addWidget(self._joints, 2, 0, 1, 3)
-        for row, share in enumerate((5, 3, 3)):
+        for row, share in enumerate((10, 6, 7)):
             grid.setRowStretch(row, share)
 
     def refresh(self) -> None:

@@ -13,6 +13,7 @@ import pytest
 from PySide6.QtGui import QImage
 
 from gateway.messages import ProcessUse
+from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, looked, resources, walking
 from tests.gui.foreseen import predicted
@@ -23,7 +24,7 @@ from tests.gui.test_archive import (  # noqa: F401  # fixtures
     posted,
     record,
     settings,
-    shown,
+    whole,
     window,
 )
 
@@ -76,7 +77,7 @@ def title_of(title: str) -> str:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.usefixtures("shown")
+@pytest.mark.usefixtures("whole")
 @pytest.mark.parametrize(
     ("look", "scale", "screens"),
     [
@@ -95,26 +96,26 @@ def test_every_tab_is_whole_on_every_screen(
     scale: float,
     screens: tuple[tuple[str, int, int], ...],
 ) -> None:
-    page: Shown = request.getfixturevalue("shown")
+    page: Shown = request.getfixturevalue("whole")
+    full: MainWindow = request.getfixturevalue("window")
     busy(bench)
     record(request.getfixturevalue("settings"))
     play(page, request.getfixturevalue("archive"))
     theme.set(look, scale)
     for screen, width, height in screens:
-        page.window.resize(width, height)
-        for tab in range(page.window.tabs.count()):
-            page.window.tabs.setCurrentIndex(tab)
+        full.resize(width, height)
+        for tab in range(full.tabs.count()):
+            full.tabs.setCurrentIndex(tab)
             live(bench)
             page.draw()
-            image = page.window.grab().toImage()
-            name = f"{title_of(page.window.tabs.tabText(tab))}-{look.value}-{scale:.0%}-{screen}.png".replace(
-                "%", ""
-            )
+            image = full.grab().toImage()
+            title = title_of(full.tabs.tabText(tab))
+            name = f"{title}-{look.value}-{100 * scale:.0f}-{screen}.png"
             save(image, name)
-            assert (page.window.width(), page.window.height()) == (width, height), name
+            assert (full.width(), full.height()) == (width, height), name
             assert len(colours(image)) > 60, name
             assert theme.colour("window").rgb() in colours(image), name
-        stop = page.window.header.stop
-        assert page.window.rect().contains(stop.mapTo(page.window, stop.rect().topLeft()))
-        assert page.window.rect().contains(stop.mapTo(page.window, stop.rect().bottomRight()))
+        stop = full.header.stop
+        assert full.rect().contains(stop.mapTo(full, stop.rect().topLeft()))
+        assert full.rect().contains(stop.mapTo(full, stop.rect().bottomRight()))
         assert stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
