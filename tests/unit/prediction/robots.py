@@ -139,6 +139,7 @@ class SteadyRobot(FakeRobot):
 
     async def _stream(self, writer: asyncio.StreamWriter, number: int, params: dict[str, Any]) -> None:
         names = [name for name in self.values() if self._wanted(name, params.get("channels"))]
+        self._now_ns = time.monotonic_ns()
         for seq in itertools.count():
             await asyncio.sleep(ROWS * STEP_MS / 1000)
             rows = [self._row(names) for _ in range(ROWS)]
