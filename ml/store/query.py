@@ -68,13 +68,18 @@ def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
             with translated(f"{store.url}/{name} cannot be read"):
                 rows = connection.from_arrow(reading.dataset(store, TABLES[name], robot))
             rows = rows if robot is None else rows.filter(_is("robot", robot))
-            (rows.query("every", _HOLDING) if "removed" in rows.columns else rows).create_view(name)
+            (_holding(rows) if "removed" in rows.columns else rows).create_view(name)
         for setting in _SETTINGS:
             connection.execute(f"SET {setting}")
         with _said(store):
             reader = _run(connection, lambda: _found(connection, sql))
         with contextlib.closing(reader):
             yield Result(reader.schema, _read(reader, connection, store))
+
+
+def _holding(labels: duckdb.DuckDBPyRelation) -> duckdb.DuckDBPyRelation:
+    found = labels.query("every", _HOLDING)
+    return labels if found is None else found  # None is for what is no SELECT
 
 
 def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Found:
