@@ -94,7 +94,7 @@ class ProcessTable(QTableView):
 
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
-        for column, width in ((PID, 70), (CPU, 80), (MEMORY, 110)):
+        for column, width in ((PID, 58), (CPU, 68), (MEMORY, 98)):
             self.setColumnWidth(column, self._theme.px(width))
 
 

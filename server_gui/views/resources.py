@@ -77,8 +77,8 @@ class Resources(QWidget):
             grid.setColumnStretch(column, 1)
         everything = QHBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
-        everything.addLayout(grid, 3)
-        everything.addWidget(self._processes, 2)
+        everything.addLayout(grid, 4)
+        everything.addWidget(self._processes, 3)
         desk.on_select.append(lambda _station: self._watch())
 
     def showEvent(self, event: QShowEvent) -> None:
