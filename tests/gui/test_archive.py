@@ -446,3 +446,21 @@ def test_the_controls_of_the_player_stay_in_sight_at_every_size(
         assert (window.width(), window.height()) == (width, height)
         for control in (player.timeline, player.play, player.labels.give):
             assert window.tabs.rect().contains(control.mapTo(window.tabs, control.rect().bottomLeft()))
+
+
+def test_both_tabs_are_drawn_dark_and_light(
+    shown: Shown, archive: Archive, settings: ServerSettings, theme: Theme
+) -> None:
+    record(settings)
+    play(shown, archive)
+    for look in Look:
+        if look is not theme.look:
+            theme.set(look)
+        for tab in ("Recordings", "Cloud"):
+            shown.open(tab)
+            shown.draw()
+            image = shown.window.grab().toImage()
+            places = ((x, y) for x in range(0, image.width(), 5) for y in range(0, image.height(), 5))
+            seen = {image.pixel(x, y) for x, y in places}
+            assert len(seen) > 40
+            assert theme.colour("card").rgb() in seen

@@ -21,6 +21,7 @@ from server_gui.core.fleet.statistics import LinkStatistics
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload, add_robots
+from server_gui.views.widgets.elided import ElidedLabel
 from tests.fake_robot import FakeRobot
 from tests.gui.test_app import wait
 
@@ -168,6 +169,8 @@ def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
         wait(lambda: station.robot.resources is not None, "saw the robot's computer")
         wait(lambda: rows(app, "exo-01") > 20, "recorded rows")
         assert len(robot.called("stream.start")) == 1
+        shown = app.window.statusBar().findChildren(ElidedLabel)
+        wait(lambda: any(label.text().startswith("Recording · ") for label in shown), "said so")
         app.window.hide()
     store = Store(settings.store.url)
     assert store.dataset(TELEMETRY.location("exo-01", 1)).count_rows() > 10
