@@ -6,8 +6,10 @@ features, judging. The time is what this thread used of a core, so that other wo
 
 import functools
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,9 @@ from ml.robot.learned import Learned
 from ml.robot.task import TASKS, Task
 from ml.serving.grid import period_ns
 from ml.serving.predictor import Windows, judged
+from server_gui.core.prediction.settings import Action, RuleSettings
+from tests.unit.ml.serving.small import hips
+from tests.unit.prediction.robots import predicting, publish, served, settings, telemetry
 
 ROBOTS = 50
 ROUNDS = 300
@@ -47,6 +52,8 @@ def main() -> int:
     over = [_line(recipe.name, functools.partial(_times, recipe, predict)) for recipe, predict in _models()]
     over += [_line(f"own {task}", functools.partial(_served, learned)) for task, learned in _own().items()]
     sys.stdout.write(f"allowed: {ONE_MS:g} ms for one robot, {ALL_MS:g} ms for {ROBOTS}, 99th percentiles\n")
+    half, tail = np.percentile(_stopping(), (50, 99))
+    sys.stdout.write(f"rows handed over → a rule asks for a stop: {half:.1f} ms, p99 {tail:.1f} ms\n")
     return int(any(over))
 
 
@@ -140,3 +147,24 @@ def _served(learned: Learned, robots: int) -> list[float]:
         judged("model", learned, due)
         times.append(1e3 * (time.thread_time() - began))
     return times[recipe.look_back + WARM :]
+
+
+def _stopping() -> list[float]:
+    """Milliseconds on the wall clock from handing over the rows that fill a window to the stop they cause."""
+    times: list[float] = []
+    rule = RuleSettings("activity", "walk", 0.5, action=Action.STOP)
+    with tempfile.TemporaryDirectory() as folder:
+        url = Path(folder).as_uri()
+        publish(url)
+        with predicting(settings(url, rule)) as (one, told):
+            for number in range(ROBOTS):
+                robot = f"exo-{number}"
+                served(one, told, robot)
+                *before, last = list(telemetry(hips(2.1, walks=True)))
+                for event in before:
+                    one.take(robot, event)
+                began = time.monotonic()
+                one.take(robot, last)
+                told.until(lambda: len(told.stops) > number)  # noqa: B023 - called here alone
+                times.append(1e3 * (told.stopped_s - began))
+    return times

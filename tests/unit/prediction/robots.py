@@ -83,6 +83,7 @@ class Told:
 
     news: list[Foreseen] = field(default_factory=list)
     stops: list[Ruled] = field(default_factory=list)
+    stopped_s: float = 0.0  # when the newest stop was asked for, on our monotonic clock
     order: list[object] = field(default_factory=list)
     changed: threading.Condition = field(default_factory=threading.Condition)
 
@@ -93,6 +94,7 @@ class Told:
             self.changed.notify_all()
 
     def stop(self, ruled: Ruled) -> None:
+        self.stopped_s = time.monotonic()
         self.stops.append(ruled)
         self.order.append("stop")
 
