@@ -9,7 +9,8 @@ from typing import Any
 
 from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication, QWidget
 
 from gateway.client import Batch, ClockOffset, ConnectionState
 from gateway.messages import (
@@ -44,6 +45,13 @@ JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("hi
 STATES = {"4": "operation enabled", "5": "quick stop active", "7": "fault"}
 UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N·m", "current": "A", "temperature": "°C"}
 HELD = {"gait.step_length": 0.4, "gait.trunk_angle": 0.05, "left_knee.max_torque": 80.0}
+
+
+def destroy(widget: QWidget) -> None:
+    """Take a view apart now: plots that are left to the garbage collector can crash those made meanwhile."""
+    widget.close()
+    widget.deleteLater()
+    QApplication.sendPostedEvents(widget, QEvent.Type.DeferredDelete)
 
 
 class FakeCommands:

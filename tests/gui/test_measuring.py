@@ -17,7 +17,7 @@ from server_gui.views.measuring import TITLES, Measuring
 from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Plot
-from tests.gui.fakes import Bench, telemetry
+from tests.gui.fakes import Bench, destroy, telemetry
 
 RATE_HZ = 100
 START_NS = 1_000_000_000_000
@@ -36,7 +36,7 @@ def signals(theme: Theme, bench: Bench) -> Iterator[Signals]:
     QApplication.processEvents()
     made.refresh()
     yield made
-    made.close()
+    destroy(made)
 
 
 def add(bench: Bench, first: int, rows: int) -> None:
@@ -239,4 +239,4 @@ def test_without_data_nothing_is_measured(theme: Theme, bench: Bench) -> None:
     QTest.keyClick(made.measuring, Qt.Key.Key_Left)
     made.refresh()
     assert made.measuring.table.rowCount() == 0
-    made.close()
+    destroy(made)

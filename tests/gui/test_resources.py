@@ -15,7 +15,7 @@ from server_gui.views.computer import held_back
 from server_gui.views.processes import CPU, MEMORY, NAME
 from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, resources
+from tests.gui.fakes import Bench, destroy, resources
 
 MIB = 1 << 20
 
@@ -26,7 +26,7 @@ def view(theme: Theme, bench: Bench) -> Iterator[Resources]:
     made.resize(900, 600)
     made.show()
     yield made
-    made.close()
+    destroy(made)
 
 
 def show(view: Resources, bench: Bench, *uses: ProcessUse) -> list[str]:

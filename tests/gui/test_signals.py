@@ -9,7 +9,7 @@ import pytest
 from server_gui.core.processing.units import Units
 from server_gui.views.signals import MOST_CURVES, Signals
 from server_gui.views.theme import Theme
-from tests.gui.fakes import JOINTS, Bench, telemetry, walking
+from tests.gui.fakes import JOINTS, Bench, destroy, telemetry, walking
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def signals(theme: Theme, bench: Bench) -> Iterator[Signals]:
     made.show()
     made.refresh()
     yield made
-    made.close()
+    destroy(made)
 
 
 def test_channels_of_one_unit_share_a_plot(signals: Signals) -> None:
