@@ -41,7 +41,7 @@ class UnsafeStore(StoreError):
 
 _REFUSED: Final = re.compile(
     r"401 Unauthorized|403 Forbidden|lacked the necessary privileges|"
-    r"HTTP status 40[13]|AWS Error ACCESS_DENIED"
+    r"HTTP status 40[13]|AWS Error ACCESS_DENIED|Missing (AccessKeyId|SecretAccessKey)"
 )
 _NO_TABLE: Final = re.compile(r"[Nn]ot a Delta table|[Nn]o files in log segment|LogSegment end version")
 _CODE: Final = re.compile(r"<Code>(\w+)</Code>|(\d{3} [A-Z][A-Za-z ]+)|(AWS Error \w+)|(HTTP status \d+)")

@@ -170,7 +170,7 @@ def _row(name: str, link: LinkReport) -> tuple[str, ...]:
         NONE if link.since_utc_s is None else _instant(link.since_utc_s),
         str(link.links),
         f"{link.rows_per_s:.0f}",
-        size(round(link.received_per_s)),
+        NONE if link.received_per_s is None else size(link.received_per_s),
         str(link.rows),
         str(link.missed),
         str(link.dropped),

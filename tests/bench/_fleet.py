@@ -1,7 +1,8 @@
 """What collecting a fleet costs: a collector in a process of its own, and its robots in another.
 
-`GWRMS_COLLECT_S` is for how long memory is watched: 3600 for an hour. Robots faster than real time would show
-how much waits, not how much is kept.
+Memory is watched over an hour's batches, files and compactions, of which each comes thirty times as soon as
+usual: robots faster than real time would show how much waits, not how much is kept. `GWRMS_COLLECT_S=3600`
+for an hour as it is.
 """
 
 import gc
@@ -14,12 +15,13 @@ import time
 from pathlib import Path
 
 from server_gui.core.fleet.collector import Collector
+from server_gui.core.prediction.settings import PredictionSettings
 from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
 
 RATE_HZ, CHANNELS = 100, 60
 WARM_S, MEASURE_S = 3.0, 20.0
-OFTEN_S = 2.0  # between uploads: thirty times as many as usual
-COLLECT_S = float(os.environ.get("GWRMS_COLLECT_S", "60"))
+COLLECT_S = float(os.environ.get("GWRMS_COLLECT_S", "120"))
+PARTS = 6  # of an hour
 LOOK_S = 0.2
 
 
@@ -29,8 +31,8 @@ def cpu(robots: int) -> dict[str, float]:
 
 
 def memory(robots: int) -> dict[str, float]:
-    """Whether memory grows with what is recorded and uploaded."""
-    return _measured("_memory", robots, OFTEN_S, "--rate", str(RATE_HZ))
+    """Whether memory grows with what is recorded, uploaded and compacted: MB at most in each part."""
+    return _measured("_memory", robots, COLLECT_S / 60, "--rate", str(RATE_HZ))
 
 
 def _measured(what: str, robots: int, batch_s: float, *options: str) -> dict[str, float]:
@@ -40,7 +42,8 @@ def _measured(what: str, robots: int, batch_s: float, *options: str) -> dict[str
             assert served.stdout is not None
             ports = served.stdout.readline()
             script = f"from tests.bench import _fleet; _fleet.run({what!r}, {ports!r}, {folder!r}, {batch_s})"
-            found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+            command = [sys.executable, "-c", script]
+            found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
         finally:
             served.kill()
     result: dict[str, float] = json.loads(found.stdout)
@@ -51,9 +54,10 @@ def run(what: str, ports: bytes, folder: str, batch_s: float) -> None:
     """Collect these robots; for a process of its own, which prints what was measured."""
     gc.freeze()  # as `gwrms collect` does
     robots = {f"exo-{i:02}": RobotSettings(f"127.0.0.1:{port}") for i, port in enumerate(json.loads(ports))}
-    store = StoreSettings((Path(folder) / "store").as_uri())
+    store = StoreSettings((Path(folder) / "store").as_uri(), compact_h=batch_s * 20 / 3600)
     recorder = RecordingSettings(spool=Path(folder) / "spool", batch_s=batch_s)
-    with Collector(ServerSettings(robots, store, recorder)) as collector:
+    settings = ServerSettings(robots, store, recorder, PredictionSettings(enabled=False))
+    with Collector(settings) as collector:
         measured = globals()[what](collector, len(robots))
     sys.stdout.write(json.dumps(measured))
 
@@ -72,9 +76,11 @@ def _memory(collector: Collector, robots: int) -> dict[str, float]:
     while (now_s := time.monotonic() - began_s) < COLLECT_S:
         collector.wait(LOOK_S)
         seen.append((now_s, _resident_mb()))
-    first = max(mb for now_s, mb in seen if COLLECT_S / 4 < now_s <= COLLECT_S / 2)
-    second = max(mb for now_s, mb in seen if now_s > COLLECT_S / 2)
-    return {"first": first, "second": second, "rows": _rows(collector) / robots, **_losses(collector)}
+    most = {
+        str(part): max(mb for now_s, mb in seen if part - 1 < PARTS * now_s / COLLECT_S <= part)
+        for part in range(1, PARTS + 1)
+    }
+    return {**most, "batches": collector.report().result().uploader.uploaded, **_losses(collector)}
 
 
 def _losses(collector: Collector) -> dict[str, float]:

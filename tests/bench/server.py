@@ -126,9 +126,14 @@ def fleet(folder: Path) -> Iterator[Row]:
     yield Row(what, cost["cores"], "cores", MOST_CORES, True)
     yield Row("  rows lost", cost["lost"], "", 0, True)
     found = _fleet.memory(ROBOTS)
-    what = f"{_fleet.COLLECT_S:g} s of {ROBOTS} robots: memory in the second half ÷ in the quarter before"
-    yield Row(what, found["second"] / found["first"], "", MOST_GROWTH, True)
-    yield Row("  memory", found["second"], "MB")
+    parts = [found[str(part)] for part in range(1, _fleet.PARTS + 1)]
+    what = (
+        f"an hour's batches of {ROBOTS} robots, in {_fleet.COLLECT_S:g} s: last half hour's memory ÷ first's"
+    )
+    yield Row(what, max(parts[3:]) / max(parts[:3]), "", MOST_GROWTH, True)
+    for part, megabytes in enumerate(parts, 1):
+        yield Row(f"  {10 * part} minutes", megabytes, "MB")
+    yield Row("  batches uploaded", found["batches"], "")
     yield Row("  rows lost", found["lost"], "", 0, True)
 
 

@@ -29,7 +29,7 @@ class LinkReport(Struct, frozen=True):
     rows_per_s: float
     bytes: int  # that its rows take in the spool
     received: int  # bytes that came over the network
-    received_per_s: float  # between the newest two looks at the robot's computer
+    received_per_s: float | None  # between the newest two looks at the robot's computer
     missed: int  # notifications that never came
     dropped: int  # rows that the robot threw away
     newest_age_s: float | None  # since rows came
@@ -56,7 +56,7 @@ class LinkStatistics:
         self._stream = (0, 0)  # link and stream; what the robot dropped is counted anew with each
         self._dropped_before = 0
         self._received = (0, 0)  # bytes, and when that was
-        self._received_per_s = 0.0
+        self._received_per_s: float | None = None
         self._monitor = LinkMonitor()
         self._clock: ClockOffset | None = None
         self._recent: collections.deque[tuple[int, int]] = collections.deque(
@@ -76,7 +76,7 @@ class LinkStatistics:
             case LinkChanged():
                 self._links += event.state is ConnectionState.CONNECTED
                 self.state, self._problem, self._since_s = event.state, event.problem, time.time()
-                self._received_per_s = 0.0
+                self._received_per_s = None
                 self._monitor.state(event.state, event.problem, event.at_ns)
 
     def report(self, session: str) -> LinkReport:

@@ -100,7 +100,7 @@ def test_what_came_over_the_network_is_counted_whatever_became_of_it() -> None:
     assert (report.received, report.received_per_s) == (61_000, 2_000.0)
     counted.take(LinkChanged(ConnectionState.WAITING, "closed", 21 * SECOND_NS))
     report = counted.report("")
-    assert (report.received, report.received_per_s) == (61_000, 0.0)
+    assert (report.received, report.received_per_s) == (61_000, None)
 
 
 def test_a_link_tells_its_quality_and_why_it_is_not_good(monkeypatch: pytest.MonkeyPatch) -> None:
