@@ -129,11 +129,8 @@ def _spells(found: Replayed) -> Iterator[str]:
     """What followed what."""
     both = zip(found.predictions, found.utc_ns, strict=True)
     spells = [list(spell) for _, spell in itertools.groupby(both, key=lambda one: one[0].label)]
-    rows = [
-        (_time(spell[0][1]), spell[0][0].label, f"{(spell[-1][1] - spell[0][1]) / 1e9:.1f} s")
-        for spell in spells
-    ]
-    yield table(("FROM (UTC)", "SAYS", "FOR"), rows[:SPELLS], (2,)).rstrip()
+    rows = [(_time(spell[0][1]), _time(spell[-1][1]), spell[0][0].label, str(len(spell))) for spell in spells]
+    yield table(("FROM (UTC)", "TO", "SAYS", "DECISIONS"), rows[:SPELLS], (3,)).rstrip()
     if len(rows) > SPELLS:
         yield f"… and {len(rows) - SPELLS} more (--json has every decision)"
 

@@ -2,5 +2,6 @@
 
 rings: the past of every channel · walk: gait phase · soles: where cells are · stopping · control: the lease ·
 edits, writing: changes staged, reviewed, written, tried, taken back · watch, news: what happened ·
-commands, link: what is asked of a robot, over a link of its own · station · desk
+commands, link: what is asked of a robot, over a link of its own · predictions: what models say ·
+station · desk
 """

@@ -1,10 +1,13 @@
-"""Status prediction, live: every robot's rows → what its models say, how far to believe it, and rules on it.
+"""Status prediction: every robot's rows → what its models say, how far to believe it, and rules on it.
 
 settings     `[prediction]` and `[[rules]]` of the server's file
+inbox        what feeds tell, on its way to the thread that predicts
 serving      a thread that looks which models serve, and loads them
 following    one robot: its rows, windows, trust and rules
-predicting   a thread that judges all robots together, and tells
 rules        when a rule on predictions begins and ends to hold
-news         what is told
-state        how it goes
+predicting   the thread that judges all robots together, and tells
+news, state  what it tells; how it goes
+live         robots that are followed for a terminal alone
+replay       a recorded session, predicted again
+rehearsal    a rule over recordings; rehearsals: which recordings there are for that
 """
