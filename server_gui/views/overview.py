@@ -7,6 +7,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
+from ml.robot.task import ABNORMAL, UNKNOWN
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.soles import Sole, sole
 from server_gui.core.desk.station import Station
@@ -161,9 +162,8 @@ class Overview(QWidget):
         if shown is None or shown.is_stale():
             return ("Walking" if gait.walking else "Not walking"), cadence
         prediction = shown.predicted.prediction
-        return label_text(prediction.label), " · ".join(
-            filter(None, (f"p {prediction.probability:.2f}", cadence))
-        )
+        how_sure = "" if prediction.label in (UNKNOWN, ABNORMAL) else f"p {prediction.probability:.2f}"
+        return label_text(prediction.label), " · ".join(filter(None, (how_sure, cadence)))
 
     def _refresh_posture(self, station: Station, *, slow: bool) -> None:
         values = station.robot.values

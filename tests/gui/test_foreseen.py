@@ -66,6 +66,8 @@ def test_a_model_that_does_not_know_says_so(
 ) -> None:
     station.foresee(predicted(label, {"walk": 0.41, "stand": 0.4}, novelty=novelty))
     shown(window, lambda: chip(window) == said)
+    assert window.overview._ring._word == label.capitalize()
+    assert "p 0" not in window.overview._ring._below, "that is another class's"
 
 
 def test_a_fall_stands_before_all_else(station: Station) -> None:
