@@ -185,7 +185,7 @@ def test_what_is_labelled_is_learned_and_serves_and_can_be_taken_back(store_url:
         asked("cloud", "upload", "--config", config)  # what a busy computer has not yet
 
     before, after = (right(predicted(store_url, model), robot.truth) for model in (first, second))
-    assert after > 0.7  # 0.9, where robot and prediction get on with it
+    assert after > 0.7  # 0.89 on a busy computer
     assert after > before + 0.2
     card = asked("models", "show", second, "--config", config)
     assert card["learned"] == [live.session, "practice-1", "practice-2"]
