@@ -125,7 +125,11 @@ class Gathering:
         if missed:
             happened(EventKind.GAP, f"{missed} notifications never came", missed=missed)
         if rows > 0:
-            happened(EventKind.DROPPED, f"the robot dropped {rows} rows: we read too slowly", rows=rows)
+            happened(
+                EventKind.DROPPED,
+                f"the robot dropped {rows} rows: it was too busy, or we read too slowly",
+                rows=rows,
+            )
         if batch.shed != shed:
             share = (
                 f"one row of {batch.shed}: it keeps to its max_cpu_percent" if batch.shed > 1 else "every row"
