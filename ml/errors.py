@@ -6,4 +6,4 @@ class UnusableData(Exception):
 
 
 class UnusableModel(ValueError):
-    """This model cannot be used here; the message says which, what is wrong with it, and what to do."""
+    """A model cannot be used here; the message says which, what is wrong with it, and what to do."""
