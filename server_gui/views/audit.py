@@ -25,7 +25,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.news import NewsKind
 from server_gui.core.desk.station import Station
-from server_gui.views.acts_model import OUTCOME, SORT_ROLE, TIME, ActsModel, Index, Line
+from server_gui.views.acts_model import OUTCOME, ROBOT, SORT_ROLE, TIME, ActsModel, Index, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
@@ -122,6 +122,7 @@ class Audit(QWidget):
             return
         self._seen = seen
         self.model.take([line for name in self._called for line in self._lines(name)])
+        self.table.setColumnHidden(ROBOT, len(self._called) < 2)
         _offer(self.robot, list(self._called))
         _offer(self.who, sorted({line.act.who for line in self.model.lines}))
         self._filter()

@@ -71,10 +71,12 @@ def test_stores_and_stops_are_told_too(journal: RobotsJournal) -> None:
     journal.say("store", component="left_knee")
     journal.say("store done", component="left_knee", result="stored")
     journal.say("stop", reason="STOP key")
+    journal.say("stop answered", result={"left_hip": "confirmed", "left_knee": "unconfirmed"})
     audit.take(journal.told().journal.entries)
     assert done(audit) == [
         ("store", "left_knee", "store done: stored"),
         ("stop", "", "STOP key"),
+        ("stop answered", "", "left_hip: confirmed, left_knee: unconfirmed"),
     ]
 
 

@@ -96,6 +96,8 @@ def test_what_is_missing_is_missing_and_the_rest_is_measured() -> None:
     assert found.sd == pytest.approx(math.sqrt(8 / 3))
     assert measure(values, 0, 1, 0, 4).difference is None
     assert measure(values, 1, 1, 1, 2) == Measured(None, None)
+    same = measure(np.full(1000, 0.1), 0, 1, 0, 1000)
+    assert (same.mean, same.sd) == (0.1, 0.0)
 
 
 # Zoom

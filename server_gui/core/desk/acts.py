@@ -49,7 +49,7 @@ def acts(entries: Iterable[Entry]) -> list[Act]:
 
 def _begun(entry: Entry, what: str) -> Iterable[Act]:
     after, before = _numbers(entry, "after"), _numbers(entry, "before")
-    said = OPEN if what in _LASTING else str(entry.get("result") or entry.get("reason") or "")
+    said = OPEN if what in _LASTING else _words(entry.get("result") or entry.get("reason") or "")
     base = Act(entry["n"], int(entry.get("utc_ns") or 0), str(entry.get("who")), what, "", said)
     if what in ("write", "write refused"):
         trial_s = entry.get("trial_s")
@@ -103,6 +103,12 @@ _ENDINGS: Final[Mapping[str, Callable[[Act, Entry], Act]]] = {
     "restore done": _told,
     "restore FAILED": _told,
 }
+
+
+def _words(said: object) -> str:
+    if isinstance(said, Mapping):
+        return ", ".join(f"{name}: {one}" for name, one in said.items())
+    return str(said)
 
 
 def _numbers(entry: Entry, key: str) -> dict[str, Number]:

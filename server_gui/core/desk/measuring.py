@@ -41,5 +41,7 @@ def measure(values: Floats, a: int, b: int, first: int, last: int) -> Measured:
     known = known[~np.isnan(known)]
     if not len(known):
         return Measured(at_a, at_b)
-    spread = (float(known.min()), float(known.max()), float(known.mean()), float(known.std()))
-    return Measured(at_a, at_b, *spread)
+    low, high = float(known.min()), float(known.max())
+    if low == high:  # of equal values the sums are not exact
+        return Measured(at_a, at_b, low, high, low, 0.0)
+    return Measured(at_a, at_b, low, high, float(known.mean()), float(known.std()))
