@@ -1,6 +1,5 @@
 """One robot as prediction follows it: its rows become windows, its predictions trust, rules and news."""
 
-import itertools
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -146,6 +145,6 @@ class Following:
 
 def _rows(batch: Batch, channels: Sequence[str]) -> Iterator[Row]:
     """A batch's rows with these channels alone; None where it does not have one."""
-    nothing = itertools.repeat(None, len(batch.stamps_ns))
+    nothing: list[float | None] = [None] * len(batch.stamps_ns)
     columns = [batch.columns.get(name, nothing) for name in channels]
     return zip(batch.stamps_ns, zip(*columns, strict=True), strict=True)

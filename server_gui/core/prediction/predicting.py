@@ -8,6 +8,7 @@ from typing import Final, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from ml.robot.task import TASKS
 from ml.serving.predictor import judged
 from server_gui.core.events import Event
 from server_gui.core.prediction.following import Following, Watched
@@ -160,7 +161,7 @@ class Predicting:
 
 def _of(robot: str, found: Mapping[tuple[str, str], Thing]) -> dict[str, Thing]:
     """What is of this robot, by task."""
-    return {task: thing for (of, task), thing in found.items() if of == robot}
+    return {task: found[robot, task] for task in TASKS if (robot, task) in found}
 
 
 def _reports(robot: Following) -> dict[str, TaskReport]:

@@ -8,7 +8,7 @@ import logging
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from ml.errors import UnusableModel
 from ml.registry.card import Card, check_robot
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ml.registry.registry import Registry
 
 log = logging.getLogger(__name__)
+
+BREAK_OFF_S: Final = 5.0
 
 Key = tuple[str, str]  # robot and task
 
@@ -33,7 +35,10 @@ class Model:
 
 
 class Serving:
-    """The models of every robot that `robot` named; use it as a context manager, which joins its thread."""
+    """The models of every robot that `robot` named; use it as a context manager, which ends its thread.
+
+    A store that hangs holds that thread up for no longer than `BREAK_OFF_S`; then it ends with the process.
+    """
 
     def __init__(self, store_url: str, poll_s: float) -> None:
         self.models: Mapping[Key, Model] = {}  # replaced as a whole, for any thread
@@ -48,7 +53,7 @@ class Serving:
         self._seen: Any = None  # what served and which robots there were, at the newest look
         self._wake = threading.Event()
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name="models")
+        self._thread = threading.Thread(target=self._run, name="models", daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -57,7 +62,7 @@ class Serving:
     def __exit__(self, *exc: object) -> None:
         self._ending = True
         self._wake.set()
-        self._thread.join()
+        self._thread.join(BREAK_OFF_S)
 
     def robot(self, name: str, units: dict[str, str]) -> None:
         """A robot has these channels, by their units; from any thread."""
@@ -69,15 +74,15 @@ class Serving:
 
     def _run(self) -> None:
         while not self._ending:
-            self._wake.clear()
             if self._robots:
                 self._look()
             self._wake.wait(self._poll_s)
+            self._wake.clear()
 
     def _look(self) -> None:
-        from ml.registry.registry import Registry  # brings scikit-learn, which takes a second or more
-
         try:
+            from ml.registry.registry import Registry  # brings scikit-learn, which takes a second or more
+
             self._registry = self._registry or Registry(self._url)
             self._update(self._registry)
         except Exception as error:  # noqa: BLE001 - whatever a library raises, what serves stays

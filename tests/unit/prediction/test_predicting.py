@@ -1,5 +1,6 @@
 """Prediction beside the recording: what serves is used at once, what breaks ends alone, nobody waits."""
 
+import dataclasses
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -62,6 +63,21 @@ def test_what_is_said_live_is_what_the_recording_gives(folder_url: str) -> None:
     report = state.robots[ROBOT]["activity"]
     assert (report.model, report.label, state.judged, state.skipped) == (name, "walk", len(wanted), 0)
     assert not state.problems
+
+
+def test_sources_that_come_one_by_one_give_what_rows_of_all_give(folder_url: str) -> None:
+    """With `rate_hz = 0` each notification has one component's channels alone."""
+    name = publish(folder_url)
+    rows = hips(3, walks=True)
+    with predicting(settings(folder_url)) as (one, told):
+        served(one, told)
+        for event in telemetry(rows):
+            for channel, column in event.batch.columns.items():
+                alone = dataclasses.replace(event.batch, columns={channel: column})
+                one.take(ROBOT, dataclasses.replace(event, batch=alone))
+            one.take(ROBOT, dataclasses.replace(event, batch=dataclasses.replace(event.batch, columns={})))
+        told.until(lambda: len(told.predicted()) >= len(expected(name, rows)))
+    assert [news.prediction for news in told.predicted()] == expected(name, rows)
 
 
 def test_a_promoted_model_serves_without_a_restart_and_so_does_the_old_one_after_a_rollback(
