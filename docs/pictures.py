@@ -22,6 +22,7 @@ from server_gui.app import FOLLOWING, App, Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.stopping import StopState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.views.processes import NAME
 
 HERE = Path(__file__).parent
 SIZE = 1480, 900
@@ -29,6 +30,7 @@ WITHIN_S = 240.0
 WALKED_S = 75.0  # recorded before it is labelled
 TRIAL_S = 20
 NEW_STEP = "430"  # mm
+EATER = "gait_planner"
 
 
 class Newcomer:
@@ -77,6 +79,9 @@ def finds_the_process(one: Newcomer) -> None:
     one.open("Resources")
     one.wait(lambda: one.window.resources.table.processes.rowCount(), "listed the processes")
     QTest.qWait(8000)
+    one.wait(
+        lambda: one.window.resources.table.model().index(0, NAME).data() == EATER, "saw who eats the CPU"
+    )
     one.keep("resources")
 
 
@@ -156,7 +161,7 @@ def stops_it(one: Newcomer) -> None:
 @contextlib.contextmanager
 def runaway(folder: Path) -> Iterator[None]:
     """A process of this name that eats a core."""
-    program = folder / "gait_planner"
+    program = folder / EATER
     shutil.copy(sys.executable, program)
     with subprocess.Popen([str(program), "-S", "-c", "while True: pass"]) as process:
         try:
