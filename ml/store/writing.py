@@ -56,11 +56,13 @@ def _portions(table: Table, batches: Iterator[pa.RecordBatch]) -> Iterator[tuple
     filled = (batch for batch in batches if batch.num_rows)
     for partition, alike in itertools.groupby(filled, lambda batch: _partition(table, batch)):
         portion: list[pa.RecordBatch] = []
+        count = 0
         for batch in alike:
             portion.append(batch)
-            if sum(map(len, portion)) >= ROW_GROUP:
+            count += batch.num_rows
+            if count >= ROW_GROUP:
                 yield partition, pa.Table.from_batches(portion)
-                portion = []
+                portion, count = [], 0
         if portion:
             yield partition, pa.Table.from_batches(portion)
 

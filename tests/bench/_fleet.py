@@ -42,8 +42,8 @@ def _measured(what: str, robots: int, batch_s: float, *options: str) -> dict[str
             assert served.stdout is not None
             ports = served.stdout.readline()
             script = f"from tests.bench import _fleet; _fleet.run({what!r}, {ports!r}, {folder!r}, {batch_s})"
-            command = [sys.executable, "-c", script]
-            found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+            collecting = [sys.executable, "-c", script]
+            found = subprocess.run(collecting, stdout=subprocess.PIPE, text=True, check=True)
         finally:
             served.kill()
     result: dict[str, float] = json.loads(found.stdout)
