@@ -3,7 +3,7 @@
 import concurrent.futures
 import math
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 from gateway.messages import ParameterInfo
 from server_gui.core.robot import Robot
@@ -17,7 +17,7 @@ class Commands(Protocol):
 
     def write(self, changes: Mapping[str, float]) -> "concurrent.futures.Future[None]": ...
 
-    def stop(self, reason: str) -> "concurrent.futures.Future[None]": ...
+    def stop(self, reason: str) -> "concurrent.futures.Future[Any]": ...
 
 
 class Controls:

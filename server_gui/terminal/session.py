@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Self
 
 from gateway.client import Address
-from server_gui.core.events import Looked, Telemetry
+from server_gui.core.events import Failed, Looked, StopAnswered, Telemetry
 from server_gui.core.feed import Feed, Following
 from server_gui.core.mailbox import Mailbox
 from server_gui.core.network import Network
@@ -70,6 +70,6 @@ class Session:
         """Change parameters; the outcome comes as an event."""
         return self._network.run(self._feed.write(changes))
 
-    def stop(self, reason: str) -> "concurrent.futures.Future[None]":
+    def stop(self, reason: str) -> "concurrent.futures.Future[StopAnswered | Failed]":
         """Quick stop on every drive; the outcome comes as an event."""
         return self._network.run(self._feed.stop(reason))
