@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-BREAK_OFF_S: Final = 5.0
+BREAK_OFF_S: Final = 20.0  # longer than it takes to import what models need, in a window 7 s of a core
 
 Key = tuple[str, str]  # robot and task
 
