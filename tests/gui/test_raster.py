@@ -94,6 +94,13 @@ rises = st.lists(st.floats(0.001, 0.4), min_size=2, max_size=200)
 heights = st.one_of(st.floats(-1.5, 1.5), st.just(math.nan))
 
 
+def test_no_line_is_drawn_over_what_is_missing_between_two_columns() -> None:
+    seen = drawn(
+        np.array([0.34, 0.41, 0.66, 0.78]), np.array([-1.0, np.nan, np.nan, 1.0]), View(3.0, -1.0, 1.0, 7, 50)
+    )
+    assert not seen[5:45].any()
+
+
 @given(rises, st.data(), st.sampled_from([7, 40, 300]))
 def test_what_is_drawn_bit_by_bit_is_what_is_drawn_at_once(
     steps: list[float], data: st.DataObject, width: int

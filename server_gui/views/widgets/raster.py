@@ -90,16 +90,17 @@ class Strip:
     def _draw_from(
         self, first: int, view: View, times: Floats, curves: Sequence[Floats], inks: Inks, *, sampled: bool
     ) -> None:
-        """Draw the columns from `first` on; the row before them joins them to what is there."""
-        row = max(0, int(np.searchsorted(times, first / view.scale)) - 1)
+        """Draw the columns from `first` on; the column before them joins them to what is there."""
+        row = max(0, int(np.searchsorted(times, (first - 1) / view.scale)) - 1)
         times, values = times[row:], np.array([curve[row:] for curve in curves])
         if sampled:
-            times, values = samples(times, values, first, view.scale)
+            times, values = samples(times, values, view.scale, begins=row == 0)
         columns = np.floor(times * view.scale).astype(np.int64)
         starts = np.flatnonzero(np.diff(columns, prepend=columns[0] - 1))
         low, high = np.fmin.reduceat(values, starts, axis=1), np.fmax.reduceat(values, starts, axis=1)
         before = values[:, starts - 1]  # the line comes from the last sample of the column before
         before[:, 0] = np.nan
+        before[np.isnan(values[:, starts])] = np.nan  # it ended there
         unknown = np.isnan(low)
         low, high = np.fmin(low, before), np.fmax(high, before)
         seen = ~unknown & (high >= view.low) & (low <= view.high) & (columns[starts] >= first)
@@ -111,12 +112,15 @@ class Strip:
         fill(self.pixels, columns[starts][column] % view.width, top, bottom, ink)
 
 
-def samples(times: Floats, values: Floats, first: int, scale: float) -> tuple[Floats, Floats]:
-    """The lines between the points, at places that are the same whenever they are drawn."""
-    begins, ends = max(times[0], (first - 1) / scale), times[-1]
+def samples(times: Floats, values: Floats, scale: float, *, begins: bool) -> tuple[Floats, Floats]:
+    """The lines between the points, at places that are the same whenever they are drawn.
+
+    The last point is one of them, and the first where nothing was before it.
+    """
+    first, last = times[0], times[-1]
     step = 1 / (SAMPLES_A_COLUMN * scale)
-    inner = (np.arange(np.floor(begins / step), np.ceil(ends / step) + 1) + 0.5) * step
-    at = np.concatenate(([begins], inner[(inner > begins) & (inner < ends)], [ends]))
+    inner = (np.arange(np.floor(first / step), np.ceil(last / step) + 1) + 0.5) * step
+    at = np.concatenate(([first] if begins else [], inner[(inner > first) & (inner < last)], [last]))
     return at, np.array([np.interp(at, times, line) for line in values])
 
 
