@@ -191,17 +191,18 @@ def check_described(module: ModuleType) -> None:
         found = module.described("knee.x", settings, {"knee": drive()}, {})
         assert (found.min, found.max, found.lock, found.problem) == (expected_low, expected_high, None, None)
         assert (found.data_type, found.access, found.store) == (0x06, "rw", True)
+        assert found.default == pytest.approx(1000 * scale)
     for object_, absent in (("0x7000:0", {}), ("0x1008:0", {}), ("0x6072:0", {"knee": "no power"})):
         found = module.described("knee.x", ParameterSettings(object=object_), {"knee": drive()}, absent)
         assert found.problem is not None
     unlimited = module.described("knee.x", ParameterSettings(object="0x6065:0"), {"knee": drive()}, {})
-    assert (unlimited.min, unlimited.max) == (None, None)
+    assert (unlimited.min, unlimited.max, unlimited.default) == (None, None, None)
 
 
 VARIABLES = {
-    (0x6072, 0): SimpleNamespace(data_type=0x06, access_type="rw", min=0, max=2500),
-    (0x6065, 0): SimpleNamespace(data_type=0x07, access_type="rw", min=None, max=None),
-    (0x1008, 0): SimpleNamespace(data_type=0x09, access_type="const", min=None, max=None),
+    (0x6072, 0): SimpleNamespace(data_type=0x06, access_type="rw", min=0, max=2500, default=1000),
+    (0x6065, 0): SimpleNamespace(data_type=0x07, access_type="rw", min=None, max=None, default=None),
+    (0x1008, 0): SimpleNamespace(data_type=0x09, access_type="const", min=None, max=None, default=None),
 }
 
 
