@@ -38,8 +38,9 @@ class Collecting:
         self.spool = folder / "spool"
         self.url = (folder / "store").as_uri()
         lines = ["[robots]", *(f'{name} = "{address}"' for name, address in robots.items())]
-        lines += ["[store]", f'url = "{self.url}"', "[recorder]", f'spool = "{self.spool}"']
-        self.config.write_text("\n".join([*lines, f"batch_s = {batch_s}", ""]))
+        lines += ["[store]", f'url = "{self.url}"', "[prediction]", "enabled = false"]
+        lines += ["[recorder]", f'spool = "{self.spool}"', f"batch_s = {batch_s}", ""]
+        self.config.write_text("\n".join(lines))
         self._log = folder / "collect.log"
         self._answer = b""
         self._process: subprocess.Popen[bytes] | None = None
