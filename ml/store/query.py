@@ -86,19 +86,22 @@ def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Fo
     """What may take long, in a thread, so that Ctrl-C ends it."""
     outcome: Future[Found] = Future()
     thread = threading.Thread(target=_settle, args=(outcome, work), name="query")
-    thread.start()
     try:
+        thread.start()  # Ctrl-C here too: the thread may have begun or not
         while not outcome.done():  # Ctrl-C just before a wait without end would be lost
             wait([outcome], AGAIN_S)
     finally:
-        while not outcome.done():
-            connection.interrupt()
-            wait([outcome], AGAIN_S)
-        thread.join()
+        if not outcome.cancel():
+            while not outcome.done():
+                connection.interrupt()
+                wait([outcome], AGAIN_S)
+            thread.join()
     return outcome.result()
 
 
 def _settle(outcome: "Future[Found]", work: Callable[[], Found]) -> None:
+    if not outcome.set_running_or_notify_cancel():
+        return
     try:
         outcome.set_result(work())
     except BaseException as error:  # noqa: BLE001 - whatever it is, who waits for it gets it

@@ -18,6 +18,7 @@ from ml.store.tables import EVENTS, TABLES, TELEMETRY, field
 from tests.stores import KEY, SeaweedFS
 
 HOUR_US = 3_600_000_000
+ENDLESS = "SELECT count(*) FROM range(100000000000) numbers(n) WHERE n % 7 = 3"
 SCHEMA = pa.schema([*TELEMETRY.schema, field("left_knee.position", pa.float64(), "rad")])
 
 
@@ -176,9 +177,27 @@ def test_ctrl_c_ends_a_query_that_takes_long(folder_url: str) -> None:
     presser = threading.Thread(target=press)
     presser.start()
     with pytest.raises(KeyboardInterrupt):
-        ask(Store(folder_url), "SELECT count(*) FROM range(100000000000) numbers(n) WHERE n % 7 = 3")
+        ask(Store(folder_url), ENDLESS)
     presser.join()
     assert not runs()
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_ctrl_c_while_the_query_starts_leaves_no_thread(
+    folder_url: str, monkeypatch: pytest.MonkeyPatch, begun: bool
+) -> None:
+    start = threading.Thread.start
+
+    def pressed(thread: threading.Thread) -> None:
+        if begun:
+            start(thread)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(threading.Thread, "start", pressed)
+        with pytest.raises(KeyboardInterrupt):
+            ask(Store(folder_url), ENDLESS)
+    assert all(thread.name != "query" for thread in threading.enumerate())
 
 
 def test_python_reads_no_file_for_arrow(store_url: str) -> None:
