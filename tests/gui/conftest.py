@@ -9,13 +9,13 @@ import pytest
 
 os.environ["QT_QPA_PLATFORM"] = "offscreen"
 
-from PySide6.QtCore import QEvent, QEventLoop, QSettings, QtMsgType, qInstallMessageHandler
+from PySide6.QtCore import QEventLoop, QSettings, QtMsgType, qInstallMessageHandler
 from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.desk import Desk
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, described
+from tests.gui.fakes import Bench, described, destroy
 
 
 def _quiet(kind: QtMsgType, _context: object, text: str) -> None:
@@ -75,6 +75,4 @@ def window(qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path) -> Iter
     made.show()
     bench.draw(made)
     yield made
-    made.close()
-    made.deleteLater()
-    qt.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    destroy(made)

@@ -1,7 +1,6 @@
 """The whole window on a gateway over TCP: it follows, writes, stops, and lets go of everything at its end."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,13 +8,12 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from server_gui.app import FOLLOWING, App
+from server_gui.app import App
 from server_gui.core.desk.stopping import StopState
 from server_gui.core.desk.writing import WriteState
 from server_gui.core.settings import ServerSettings, add_robots
 from tests.fake_robot import FakeRobot
-
-WITHIN_S = 50.0
+from tests.gui.running import running, wait
 
 
 @pytest.fixture
@@ -28,18 +26,9 @@ def robot() -> Iterator[FakeRobot]:
 def app(qt: QApplication, robot: FakeRobot, tmp_path: Path) -> Iterator[App]:
     settings = add_robots(ServerSettings(), {"exo-01": robot.address})
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
-    with App(qt, settings, kept, FOLLOWING) as made:
-        made.window.show()
+    with running(qt, settings, kept) as made:
         wait(lambda: bool(made.desk.stations[0].robot.parameters), "read the parameters")
         yield made
-        made.window.hide()
-
-
-def wait(so: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + WITHIN_S
-    while not so():
-        assert time.monotonic() < deadline, f"never {what}"
-        QTest.qWait(10)
 
 
 def test_a_value_goes_from_the_table_to_the_robot_on_trial_and_back(app: App, robot: FakeRobot) -> None:
@@ -107,12 +96,10 @@ def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> N
 @pytest.mark.timeout(120)
 def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplication, tmp_path: Path) -> None:
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
-    with App(qt, ServerSettings(), kept, FOLLOWING) as app:
-        app.window.show()
+    with running(qt, ServerSettings(), kept) as app:
         wait(app.window.empty.isVisible, "offered it")
         app.window.empty.start.click()
         wait(lambda: app.desk.selected is not None, "started it")
         station = app.desk.stations[0]
         wait(lambda: station.title == "simulated-exo" and not station.robot.is_stale(), "was live")
         wait(lambda: station.processing.derived().gait.walking, "walked")
-        app.window.hide()

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QSettings, Qt
+from PySide6.QtCore import QPoint, QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -35,8 +35,8 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, walking
-from tests.gui.test_app import wait
+from tests.gui.fakes import Bench, destroy, walking
+from tests.gui.running import wait
 from tests.gui.test_recording import FakeKeeper, report
 
 SECONDS = 12
@@ -85,9 +85,7 @@ def window(
     made.resize(1480, 900)
     made.show()
     yield made
-    made.close()
-    made.deleteLater()
-    qt.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    destroy(made)
 
 
 class Tabs(QTabWidget):
@@ -149,9 +147,7 @@ def shown(
     tabs = Tabs(archive, bench, theme)
     tabs.show()
     yield Shown(tabs, posted)
-    tabs.close()
-    tabs.deleteLater()
-    qt.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    destroy(tabs)
 
 
 def cell(shown: Shown, column: int) -> str:

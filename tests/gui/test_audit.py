@@ -12,7 +12,7 @@ from server_gui.core.processing.units import Units
 from server_gui.views.acts_model import NEW, OLD, OUTCOME, READ_BACK, THING, TIME, UNIT, WHAT, WHO
 from server_gui.views.audit import Audit
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, described
+from tests.gui.fakes import Bench, described, destroy
 from tests.gui.journals import RobotsJournal
 
 STEP, ANGLE = "gait.step_length", "gait.trunk_angle"
@@ -36,7 +36,7 @@ def view(theme: Theme, bench: Bench, journal: RobotsJournal) -> Iterator[Audit]:
     made.show()
     made.refresh()
     yield made
-    made.close()
+    destroy(made)
 
 
 def column(view: Audit, place: int) -> list[str]:

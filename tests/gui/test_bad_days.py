@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
 
 from gateway.client import ConnectionState
 from gateway.messages import LayoutInfo
-from server_gui.app import FOLLOWING, App
+from server_gui.app import App
 from server_gui.core.desk.news import NewsKind
 from server_gui.core.events import LinkChanged
 from server_gui.core.settings import ServerSettings, add_robots
@@ -21,7 +21,7 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.widgets.files import ask_open, ask_save
 from tests.fake_robot import FakeRobot
 from tests.gui.fakes import HELD, Bench, described, looked, telemetry, walking
-from tests.gui.test_app import wait
+from tests.gui.running import running, wait
 
 HOUR_S = 3600.0
 
@@ -95,12 +95,9 @@ def old(qt: QApplication, robot: FakeRobot, tmp_path: Path) -> Iterator[App]:
     robot.protocol = 0
     with FakeRobot() as well:
         settings = add_robots(ServerSettings(), {"old": robot.address, "well": well.address})
-        with App(
-            qt, settings, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat), FOLLOWING
-        ) as app:
-            app.window.show()
+        kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
+        with running(qt, settings, kept) as app:
             yield app
-            app.window.hide()
 
 
 def test_a_gateway_of_an_older_protocol_is_named_and_disturbs_no_other(old: App, robot: FakeRobot) -> None:
@@ -121,17 +118,13 @@ def test_a_gateway_whose_description_cannot_be_read_says_why_and_is_asked_again(
 ) -> None:
     robot.overrides["robot.describe"] = lambda _params: {"robot": "exo-old", "parts": []}
     settings = add_robots(ServerSettings(), {"old": robot.address})
-    with App(
-        qt, settings, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat), FOLLOWING
-    ) as app:
-        app.window.show()
+    with running(qt, settings, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)) as app:
         station = app.desk.stations[0]
         wait(lambda: station.robot.last_failure is not None, "told the failure")
         QTest.qWait(300)
         assert any("robot.describe" in item.text for item in app.desk.news.items)
         del robot.overrides["robot.describe"]
         wait(lambda: not station.robot.is_stale(), "followed it all the same")
-        app.window.hide()
 
 
 def test_parameters_that_a_new_firmware_no_longer_has_go_with_what_was_to_be_written(

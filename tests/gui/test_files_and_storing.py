@@ -17,7 +17,7 @@ from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.store_page import SETTLE_MS
 from server_gui.views.parameters.tree import DEFAULT, FILE, NAME, NEW, STORED, TITLES
 from server_gui.views.theme import Theme
-from tests.gui.fakes import HELD, Bench, described, looked, walking
+from tests.gui.fakes import HELD, Bench, described, destroy, looked, walking
 
 FILE_TEXT = """
 [robot]
@@ -39,7 +39,7 @@ def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
     made.show()
     made.refresh()
     yield made
-    made.close()
+    destroy(made)
 
 
 @pytest.fixture
@@ -191,8 +191,7 @@ def test_pinned_parameters_are_kept_for_their_robot(
     other.add("exo-02").take([described("exo-02"), looked()])
     again = MainWindow(other.desk, theme, window.kept)
     assert [sorted(other.desk.pins.of(name)) for name in ("exo-01", "exo-02")] == [["gait.step_length"], []]
-    again.close()
-    again.deleteLater()
+    destroy(again)
 
 
 def test_the_default_of_the_eds_is_shown_and_filtered_by(panel: ParametersPanel) -> None:

@@ -19,7 +19,7 @@ from server_gui.views.foreseen import model_phases, status
 from server_gui.views.main_window import MainWindow
 from tests.gui.fakes import Bench, looked, walking
 from tests.gui.foreseen import predicted
-from tests.gui.test_app import wait
+from tests.gui.running import wait
 
 HOUR_S = 3600.0
 WALKS = {"walk": 0.94, "turn": 0.04, "stand": 0.02}

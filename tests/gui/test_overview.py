@@ -18,7 +18,7 @@ from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
-from tests.gui.fakes import Bench, described, looked, telemetry, walking
+from tests.gui.fakes import Bench, described, destroy, looked, telemetry, walking
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
     made.resize(1000, 800)
     made.show()
     yield made
-    made.close()
+    destroy(made)
 
 
 def cells(model: JointModel, joint: int) -> list[str]:

@@ -16,7 +16,7 @@ from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from server_gui.views.theme import Theme
-from tests.gui.fakes import HELD, Bench, described, looked
+from tests.gui.fakes import HELD, Bench, described, destroy, looked
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
     made.show()
     made.refresh()
     yield made
-    made.close()
+    destroy(made)
 
 
 def row(panel: ParametersPanel, name: str) -> list[str]:

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication
 from gateway.client import Address
 from ml.store import Store
 from ml.store.tables import TELEMETRY
-from server_gui.app import FOLLOWING, App, Record
+from server_gui.app import App, Record
 from server_gui.core.desk.news import News
 from server_gui.core.desk.recording import By, Recording, Tone
 from server_gui.core.fleet.collector import Collector, CollectorReport
@@ -23,7 +23,7 @@ from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload, add_robots
 from server_gui.views.widgets.elided import ElidedLabel
 from tests.fake_robot import FakeRobot
-from tests.gui.test_app import wait
+from tests.gui.running import running, wait
 
 ADDRESS = "192.0.2.7:7420"
 FULL = Alarm(AlarmKind.DISK_FULL, "recording has stopped: the disk of /spool is nearly full; make room there")
@@ -159,8 +159,7 @@ def kept(tmp_path: Path) -> QSettings:
 def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
     qt: QApplication, settings: ServerSettings, kept: QSettings, robot: FakeRobot
 ) -> None:
-    with App(qt, settings, kept, FOLLOWING, Record("Ada", "first")) as app:
-        app.window.show()
+    with running(qt, settings, kept, Record("Ada", "first")) as app:
         station = app.desk.stations[0]
         wait(lambda: not station.robot.is_stale() and bool(station.robot.parameters), "was live")
         wait(lambda: app.desk.recording.report is not None, "told how recording goes")
@@ -171,7 +170,6 @@ def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
         assert len(robot.called("stream.start")) == 1
         shown = app.window.statusBar().findChildren(ElidedLabel)
         wait(lambda: any(label.text().startswith("Recording · ") for label in shown), "said so")
-        app.window.hide()
     store = Store(settings.store.url)
     assert store.dataset(TELEMETRY.location("exo-01", 1)).count_rows() > 10
     assert store.dataset("sessions").to_table()["operator"].to_pylist()[-1] == "Ada"
@@ -186,7 +184,7 @@ def rows(app: App, robot: str) -> int:
 def test_a_robot_added_while_it_runs_is_recorded_too(
     qt: QApplication, settings: ServerSettings, kept: QSettings
 ) -> None:
-    with FakeRobot() as other, App(qt, settings, kept, FOLLOWING, Record()) as app:
+    with FakeRobot() as other, running(qt, settings, kept, Record()) as app:
         app.window.added.emit(other.address)
         wait(lambda: not app.desk.stations[1].robot.is_stale(), "saw the other")
         name = app.desk.stations[1].name
@@ -197,7 +195,7 @@ def test_a_robot_added_while_it_runs_is_recorded_too(
 def test_where_a_collector_records_the_window_shows_and_says_who_records(
     qt: QApplication, settings: ServerSettings, kept: QSettings
 ) -> None:
-    with Collector(settings) as collector, App(qt, settings, kept, FOLLOWING, Record()) as app:
+    with Collector(settings) as collector, running(qt, settings, kept, Record()) as app:
         station = app.desk.stations[0]
         wait(lambda: not station.robot.is_stale(), "was live")
         wait(lambda: app.desk.recording.report is not None, "asked the collector")
@@ -213,7 +211,7 @@ def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
     qt: QApplication, settings: ServerSettings, kept: QSettings, tmp_path: Path
 ) -> None:
     (tmp_path / "spool").write_text("no folder")
-    with App(qt, settings, kept, FOLLOWING, Record()) as app:
+    with running(qt, settings, kept, Record()) as app:
         station = app.desk.stations[0]
         wait(lambda: not station.robot.is_stale(), "was live")
         wait(lambda: app.desk.recording.problem is not None, "found nobody")

@@ -14,7 +14,7 @@ from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Theme
-from tests.gui.fakes import JOINTS, Bench, described
+from tests.gui.fakes import JOINTS, Bench, described, destroy
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
@@ -27,7 +27,7 @@ def header(theme: Theme, bench: Bench) -> Iterator[Header]:
     made.show()
     made.refresh()
     yield made
-    made.close()
+    destroy(made)
 
 
 def press(header: Header) -> None:

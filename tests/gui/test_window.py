@@ -14,7 +14,7 @@ from server_gui.core.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, described, looked, walking
+from tests.gui.fakes import Bench, described, destroy, looked, walking
 
 TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
 
@@ -31,7 +31,7 @@ def test_without_a_robot_the_window_says_what_to_do_and_offers_the_simulator(
     window.empty.start.click()
     assert asked == [True]
     assert not window.empty.start.isEnabled(), "it could be asked for twice"
-    window.close()
+    destroy(window)
 
 
 def test_a_robot_that_is_gone_says_so_and_how_old_its_data_are(window: MainWindow, bench: Bench) -> None:
@@ -97,7 +97,7 @@ def test_the_layout_is_kept_and_can_be_reset(window: MainWindow, bench: Bench, t
     assert again.docks[2].isHidden()
     again.reset_layout()
     assert not again.docks[2].isHidden()
-    again.close()
+    destroy(again)
 
 
 @pytest.mark.parametrize("look", Look)

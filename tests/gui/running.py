@@ -1,0 +1,35 @@
+"""The whole window at work on robots that answer over TCP, and taken apart at its end."""
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+
+from PySide6.QtCore import QSettings
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from server_gui.app import FOLLOWING, App, Record
+from server_gui.core.settings import ServerSettings
+from tests.gui.fakes import destroy
+
+WITHIN_S = 50.0
+
+
+@contextlib.contextmanager
+def running(
+    qt: QApplication, settings: ServerSettings, kept: QSettings, record: Record | None = None
+) -> Iterator[App]:
+    """The window of these robots, shown."""
+    with App(qt, settings, kept, FOLLOWING, record) as app:
+        app.window.show()
+        yield app
+        app.window.hide()
+    destroy(app.window)
+
+
+def wait(so: Callable[[], bool], what: str) -> None:
+    """Until it is so, while the window draws."""
+    deadline = time.monotonic() + WITHIN_S
+    while not so():
+        assert time.monotonic() < deadline, f"never {what}"
+        QTest.qWait(10)
