@@ -54,6 +54,14 @@ def destroy(widget: QWidget) -> None:
     QApplication.sendPostedEvents(widget, QEvent.Type.DeferredDelete)
 
 
+def stop_is_whole(window: MainWindow) -> bool:
+    """Whether the STOP button lies within the window, with all of its text."""
+    stop = window.header.stop
+    corners = (stop.rect().topLeft(), stop.rect().bottomRight())
+    inside = all(window.rect().contains(stop.mapTo(window, corner)) for corner in corners)
+    return inside and stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
+
+
 class FakeCommands:
     """Notes what is asked; each answer is a future that the test settles."""
 

@@ -272,7 +272,7 @@ def test_what_speaks_against_storing_is_said_and_it_cannot_be_asked_for(
     [
         (
             RemoteError(-32006, "the state of left_knee is unknown", {"kind": "wrong_state"}),
-            WriteState.FAILED,
+            WriteState.NOT_STORED,
         ),
         (RemoteError(-32011, "NOBODY KNOWS whether it did", {"kind": "device_timeout"}), WriteState.UNKNOWN),
         (LinkLost("the link dropped"), WriteState.UNKNOWN),

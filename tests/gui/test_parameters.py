@@ -134,7 +134,7 @@ def test_a_refusal_stands_on_its_row_and_the_edit_stays(panel: ParametersPanel, 
     panel.refresh()
     assert bench.station.writing.rows == {"gait.step_length": "it holds 429"}
     assert row(panel, "gait.step_length")[NEW] == "430"
-    assert "not done: rolled back" in panel.banner.text()
+    assert "not written: rolled back" in panel.banner.text()
 
 
 def test_an_answer_that_never_came_is_not_taken_for_a_refusal(panel: ParametersPanel, bench: Bench) -> None:

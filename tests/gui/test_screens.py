@@ -15,7 +15,7 @@ from PySide6.QtGui import QImage
 from gateway.messages import ProcessUse
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, looked, resources, walking
+from tests.gui.fakes import Bench, looked, resources, stop_is_whole, walking
 from tests.gui.foreseen import predicted
 from tests.gui.test_archive import (  # noqa: F401  # fixtures
     Shown,
@@ -115,7 +115,4 @@ def test_every_tab_is_whole_on_every_screen(
             assert (full.width(), full.height()) == (width, height), name
             assert len(colours(image)) > 60, name
             assert theme.colour("window").rgb() in colours(image), name
-        stop = full.header.stop
-        assert full.rect().contains(stop.mapTo(full, stop.rect().topLeft()))
-        assert full.rect().contains(stop.mapTo(full, stop.rect().bottomRight()))
-        assert stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
+        assert stop_is_whole(full)

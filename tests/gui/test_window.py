@@ -14,7 +14,7 @@ from server_gui.core.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, described, destroy, looked, walking
+from tests.gui.fakes import Bench, described, destroy, looked, stop_is_whole, walking
 
 TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
 
@@ -98,6 +98,19 @@ def test_the_layout_is_kept_and_can_be_reset(window: MainWindow, bench: Bench, t
     again.reset_layout()
     assert not again.docks[2].isHidden()
     destroy(again)
+
+
+@pytest.mark.parametrize(("width", "height", "scale"), [(1366, 768, 1.0), (1920, 1080, 2.0)])
+def test_the_window_fits_the_screen_with_stop_whole_and_in_sight(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    """Smaller text and larger screens are in `test_screens`."""
+    bench.station.take([walking(100), looked()])
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.draw(window)
+    assert (window.width(), window.height()) == (width, height)
+    assert stop_is_whole(window)
 
 
 @pytest.mark.parametrize("look", Look)

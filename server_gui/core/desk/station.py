@@ -320,13 +320,17 @@ class Station:
             self._commands.store(component),
             self._deliver,
             self._stored,
-            lambda error: self._write_failed((), error),
+            self._store_failed,
         )
 
     def _stored(self, stored: Stored) -> None:
         self.control.renewed(LEASE_S)
         self.writing.say(WriteState.DONE, f"{stored.component}: {stored.result}")
         self.tell(NewsKind.PARAMETER, self.writing.text)
+
+    def _store_failed(self, error: Exception) -> None:
+        self.writing.not_stored(error)
+        self.tell(NewsKind.PARAMETER, f"{self.writing.state.value}: {error}")
 
     def is_stored(self, name: str) -> bool:
         """Whether the value that is held is in flash, as far as the journal shows it; else nobody knows."""

@@ -26,7 +26,8 @@ class WriteState(Enum):
     IDLE = "nothing was written"
     WRITING = "writing"
     DONE = "written and read back"
-    FAILED = "not done"
+    FAILED = "not written"
+    NOT_STORED = "not stored"
     UNKNOWN = "NOT KNOWN"  # the link or the answer was lost: it may have been written
 
 
@@ -79,13 +80,15 @@ class Writing:
 
     def failed(self, changes: tuple[Change, ...], error: Exception) -> None:
         """It was refused or rolled back, or nobody knows; what is known of a row stands on it."""
-        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
-        nothing_done = refused or isinstance(error, NotConnected)
-        self._set(WriteState.FAILED if nothing_done else WriteState.UNKNOWN, str(error))
+        self._refused(WriteState.FAILED, error)
         said = error.data.get(OUTCOMES) if isinstance(error, RemoteError) else None
         for change in changes:
             told = said.get(change.name) if isinstance(said, Mapping) else None
             self.rows[change.name] = str(told) if told is not None else str(error)
+
+    def not_stored(self, error: Exception) -> None:
+        """A device was not asked to store, or has refused, or nobody knows."""
+        self._refused(WriteState.NOT_STORED, error)
 
     def kept(self) -> None:
         """What was on trial stays."""
@@ -100,6 +103,11 @@ class Writing:
     def say(self, state: WriteState, text: str) -> None:
         """What else is to be told."""
         self._set(state, text)
+
+    def _refused(self, state: WriteState, error: Exception) -> None:
+        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
+        nothing_done = refused or isinstance(error, NotConnected)
+        self._set(state if nothing_done else WriteState.UNKNOWN, str(error))
 
     def _end_trial(self, text: str) -> None:
         self.trial = None

@@ -280,7 +280,7 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
     if problem:
         return problem, "bad"
     writing = station.writing
-    if writing.state in (WriteState.FAILED, WriteState.UNKNOWN):
+    if writing.state in (WriteState.FAILED, WriteState.NOT_STORED, WriteState.UNKNOWN):
         return f"{writing.state.value}: {writing.text}", "bad"
     if writing.state is WriteState.WRITING:
         return writing.text, "warn"
