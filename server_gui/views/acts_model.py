@@ -1,20 +1,19 @@
 """The audit's lines as a table: a line is known by its robot, entry and thing, and is never made anew."""
 
 import datetime
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
+from PySide6.QtCore import Qt
 
 from gateway.messages import Number
 from server_gui.core.desk.acts import Act
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import brief, exact
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.rows import SORT_ROLE, Index, RowsModel
 
-Index = QModelIndex | QPersistentModelIndex
-SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 TITLES: Final = ("Time", "Robot", "Who", "What", "Of", "Old", "New", "Read back", "Unit", "What came of it")
 TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, OUTCOME = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, READ_BACK)
@@ -34,46 +33,15 @@ class Line:
         return self.robot, self.act.n, self.act.thing
 
 
-class ActsModel(QAbstractTableModel):
-    """`lines` as they were taken the last time, oldest first of each robot."""
+class ActsModel(RowsModel[Line]):
+    """Each robot's lines, oldest first."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(TITLES, lambda line: line.key)
         self._theme = theme
-        self.lines: list[Line] = []
-
-    def take(self, lines: Sequence[Line]) -> None:
-        """Show these from now on."""
-        found = {line.key: line for line in lines}
-        for row in reversed(range(len(self.lines))):
-            if self.lines[row].key not in found:
-                self.beginRemoveRows(QModelIndex(), row, row)
-                del self.lines[row]
-                self.endRemoveRows()
-        for row, line in enumerate(self.lines):
-            new = found.pop(line.key)
-            if new != line:
-                self.lines[row] = new
-                self.dataChanged.emit(self.index(row, 0), self.index(row, OUTCOME))
-        if found:
-            first = len(self.lines)
-            self.beginInsertRows(QModelIndex(), first, first + len(found) - 1)
-            self.lines.extend(found.values())
-            self.endInsertRows()
-
-    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return 0 if parent.isValid() else len(self.lines)
-
-    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return len(TITLES)
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
-        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return TITLES[section]
-        return None
 
     def data(self, index: Index, role: int = 0) -> Any:
-        line, column = self.lines[index.row()], index.column()
+        line, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
                 return _TEXTS[column](line)

@@ -6,16 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QSortFilterProxyModel, Qt
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QComboBox,
     QHBoxLayout,
     QHeaderView,
     QLabel,
     QLineEdit,
     QPushButton,
-    QTableView,
     QVBoxLayout,
     QWidget,
 )
@@ -25,10 +22,11 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.news import NewsKind
 from server_gui.core.desk.station import Station
-from server_gui.views.acts_model import OUTCOME, ROBOT, SORT_ROLE, TIME, ActsModel, Index, Line
+from server_gui.views.acts_model import OUTCOME, ROBOT, TIME, ActsModel, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
+from server_gui.views.widgets.rows import Filtered, Index, RowsTable
 
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
 CSV_TITLES: Final = (
@@ -46,13 +44,12 @@ CSV_TITLES: Final = (
 )
 
 
-class Chosen(QSortFilterProxyModel):
+class Chosen(Filtered):
     """The lines of one robot and one person that have all words; none of them means any."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, model: ActsModel) -> None:
+        super().__init__(model)
         self._wanted: tuple[str, str, list[str]] = ("", "", [])
-        self.setSortRole(SORT_ROLE)
 
     def show(self, robot: str, who: str, words: str) -> None:
         wanted = robot, who, words.lower().split()
@@ -65,7 +62,7 @@ class Chosen(QSortFilterProxyModel):
         robot, who, words = self._wanted
         if not isinstance(model, ActsModel):
             return False
-        line = model.lines[row]
+        line = model.rows[row]
         if (robot and line.robot != robot) or (who and line.act.who != who):
             return False
         text = f"{line.act.thing} {line.act.what} {line.act.who} {line.act.outcome}".lower()
@@ -82,8 +79,7 @@ class Audit(QWidget):
         self._called: dict[str, Station] = {}
         self.setObjectName("page")
         self.model = ActsModel(theme)
-        self.chosen = Chosen()
-        self.chosen.setSourceModel(self.model)
+        self.chosen = Chosen(self.model)
         self.robot, self.who = _combo("Robot", EVERY_ROBOT), _combo("Who", EVERYBODY)
         self.words = QLineEdit()
         self.words.setPlaceholderText("Filter: parameter, what, outcome …")
@@ -124,7 +120,7 @@ class Audit(QWidget):
         self.model.take([line for name in self._called for line in self._lines(name)])
         self.table.setColumnHidden(ROBOT, len(self._called) < 2)
         _offer(self.robot, list(self._called))
-        _offer(self.who, sorted({line.act.who for line in self.model.lines}))
+        _offer(self.who, sorted({line.act.who for line in self.model.rows}))
         self._filter()
 
     def save_csv(self, path: Path) -> None:
@@ -133,7 +129,7 @@ class Audit(QWidget):
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(CSV_TITLES)
-            writer.writerows(_cells(self.model.lines[place.row()]) for place in places)
+            writer.writerows(_cells(self.model.rows[place.row()]) for place in places)
 
     def _export(self, path: Path) -> None:
         self._desk.news.add(NewsKind.STATE, "audit", save_whole(self.save_csv, path))
@@ -160,18 +156,8 @@ class Audit(QWidget):
     def _restyle(self) -> None:
         self.table.verticalHeader().setDefaultSectionSize(self._theme.px(20))
 
-    def _table(self) -> QTableView:
-        table = QTableView()
-        table.setModel(self.chosen)
-        table.setSortingEnabled(True)
-        table.sortByColumn(TIME, Qt.SortOrder.DescendingOrder)
-        table.setAccessibleName("What was done to the robots")
-        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        table.setTabKeyNavigation(False)
-        table.setShowGrid(False)
-        table.setAlternatingRowColors(True)
-        table.setWordWrap(False)
-        table.verticalHeader().hide()
+    def _table(self) -> RowsTable:
+        table = RowsTable(self.chosen, "What was done to the robots", TIME)
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(OUTCOME, QHeaderView.ResizeMode.Stretch)

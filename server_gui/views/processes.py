@@ -2,56 +2,27 @@
 
 from typing import Any, Final
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QSortFilterProxyModel, Qt
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
 from gateway.messages import ProcessUse
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
-Index = QModelIndex | QPersistentModelIndex
 TITLES: Final = ("Name", "PID", "CPU %", "Memory MiB")
 NAME, PID, CPU, MEMORY = range(4)
-SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 MIB: Final = 1 << 20
 
 
-class ProcessModel(QAbstractTableModel):
-    """A row a process; a look changes rows by their PID and never resets the table."""
+class ProcessModel(RowsModel[ProcessUse]):
+    """A row a process."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(TITLES, lambda process: (process.pid, process.name))
         self._theme = theme
-        self._rows: list[ProcessUse] = []
-
-    def take(self, processes: list[ProcessUse]) -> None:
-        """Show these from now on."""
-        found = {(process.pid, process.name): process for process in processes}
-        for row in reversed(range(len(self._rows))):
-            if (self._rows[row].pid, self._rows[row].name) not in found:
-                self.beginRemoveRows(QModelIndex(), row, row)
-                del self._rows[row]
-                self.endRemoveRows()
-        self._rows = [found.pop((known.pid, known.name)) for known in self._rows]
-        if self._rows:
-            self.dataChanged.emit(self.index(0, CPU), self.index(len(self._rows) - 1, MEMORY))
-        if found:
-            self.beginInsertRows(QModelIndex(), len(self._rows), len(self._rows) + len(found) - 1)
-            self._rows.extend(found.values())
-            self.endInsertRows()
-
-    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return 0 if parent.isValid() else len(self._rows)
-
-    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return len(TITLES)
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
-        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return TITLES[section]
-        return None
 
     def data(self, index: Index, role: int = 0) -> Any:
-        process, column = self._rows[index.row()], index.column()
+        process, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
                 return _text(process, column)
@@ -64,28 +35,15 @@ class ProcessModel(QAbstractTableModel):
         return None
 
 
-class ProcessTable(QTableView):
-    """Highest CPU first, until somebody clicks another column."""
+class ProcessTable(RowsTable):
+    """Highest CPU first."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
         self.processes = ProcessModel(theme)
-        self.sorted = QSortFilterProxyModel()
-        self.sorted.setSourceModel(self.processes)
-        self.sorted.setSortRole(SORT_ROLE)
-        self.sorted.setFilterKeyColumn(NAME)
-        self.sorted.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
-        self.setModel(self.sorted)
-        self.setSortingEnabled(True)
-        self.sortByColumn(CPU, Qt.SortOrder.DescendingOrder)
-        self.setAccessibleName("Processes of the robot's computer")
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.sorted = Filtered(self.processes, NAME)
+        super().__init__(self.sorted, "Processes of the robot's computer", CPU)
+        self._theme = theme
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.setTabKeyNavigation(False)
-        self.setShowGrid(False)
-        self.setAlternatingRowColors(True)
-        self.verticalHeader().hide()
         header = self.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)

@@ -4,14 +4,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, Final
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QModelIndex,
-    QPersistentModelIndex,
-    QSortFilterProxyModel,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -21,7 +14,6 @@ from PySide6.QtWidgets import (
     QPlainTextEdit,
     QPushButton,
     QSplitter,
-    QTableView,
     QVBoxLayout,
     QWidget,
 )
@@ -35,11 +27,10 @@ from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
-Index = QModelIndex | QPersistentModelIndex
 TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator", "Notes")
 NUMBERS: Final = frozenset({2, 3, 4})
-SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 EMPTY: Final = (
     "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
     "add a robot at the left, and its session appears here within seconds."
@@ -47,39 +38,15 @@ EMPTY: Final = (
 EVENTS_TOLD: Final = 200
 
 
-class SessionModel(QAbstractTableModel):
+class SessionModel(RowsModel[Session]):
     """A row a session."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(TITLES, lambda session: (session.robot, session.session))
         self._theme = theme
-        self.sessions: tuple[Session, ...] = ()
-
-    def show_sessions(self, sessions: tuple[Session, ...]) -> None:
-        """These, from now on; where they are the same ones, rows change in their place."""
-        names = [(each.robot, each.session) for each in sessions]
-        if names == [(each.robot, each.session) for each in self.sessions]:
-            self.sessions = sessions
-            if sessions:
-                self.dataChanged.emit(self.index(0, 0), self.index(len(sessions) - 1, len(TITLES) - 1))
-            return
-        self.beginResetModel()
-        self.sessions = sessions
-        self.endResetModel()
-
-    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return 0 if parent.isValid() else len(self.sessions)
-
-    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return len(TITLES)
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
-        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return TITLES[section]
-        return None
 
     def data(self, index: Index, role: int = 0) -> Any:
-        session, column = self.sessions[index.row()], index.column()
+        session, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
                 return _cells(session)[column]
@@ -147,7 +114,7 @@ class SessionsPage(QWidget):
         library.look()
         if library.revision != self._revision:
             self._revision = library.revision
-            self.sessions.show_sessions(library.found.sessions)
+            self.sessions.take(library.found.sessions)
         set_text(self.said, self._state())
         self.said.setVisible(bool(self.said.text()))
         count = len(library.found.sessions)
@@ -160,7 +127,7 @@ class SessionsPage(QWidget):
     def chosen(self) -> Session | None:
         """The session that is chosen in the table."""
         rows = self.table.selectionModel().selectedRows()
-        return self.sessions.sessions[self._filter.mapToSource(rows[0]).row()] if rows else None
+        return self.sessions.rows[self._filter.mapToSource(rows[0]).row()] if rows else None
 
     def _state(self) -> str:
         library = self._archive.library
@@ -179,24 +146,10 @@ class SessionsPage(QWidget):
 
     # --- how it is put together
 
-    def _table(self) -> QTableView:
-        self._filter = QSortFilterProxyModel()
-        self._filter.setSourceModel(self.sessions)
-        self._filter.setSortRole(SORT_ROLE)
-        self._filter.setFilterKeyColumn(-1)
-        self._filter.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
-        table = QTableView()
-        table.setModel(self._filter)
-        table.setSortingEnabled(True)
-        table.sortByColumn(0, Qt.SortOrder.DescendingOrder)
-        table.setAccessibleName("Recordings")
-        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    def _table(self) -> RowsTable:
+        self._filter = Filtered(self.sessions)
+        table = RowsTable(self._filter, "Recordings", 0)
         table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        table.setTabKeyNavigation(False)
-        table.setShowGrid(False)
-        table.setAlternatingRowColors(True)
-        table.setWordWrap(False)
-        table.verticalHeader().hide()
         table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         table.horizontalHeader().setStretchLastSection(True)
         table.selectionModel().selectionChanged.connect(lambda *_: self._archive.choose(self.chosen))
