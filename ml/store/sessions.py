@@ -1,6 +1,6 @@
 """Recorded sessions: what is known of each, what happened in it, and its telemetry in time's order."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final
@@ -21,8 +21,13 @@ ROWS_AT_ONCE: Final = 100_000  # of telemetry, about
 SHORTEST: Final = timedelta(seconds=1)  # that is read at once
 KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
 _ORDER: Final = [(name, "ascending") for name in ("utc", "connection", "stream", "seq", "row")]
+_NAMING: Final = pa.schema(
+    [TELEMETRY.schema.field(name) for name in (*(name for name, _ in _ORDER), "stamp_ns")]
+)
 _UNKNOWN: Final = datetime(1970, 1, 1, tzinfo=UTC)  # when it began
 _AT_ONCE: Final = 8  # footers that are read at a time
+
+Source = Callable[[datetime, datetime], pyarrow.dataset.Dataset]  # what may have rows of such a time
 
 
 class NoSuchSession(StoreError):
@@ -66,16 +71,24 @@ class Channel(msgspec.Struct, frozen=True):
     samples: int
 
 
-def sessions(store: Store, robot: str | None = None) -> list[Session]:
-    """Every session, oldest first; of one robot where it is named."""
+def sessions(
+    store: Store, robot: str | None = None, waiting: Iterable[Mapping[str, Any]] = ()
+) -> list[Session]:
+    """Every session, oldest first; of one robot where it is named. `waiting`: rows that are not there yet."""
     extents: dict[tuple[str, str], list[DataFile]] = {}
     for file in reading.files(store, TELEMETRY, robot):
         extents.setdefault((file.robot or "", file.session or ""), []).append(file)
+    stored = _rows(store, SESSIONS, robot)
+    uploaded = {_name(fields) for fields in stored}
     found = [
-        made(fields, Extent(extents.get((fields["robot"], fields["session"]), ())))
-        for fields in newest(_rows(store, SESSIONS, robot))
+        made(fields, Extent(extents.get(_name(fields), ())), _name(fields) in uploaded)
+        for fields in newest([*stored, *waiting])
     ]
     return in_order(found)
+
+
+def _name(fields: Mapping[str, Any]) -> tuple[str, str]:
+    return fields["robot"], fields["session"]
 
 
 def in_order(found: Iterable[Session]) -> list[Session]:
@@ -105,13 +118,18 @@ def among(known: Sequence[Session], name: str, where: str) -> Session:
     return found[0]
 
 
-def newest(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+def newest(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Of the rows of each session the one that holds: the newest."""
     by_time = sorted(rows, key=lambda row: (row["utc"], row.get("batch") or 0, row.get("number") or 0))
-    return list({(row["robot"], row["session"]): row for row in by_time}.values())
+    return list({_name(row): row for row in by_time}.values())
 
 
-def made(fields: dict[str, Any], extent: Extent, uploaded: bool = True) -> Session:
+def unstored(rows: Iterable[Mapping[str, Any]]) -> list[Session]:
+    """Those that are told of in rows which are in no store; their telemetry is not counted."""
+    return [made(row, Extent(()), uploaded=False) for row in newest(rows)]
+
+
+def made(fields: Mapping[str, Any], extent: Extent, uploaded: bool = True) -> Session:
     """A session from its row in the table, and its telemetry's extent."""
     known = {name: value for name, value in fields.items() if value is not None}
     tables = {
@@ -174,20 +192,44 @@ def telemetry(
 
     The columns are `utc`, `stamp_ns` and these channels; rows in which all of them are null are left out.
     """
+    if session.rows and names:
+        with translated(f"the telemetry of {session.session} in {store.url} cannot be read"):
+            yield from merged([stored(store, session)], session, names, begin, end)
+
+
+def stored(store: Store, session: Session) -> Source:
+    """The session's telemetry in the store, for `merged`."""
+    rows = _of_session(store, session)
+    return lambda _begin, _end: rows
+
+
+def merged(
+    sources: Sequence[Source],
+    session: Session,
+    names: Sequence[str],
+    begin: datetime | None = None,
+    end: datetime | None = None,
+) -> Iterator[pa.Table]:
+    """As `telemetry`, from several places with no row in common; the session's extent is that of all."""
     if session.first is None or session.last is None or not session.rows or not names:
         return
     begin = max(begin or session.first, session.first)
     end = min(end or session.last, session.last)
     step = max(session.length * ROWS_AT_ONCE / session.rows, SHORTEST)
-    with translated(f"the telemetry of {session.session} in {store.url} cannot be read"):
-        rows = _of_session(store, session)
-        while begin < end:
-            found = rows.to_table(
-                columns=[name for name, _ in _ORDER] + ["stamp_ns", *names],
-                filter=_between(begin, min(begin + step, end)) & _any(names),
-            )
-            yield found.sort_by(_ORDER).select([*KEYS, *names])
-            begin += step
+    nothing = pa.schema([*_NAMING, *(pa.field(name, pa.float64()) for name in names)]).empty_table()
+    while begin < end:
+        until = min(begin + step, end)
+        found = [_part(source(begin, until), names, _between(begin, until)) for source in sources]
+        rows = pa.concat_tables([nothing, *found], promote_options="default")
+        yield rows.sort_by(_ORDER).select([*KEYS, *names])
+        begin = until
+
+
+def _part(rows: pyarrow.dataset.Dataset, names: Sequence[str], when: pyarrow.dataset.Expression) -> pa.Table:
+    known = [name for name in names if name in rows.schema.names]
+    if not known:
+        return _NAMING.empty_table()
+    return rows.to_table(columns=[*_NAMING.names, *known], filter=when & _any(known))
 
 
 def _of_session(store: Store, session: Session) -> pyarrow.dataset.Dataset:

@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from gateway.cli.text import warn
 from ml.store import StoreError
 from ml.store.sessions import Session
 from ml.store.store import Store
+from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.settings import load
 
 Advance = Callable[[int], object]
@@ -54,6 +56,14 @@ def spool(arguments: argparse.Namespace) -> Path:
     return load(arguments.config).recorder.spool
 
 
+def recordings(command: str, arguments: argparse.Namespace) -> Recordings:
+    """What is in the store and in this computer's spool; says so where the store cannot be reached."""
+    found = Recordings(url(arguments), spool(arguments))
+    if found.problem is not None:
+        warn(command, f"{found.problem}; here is what this computer's spool has")
+    return found
+
+
 def instant(text: str) -> datetime:
     """A date or time as ISO 8601 writes it; UTC where it does not say otherwise."""
     try:
@@ -78,9 +88,7 @@ def absolute(session: Session, time: datetime | float | None) -> datetime | None
     if not isinstance(time, float):
         return time
     if session.first is None:
-        raise StoreError(
-            f"the session {session.session} has no telemetry in the store: there is nothing to count from"
-        )
+        raise StoreError(f"the session {session.session} has no telemetry: there is nothing to count from")
     return session.first + timedelta(seconds=time)
 
 

@@ -13,9 +13,7 @@ import pyarrow as pa
 
 from gateway.cli.reach import choose as choose_command
 from gateway.cli.text import NONE, say, say_json, size, table, warn
-from ml.store import sessions
 from ml.store.sessions import Channel, Session
-from ml.store.store import Store
 from server_gui.commands.cloud_reach import (
     Advance,
     absolute,
@@ -24,15 +22,14 @@ from server_gui.commands.cloud_reach import (
     instant_or_seconds,
     parser,
     progress,
-    reach,
-    spool,
+    recordings,
     when,
 )
 from server_gui.commands.sessions_gait import gait
 from server_gui.commands.sessions_use import compare, resources
-from server_gui.core.cloud import spooled
 from server_gui.core.cloud.chosen import Choice, choose
 from server_gui.core.cloud.mcap import write_mcap
+from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 
 FORMATS: Final = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
@@ -59,13 +56,13 @@ def ls(argv: list[str]) -> int:
     _add_times(made, instant, "as ISO 8601 writes it, UTC")
     add_url(made)
     arguments = made.parse_args(argv)
-    known = spooled.all_sessions(spool(arguments), lambda: reach(arguments))
-    found = [session for session in known if _wanted(session, arguments)]
+    known = recordings("sessions", arguments)
+    found = [session for session in known.sessions() if _wanted(session, arguments)]
     if arguments.json:
         say_json([_fields(session) for session in found])
     else:
         say(table(HEADER, map(_row, found), right=(3, 4, 5)))
-    return 0
+    return 0 if known.problem is None else 1
 
 
 def _wanted(session: Session, arguments: argparse.Namespace) -> bool:
@@ -115,28 +112,28 @@ def show(argv: list[str]) -> int:
     made = parser("sessions show", "What is known of a session, its channels, and what happened in it.")
     _add_session(made)
     arguments = made.parse_args(argv)
-    store = reach(arguments)
-    session = sessions.find(store, arguments.session)
-    channels = sessions.channels(store, session)
-    events, labels = sessions.happenings(store, session), sessions.labels(store, session)
+    known = recordings("sessions", arguments)
+    recorded = known.open(known.find(arguments.session))
+    events, labels = known.happenings(recorded.session), known.labels(recorded.session)
     if arguments.json:
-        more = {"channels": channels, "events": list(map(_bare, events)), "labels": list(map(_bare, labels))}
-        say_json(_fields(session) | more)
+        more = {"waiting": recorded.waiting, "channels": recorded.channels}
+        happened = {"events": list(map(_bare, events)), "labels": list(map(_bare, labels))}
+        say_json(_fields(recorded.session) | more | happened)
     else:
-        say("\n".join(_told(session, channels, events, labels)))
+        say("\n".join(_told(recorded, events, labels)))
     return 0
 
 
-def _told(
-    session: Session, channels: list[Channel], events: list[dict[str, Any]], labels: list[dict[str, Any]]
-) -> Iterator[str]:
+def _told(recorded: Recorded, events: list[dict[str, Any]], labels: list[dict[str, Any]]) -> Iterator[str]:
+    session = recorded.session
     facts = {
         "robot": session.robot,
         "began": f"{when(session.began)} UTC",
         "ended": f"{when(session.ended)} UTC"
         if session.ended
         else "not: it goes on, or its server was killed",
-        "telemetry": f"{_length(session)}, {session.rows} rows, {size(session.size_bytes)}",
+        "telemetry": f"{_length(session)}, {session.rows} rows, {size(session.size_bytes)} in the store",
+        "not uploaded": f"{recorded.waiting} of these rows" if recorded.waiting else "",
         "operator": session.operator,
         "notes": session.notes,
         "configuration": session.configuration_hash,
@@ -148,7 +145,7 @@ def _told(
     yield f"session {session.session}"
     yield from (f"  {name:<14} {value}" for name, value in facts.items() if value)
     yield ""
-    yield table(("CHANNEL", "UNIT", "SAMPLES"), [_channel(each) for each in channels], right=(2,))
+    yield table(("CHANNEL", "UNIT", "SAMPLES"), [_channel(each) for each in recorded.channels], right=(2,))
     if events:
         yield table(
             ("EVENT", "AT (UTC)", ""), [(row["kind"], when(row["utc"]), row["text"]) for row in events]
@@ -203,8 +200,7 @@ def export(argv: list[str]) -> int:
     kind = arguments.format or arguments.out.suffix.removeprefix(".")
     if kind not in FORMATS:
         made.error(f"--format is needed: {arguments.out.name} does not end with .{', .'.join(FORMATS)}")
-    store = reach(arguments)
-    count = _export(store, sessions.find(store, arguments.session), kind, arguments)
+    count = _export(recordings("sessions", arguments), kind, arguments)
     if arguments.json:
         say_json({"file": str(arguments.out), "format": kind, "count": count})
     else:
@@ -212,11 +208,13 @@ def export(argv: list[str]) -> int:
     return 0
 
 
-def _export(store: Store, session: Session, kind: str, arguments: argparse.Namespace) -> int:
+def _export(known: Recordings, kind: str, arguments: argparse.Namespace) -> int:
+    recorded = known.open(known.find(arguments.session))
+    session = recorded.session
     choice = Choice(
         arguments.channels or ("*",), absolute(session, arguments.begin), absolute(session, arguments.end)
     )
-    chosen = choose(store, session, choice)
+    chosen = choose(known, recorded, choice)
     with progress("rows", session.rows) as advance:
         return FORMATS[kind](
             arguments.out, dataclasses.replace(chosen, tables=_counted(chosen.tables, advance))

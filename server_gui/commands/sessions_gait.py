@@ -7,8 +7,14 @@ import numpy as np
 import pyarrow as pa
 
 from gateway.cli.text import NONE, say, say_json, table
-from ml.store import sessions
-from server_gui.commands.cloud_reach import absolute, add_url, instant_or_seconds, parser, progress, reach
+from server_gui.commands.cloud_reach import (
+    absolute,
+    add_url,
+    instant_or_seconds,
+    parser,
+    progress,
+    recordings,
+)
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import LegGait
 from server_gui.core.processing.recording import RecordedGait, summarise
@@ -33,13 +39,14 @@ def gait(argv: list[str]) -> int:
     made.add_argument("--to", dest="end", type=instant_or_seconds, metavar="TIME", help=meaning)
     add_url(made)
     arguments = made.parse_args(argv)
-    store = reach(arguments)
-    session = sessions.find(store, arguments.session)
-    names = sorted(Wiring.of([each.name for each in sessions.channels(store, session)]).channels)
+    known = recordings("sessions", arguments)
+    recorded = known.open(known.find(arguments.session))
+    session = recorded.session
+    names = sorted(Wiring.of([each.name for each in recorded.channels]).channels)
     begin, end = absolute(session, arguments.begin), absolute(session, arguments.end)
     parts: list[pa.Table] = []
     with progress("rows", session.rows) as advance:
-        for part in sessions.telemetry(store, session, names, begin, end):
+        for part in recorded.telemetry(names, begin, end):
             parts.append(part)
             advance(part.num_rows)
     found = _summary(parts, names)

@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 
 from gateway.cli.text import NONE, say, say_json, size, table
-from ml.store import sessions
 from ml.store.sessions import Session
-from ml.store.store import Store
 from ml.store.tables import RESOURCES
-from server_gui.commands.cloud_reach import add_url, parser, reach
+from server_gui.commands.cloud_reach import add_url, parser, recordings
+from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.processing.recorded_use import Looks, ProgramUse, looks, used
 from server_gui.core.processing.regression import Regression, SessionUse, regressions
 
@@ -30,8 +29,8 @@ def resources(argv: list[str]) -> int:
     made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
     add_url(made)
     arguments = made.parse_args(argv)
-    store = reach(arguments)
-    found = used(_looks(store, sessions.find(store, arguments.session)))
+    known = recordings("sessions", arguments)
+    found = used(_looks(known, known.find(arguments.session)))
     if arguments.json:
         say_json(found)
     else:
@@ -48,8 +47,8 @@ def compare(argv: list[str]) -> int:
     made.add_argument("after", metavar="AFTER[,…]", help="likewise, of another version")
     add_url(made)
     arguments = made.parse_args(argv)
-    store = reach(arguments)
-    sides = [[_use(store, name) for name in side.split(",")] for side in (arguments.before, arguments.after)]
+    known = recordings("sessions", arguments)
+    sides = [[_use(known, name) for name in side.split(",")] for side in (arguments.before, arguments.after)]
     found = regressions(*sides)
     if arguments.json:
         say_json(found)
@@ -58,9 +57,9 @@ def compare(argv: list[str]) -> int:
     return 1 if found else 0
 
 
-def _use(store: Store, name: str) -> SessionUse:
-    session = sessions.find(store, name)
-    return SessionUse.of(_version(session), _looks(store, session))
+def _use(known: Recordings, name: str) -> SessionUse:
+    session = known.find(name)
+    return SessionUse.of(_version(session), _looks(known, session))
 
 
 def _version(session: Session) -> str:
@@ -69,8 +68,8 @@ def _version(session: Session) -> str:
     return f"gateway {known}" if known else session.session
 
 
-def _looks(store: Store, session: Session) -> Looks:
-    return looks(sessions.happenings(store, session, RESOURCES))
+def _looks(known: Recordings, session: Session) -> Looks:
+    return looks(known.happenings(session, RESOURCES))
 
 
 def _told(sides: list[list[SessionUse]], found: list[Regression]) -> Iterator[str]:

@@ -13,12 +13,10 @@ from typing import Final
 
 import msgspec
 
-import ml.store.sessions
-from ml.store import NoSuchTable, Store, StoreError
-from ml.store.labels import ACTIVITIES, INSTANTS, Label, Source, holding, utc_ns
-from ml.store.sessions import Session, among
-from ml.store.tables import LABELS
-from server_gui.core.cloud import spooled
+from ml.store import StoreError
+from ml.store.labels import ACTIVITIES, INSTANTS, Label, Source, utc_ns
+from ml.store.sessions import Session
+from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.fleet.collector import connect
 from server_gui.core.fleet.door import NobodyCollects, ask
 from server_gui.core.recording import records
@@ -62,18 +60,11 @@ class Labelling:
 
     def session(self, name: str, robot: str | None = None) -> Session:
         """The session whose name is this, or alone begins so, uploaded or not; raises `NoSuchSession`."""
-        known = spooled.all_sessions(self._spool, self._stored)
-        return among([each for each in known if robot in (None, each.robot)], name, self._settings.store.url)
+        return self._recordings().find(name, robot)
 
     def ls(self, session: Session) -> list[Label]:
         """The labels of a session that hold, in time's order."""
-        waiting = spooled.rows(self._spool, LABELS)  # first: what is uploaded meanwhile is in both
-        mine = [row for row in waiting if (row["robot"], row["session"]) == (session.robot, session.session)]
-        try:
-            stored = ml.store.sessions.happenings(self._stored(), session, LABELS)
-        except NoSuchTable:
-            stored = []
-        return list(map(Label.of, holding([*stored, *mine])))
+        return list(map(Label.of, self._recordings().labels(session)))
 
     def add(
         self,
@@ -147,8 +138,11 @@ class Labelling:
                 return Where.SPOOL, str(error)
         return Where.STORE, ""
 
-    def _stored(self) -> Store:
-        return Store.existing(self._settings.store.url)
+    def _recordings(self) -> Recordings:
+        found = Recordings(self._settings.store.url, self._spool)
+        if found.problem is not None:  # what is said already must be known
+            raise found.problem
+        return found
 
 
 def check(new: Sequence[Label], known: Iterable[Label], session: Session) -> None:

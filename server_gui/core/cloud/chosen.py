@@ -8,10 +8,9 @@ from typing import Any
 
 import pyarrow as pa
 
-from ml.store import sessions
 from ml.store.errors import StoreError
 from ml.store.sessions import Channel, Session
-from ml.store.store import Store
+from server_gui.core.cloud.recordings import Recorded, Recordings
 
 Row = Mapping[str, Any]
 
@@ -49,22 +48,23 @@ class Recording:
     labels: Sequence[Row]
 
 
-def choose(store: Store, session: Session, choice: Choice) -> Recording:
-    """What is wanted of the session; telemetry is read while `tables` is.
+def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Recording:
+    """What is wanted of a session that was opened among these; telemetry is read while `tables` is.
 
     Raises:
         StoreError: there is nothing of it, or the store cannot be read.
+        SpoolUnusable: the spool cannot be read.
 
     """
-    known = sessions.channels(store, session)
-    if not known:
-        raise StoreError(f"the session {session.session} has no telemetry in {store.url}")
-    channels = choice.of(known)
+    session = recorded.session
+    if not recorded.channels:
+        raise StoreError(f"the session {session.session} of {session.robot} has no telemetry")
+    channels = choice.of(recorded.channels)
     names = [each.name for each in channels]
     return Recording(
         session,
         channels,
-        sessions.telemetry(store, session, names, choice.begin, choice.end),
-        list(filter(choice.holds, sessions.happenings(store, session))),
-        list(filter(choice.holds, sessions.labels(store, session))),
+        recorded.telemetry(names, choice.begin, choice.end),
+        list(filter(choice.holds, recordings.happenings(session))),
+        list(filter(choice.holds, recordings.labels(session))),
     )

@@ -1,26 +1,22 @@
 """A spool, looked into without disturbing who records into it."""
 
 import contextlib
+import itertools
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
-import ml.store.sessions
-from ml.store import NoSuchTable, Store, Table
-from ml.store.fragments import Extent
-from ml.store.sessions import Session, in_order, made, newest
+from ml.store import Table
+from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
-from ml.store.tables import UTC as UTC_TIME
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
 
-_WAITING: Final = "????????.db"
-_UPLOADED: Final = "????????.uploaded.db"
+_NUMBER: Final = "[0-9]" * 8
 _decoder = msgspec.msgpack.Decoder(Record)
 _layout_decoder = msgspec.msgpack.Decoder(Layout)
 
@@ -35,84 +31,81 @@ class Batch:
     tables: frozenset[str]
 
 
+def waiting(spool: Path) -> list[int]:
+    """The batches that wait for upload, and the one that is being recorded; oldest first."""
+    return sorted(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.db"))
+
+
+def kept(spool: Path) -> list[int]:
+    """These, and those that are still here after they were uploaded; oldest first."""
+    return sorted({*waiting(spool), *(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.uploaded.db"))})
+
+
 def sessions(spool: Path) -> list[Session]:
     """Those that are told of in what waits for upload; their telemetry is not counted."""
-    return [made(row, Extent(()), uploaded=False) for row in newest(rows(spool, SESSIONS))]
+    return unstored(rows(spool, SESSIONS))
 
 
-def all_sessions(spool: Path, store: Callable[[], Store]) -> list[Session]:
-    """The store's sessions, and those that this computer's spool alone has, oldest first.
-
-    Raises:
-        StoreError: the store cannot be read; or there is none, and nothing in the spool either.
-
-    """
-    waiting = {(each.robot, each.session): each for each in sessions(spool)}
-    try:
-        stored = ml.store.sessions.sessions(store())
-    except NoSuchTable:
-        if not waiting:
-            raise
-        stored = []
-    for each in stored:
-        waiting.pop((each.robot, each.session), None)
-    return in_order([*stored, *waiting.values()])
-
-
-def rows(spool: Path, table: Table) -> list[dict[str, Any]]:
-    """A table's rows in what waits for upload, their times as the store has them."""
-    times = [column.name for column in table.schema if column.type == UTC_TIME]
-    return [
-        record.fields | {name: _time(record.fields.get(name)) for name in times}
-        for segment in sorted(spool.glob(_WAITING))
-        for record in _records(segment)
+def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> list[dict[str, Any]]:
+    """A table's rows in these batches, or in all that wait, as the store has them."""
+    name = identity(spool)
+    found = [
+        record.fields | {"spool": name, "batch": batch, "number": number}
+        for batch in (waiting(spool) if batches is None else batches)
+        for number, record in enumerate(_records(spool, batch))
         if record.table == table.name
     ]
+    made: list[dict[str, Any]] = table.rows(found).to_pylist()
+    return made
 
 
-def runs(spool: Path, session: Session) -> Iterator[Run]:
-    """A session's telemetry in what waits for upload, with what is being recorded; in no order."""
+def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
+    """A session's telemetry in this batch, a run a stream and layout."""
     sql = (
         "SELECT connection, stream, description, data FROM run JOIN layout ON layout = layout.id "
-        "WHERE run.robot = ? AND session = ?"
+        "WHERE run.robot = ? AND session = ? ORDER BY connection, stream, layout, seq, row"
     )
-    for segment in sorted(spool.glob(_WAITING)):
-        for connection, stream, description, data in _read(segment, sql, session.robot, session.session):
-            layout = _layout_decoder.decode(description)
-            yield unpack(session.robot, session.session, connection, stream, layout, data)
+    found = _read(spool, batch, sql, session.robot, session.session)
+    for (connection, stream, description), alike in itertools.groupby(found, lambda line: line[:3]):
+        layout, data = _layout_decoder.decode(description), b"".join(line[3] for line in alike)
+        yield unpack(session.robot, session.session, connection, stream, layout, data)
+
+
+def identity(spool: Path) -> str:
+    """What the spool is called at the store; nothing where there is none."""
+    file = spool / "id"
+    return file.read_text().strip() if file.exists() else ""
 
 
 def uploaded(spool: Path) -> Iterator[Batch]:
     """Every batch that is kept as a second copy, oldest first."""
-    for segment in sorted(spool.glob(_UPLOADED)):
-        robots = frozenset(robot for (robot,) in _read(segment, "SELECT DISTINCT robot FROM run"))
-        tables = frozenset(record.table for record in _records(segment))
-        yield Batch((spool / "id").read_text().strip(), int(segment.name[:8]), robots, tables)
+    for number in sorted(set(kept(spool)) - set(waiting(spool))):
+        robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))
+        tables = frozenset(record.table for record in _records(spool, number))
+        yield Batch(identity(spool), number, robots, tables)
 
 
-def _records(segment: Path) -> list[Record]:
-    found = _read(segment, "SELECT content FROM record ORDER BY number")
+def _records(spool: Path, batch: int) -> list[Record]:
+    found = _read(spool, batch, "SELECT content FROM record ORDER BY number")
     return [_decoder.decode(content) for (content,) in found]
 
 
-def _read(segment: Path, sql: str, *values: str) -> list[tuple[Any, ...]]:
-    """Nothing where the file has gone, or holds nothing yet: who records may just be making or removing it.
+def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ...]]:
+    """Nothing where the batch holds nothing yet: who records may just be making it.
 
     Raises:
-        SpoolUnusable: it is there and cannot be read.
+        SpoolUnusable: it cannot be read; or it went to the store, and was removed to make room.
 
     """
-    try:
-        with contextlib.closing(sqlite3.connect(f"{segment.as_uri()}?mode=ro", uri=True)) as database:
-            return database.execute(sql, values).fetchall()
-    except sqlite3.Error as error:
-        if segment.exists() and "no such table" not in str(error):
-            raise SpoolUnusable(f"the spool's file {segment} cannot be read: {error}") from error
-        return []
-
-
-def _time(utc_ns: int | None) -> datetime | None:
-    """To the microsecond, as the store keeps it."""
-    return (
-        None if utc_ns is None else datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=utc_ns // 1000)
-    )
+    for file in (spool / f"{batch:08}.db", spool / f"{batch:08}.uploaded.db"):
+        try:
+            with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True)) as database:
+                return database.execute(sql, values).fetchall()
+        except sqlite3.Error as error:
+            if "no such table" in str(error):
+                return []
+            if file.exists():
+                raise SpoolUnusable(
+                    f"the spool's file {file} cannot be read: {error}; move it away to go on without its rows"
+                ) from error
+    raise SpoolUnusable(f"batch {batch} of the spool {spool} has just gone to the store; ask again")

@@ -83,8 +83,10 @@ class Tape:
 
         """
         spool = settings.recorder.spool
-        waiting = Rows.joined(_newest(map(_rows_of, spooled.runs(spool, session))))
-        events: list[Mapping[str, Any]] = list(_of(session, spooled.rows(spool, EVENTS)))
+        batches = spooled.waiting(spool)
+        runs = (run for batch in batches for run in spooled.runs(spool, session, batch))
+        waiting = Rows.joined(_newest(map(_rows_of, runs)))
+        events: list[Mapping[str, Any]] = list(_of(session, spooled.rows(spool, EVENTS, batches)))
         stored: dict[str, str | None] = {}
         if session.uploaded and session.rows:
             store = Store.existing(settings.store.url)

@@ -8,12 +8,13 @@ from typing import Final
 import pyarrow as pa
 
 from gateway.cli.text import size
-from ml.store import Store, StoreError, sessions
+from ml.store import Store, StoreError
 from ml.store.sessions import Session
-from server_gui.core.cloud import parts, spooled, transfer, verify
+from server_gui.core.cloud import parts, transfer, verify
 from server_gui.core.cloud.chosen import Choice, Recording, choose
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
+from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 from server_gui.core.fleet.collector import connect
 from server_gui.core.recording.spool import Spool
@@ -29,21 +30,16 @@ PROBLEMS_TOLD: Final = 3
 
 
 def export(settings: ServerSettings, session: Session, choice: Choice, kind: str, file: Path) -> Work:
-    """What the store has of a session, or a part of it, as one of `FORMATS`; there whole or not at all."""
+    """A session, or a part of it, as one of `FORMATS`; there whole or not at all."""
 
     def work(job: Job) -> str:
-        waiting = sum(map(len, spooled.runs(settings.recorder.spool, session)))
-        if not session.uploaded:
-            raise StoreError(
-                f"{session.session} waits for upload: bring it into the store first, with Upload now"
-            )
-        opened = Store.existing(settings.store.url)
-        known = sessions.find(opened, session.session, session.robot)
-        job.expect(known.rows, "rows")
-        chosen = choose(opened, known, choice)
+        known = Recordings(settings.store.url, settings.recorder.spool)
+        recorded = known.open(known.find(session.session, session.robot))
+        job.expect(recorded.session.rows, "rows")
+        chosen = choose(known, recorded, choice)
         counted = dataclasses.replace(chosen, tables=_counted(chosen.tables, job))
         count = FORMATS[kind](file, counted)
-        more = f"; {waiting} newer rows wait for upload and are not in it" if waiting else ""
+        more = f"; of this computer's spool alone: {known.problem}" if known.problem else ""
         return f"{file}: {count} {'messages' if kind == 'mcap' else 'rows'}{more}"
 
     return work

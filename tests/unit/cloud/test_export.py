@@ -16,12 +16,14 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from ml.store import StoreError
-from ml.store.sessions import Channel, Session, find
+from ml.store.sessions import Channel, Session
 from server_gui.core.cloud import ros
 from server_gui.core.cloud.chosen import Choice, Recording, choose
 from server_gui.core.cloud.mcap import write_mcap
+from server_gui.core.cloud.recordings import Recorded as Opened
+from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.tabular import write_csv, write_parquet
-from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, record
+from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, Recorded, record
 from tests.unit.recording.robots import value
 
 WRITERS = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
@@ -30,7 +32,12 @@ BEGAN = datetime(2026, 11, 21, 15, 30, tzinfo=UTC)
 
 def chosen(url: str, spool: Path, choice: Choice | None = None) -> Recording:
     recorded = record(url, spool)
-    return choose(recorded.store, find(recorded.store, recorded.session), choice or Choice())
+    return choose(*opened(recorded), choice or Choice())
+
+
+def opened(recorded: Recorded) -> tuple[Recordings, Opened]:
+    known = Recordings(recorded.store.url, recorded.spool)
+    return known, known.open(known.find(recorded.session))
 
 
 def test_csv_has_units_in_its_header_and_every_row(store_url: str, tmp_path: Path) -> None:
@@ -174,13 +181,14 @@ def test_a_choice_takes_channels_by_glob_and_refuses_one_that_means_none(
     folder_url: str, tmp_path: Path
 ) -> None:
     recorded = record(folder_url, tmp_path / "spool")
-    session = find(recorded.store, recorded.session)
-    some = choose(recorded.store, session, Choice(("*.position", "trunk.tilt_forward")))
+    known, whole = opened(recorded)
+    session = whole.session
+    some = choose(known, whole, Choice(("*.position", "trunk.tilt_forward")))
     assert [each.name for each in some.channels] == ["left_knee.position", "trunk.tilt_forward"]
     with pytest.raises(StoreError, match="no channel 'right_"):
-        choose(recorded.store, session, Choice(("right_*",)))
+        choose(known, whole, Choice(("right_*",)))
     assert session.last is not None
-    late = choose(recorded.store, session, Choice(begin=session.last + timedelta(hours=1)))
+    late = choose(known, whole, Choice(begin=session.last + timedelta(hours=1)))
     assert (sum(table.num_rows for table in late.tables), late.events, late.labels) == (0, [], [])
 
 

@@ -1,0 +1,210 @@
+"""Every recording, wherever it is: in the store, in this computer's spool, or half in each; every row once.
+
+A batch of the spool is in a table of the store if that says so itself, and is read in the spool if not. The
+spool is listed before a table is looked at, and each table is looked at once: what is uploaded meanwhile is
+neither missed nor found twice.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset
+
+from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
+from ml.store.errors import translated
+from ml.store.labels import holding
+from ml.store.sessions import Channel, NoSuchSession, Session, Source
+from ml.store.snapshot import Snapshot
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
+from server_gui.core.cloud import spooled
+from server_gui.core.recording.columns import OWN, Columns
+
+_US: Final = timedelta(microseconds=1)
+Row = dict[str, Any]
+
+
+class Recordings:
+    """What there was of them when this was made; for one thread.
+
+    Where the store cannot be reached, `problem` says why, and the recordings are those of which this
+    computer's spool has something, also what it keeps of uploaded batches.
+
+    Raises:
+        StoreError: there is no store, or it cannot be reached, and nothing in the spool either.
+        SpoolUnusable: the spool cannot be read.
+
+    """
+
+    def __init__(self, url: str, spool: Path) -> None:
+        self.problem: StoreError | None = None
+        self._url = url
+        self._spool = spool
+        self._batches = spooled.waiting(spool)
+        self._name = spooled.identity(spool)
+        self._store: Snapshot | None = None
+        self._reach()
+
+    def _reach(self) -> None:
+        try:
+            self._store = Snapshot.existing(self._url)
+        except NoSuchTable:
+            if not self._waiting(SESSIONS):
+                raise
+        except (StoreRefused, StoreUnreachable) as error:
+            self._batches = spooled.kept(self._spool)
+            if not self._waiting(SESSIONS):
+                raise
+            self.problem = error
+
+    def sessions(self) -> list[Session]:
+        """Every session, oldest first; rows that wait for upload are not counted."""
+        told = self._waiting(SESSIONS)
+        if self._store is None:
+            return sessions.in_order(sessions.unstored(told))
+        return sessions.sessions(self._store, waiting=told)
+
+    def find(self, name: str, robot: str | None = None) -> Session:
+        """The session whose name is this, or alone begins so.
+
+        Raises:
+            NoSuchSession: none, or several do.
+            StoreError: the store, which may have it, cannot be reached.
+
+        """
+        known = [each for each in self.sessions() if robot in (None, each.robot)]
+        try:
+            return sessions.among(known, name, self._url)
+        except NoSuchSession as error:
+            raise (self.problem or error) from None
+
+    def happenings(self, session: Session, table: Table = EVENTS) -> list[Row]:
+        """The session's rows of this table, in time's order."""
+        stored = [] if self._store is None else sessions.happenings(self._store, session, table)
+        mine = (session.robot, session.session)
+        told = [row for row in self._waiting(table) if (row["robot"], row["session"]) == mine]
+        return sorted([*stored, *told], key=lambda row: row["utc"])
+
+    def labels(self, session: Session) -> list[Row]:
+        """What somebody says that robot and wearer did, as far as it has not been taken back."""
+        return holding(self.happenings(session, LABELS))
+
+    def open(self, session: Session) -> "Recorded":
+        """Look into its telemetry."""
+        waiting = _Waiting(self._spool, self._missing(self._location(session)), session, self._units(session))
+        known = [] if self._store is None else sessions.channels(self._store, session)
+        sources = [] if self._store is None else [sessions.stored(self._store, session)]
+        return Recorded(
+            waiting.added_to(session),
+            waiting.channels(known),
+            waiting.rows,
+            [*sources, waiting.source] if waiting.rows else sources,
+            self._url,
+        )
+
+    # --- inside
+
+    def _waiting(self, table: Table) -> list[Row]:
+        return spooled.rows(self._spool, table, self._missing(table.name))
+
+    def _missing(self, location: str) -> list[int]:
+        """The batches of the spool that are not in this table."""
+        if self._store is None:
+            return self._batches
+        return [each for each in self._batches if not self._store.has(location, self._name, each)]
+
+    def _location(self, session: Session) -> str:
+        return TELEMETRY.location(session.robot, 1 if self._store is None else self._store.about.shards)
+
+    def _units(self, session: Session) -> dict[str, str | None]:
+        return {} if self._store is None else self._store.units(self._location(session))
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A session's telemetry; `waiting` of its rows are in this computer's spool alone."""
+
+    session: Session
+    channels: Sequence[Channel]
+    waiting: int
+    _sources: Sequence[Source]
+    _url: str
+
+    def telemetry(
+        self, names: Sequence[str], begin: datetime | None = None, end: datetime | None = None
+    ) -> Iterator[pa.Table]:
+        """The rows from `begin` up to before `end`, in time's order, as `ml.store.sessions.telemetry`."""
+        with translated(f"the telemetry of {self.session.session} in {self._url} cannot be read"):
+            yield from sessions.merged(self._sources, self.session, names, begin, end)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Of a session what one batch has: rows from `first` up to before `last`."""
+
+    batch: int
+    first: datetime
+    last: datetime
+    rows: int
+
+
+class _Waiting:
+    """A session's telemetry in these batches, as columns of the store; read when it is asked for."""
+
+    def __init__(
+        self, spool: Path, batches: Sequence[int], session: Session, units: dict[str, str | None]
+    ) -> None:
+        self._spool = spool
+        self._session = session
+        self._units = units
+        self._samples: Counter[str] = Counter()
+        self._parts = [part for batch in batches if (part := self._looked_into(batch))]
+        self.rows = sum(part.rows for part in self._parts)
+
+    def source(self, begin: datetime, end: datetime) -> pyarrow.dataset.Dataset:
+        """The batches that have something of this time, for `merged`."""
+        wanted = [part.batch for part in self._parts if part.first < end and part.last > begin]
+        found = [self._table(batch) for batch in wanted] or [TELEMETRY.schema.empty_table()]
+        return pyarrow.dataset.dataset(pa.concat_tables(found, promote_options="default"))
+
+    def channels(self, stored: Sequence[Channel]) -> list[Channel]:
+        """With those that the store has of the session."""
+        samples = self._samples + Counter({each.name: each.samples for each in stored})
+        units = {each.name: each.unit for each in stored}
+        return [
+            Channel(name, units.get(name) or self._units.get(name), samples[name]) for name in sorted(samples)
+        ]
+
+    def added_to(self, session: Session) -> Session:
+        """The session with the extent of all of its rows."""
+        first = min(
+            (time for time in (session.first, *(part.first for part in self._parts)) if time), default=None
+        )
+        last = max(
+            (time for time in (session.last, *(part.last for part in self._parts)) if time), default=None
+        )
+        return msgspec.structs.replace(session, first=first, last=last, rows=session.rows + self.rows)
+
+    def _looked_into(self, batch: int) -> _Part | None:
+        rows = self._table(batch)
+        if not rows.num_rows:
+            return None
+        for name in rows.column_names:
+            if name not in OWN and (samples := rows.num_rows - rows[name].null_count):
+                self._samples[name] += samples
+        extent = pc.min_max(rows["utc"]).as_py()
+        return _Part(batch, extent["min"], extent["max"] + _US, rows.num_rows)
+
+    def _table(self, batch: int) -> pa.Table:
+        runs = list(spooled.runs(self._spool, self._session, batch))
+        columns = Columns((run.layout for run in runs), self._units)
+        self._units |= {
+            each.name: (each.metadata or {}).get(b"unit", b"").decode() or None for each in columns.schema
+        }
+        return pa.Table.from_batches(map(columns.batch, runs), schema=columns.schema)
