@@ -10,6 +10,7 @@ import pytest
 
 from ml.store import Store, StoreError
 from server_gui.core.cloud import spooled
+from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk import playback as module
 from server_gui.core.desk.desk import Shown
@@ -44,7 +45,7 @@ def record(settings: ServerSettings, *, sent: bool = True) -> None:
 
 
 def tape_of(settings: ServerSettings) -> Tape:
-    found = spooled.all_sessions(settings.recorder.spool, lambda: Store.existing(settings.store.url))
+    found = Recordings(settings.store.url, settings.recorder.spool).sessions()
     return Tape.open(settings, found[-1])
 
 
