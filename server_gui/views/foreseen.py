@@ -8,7 +8,7 @@ from typing import Final
 from ml.registry.card import Source
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level, Trust
-from server_gui.core.desk.predictions import Shown
+from server_gui.core.desk.predictions import Recalled, Told
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.walk import LegPhase, phase_at
 from server_gui.core.processing.gait_events import Leg
@@ -34,9 +34,9 @@ class Line:
     detail: str = ""
 
 
-def said(shown: Shown) -> Line:
+def said(shown: Told) -> Line:
     """What a model says now: the label and how probable, or that it does not know."""
-    prediction = shown.predicted.prediction
+    prediction = shown.prediction
     if shown.is_stale():
         return Line(Mark("ring", "old", "old"), "No prediction now", f"the last {shown.age_s():.0f} s ago")
     word, detail = label_text(prediction.label), _detail(shown)
@@ -55,7 +55,7 @@ def said(shown: Shown) -> Line:
 
 def status(station: Station) -> Line | None:
     """The one line that stands in the header: a fall before all, then activity; None without a model."""
-    shown = station.predictions.by_task
+    shown = station.predictions.told
     falling = shown.get(FALLING)
     if falling is not None and not falling.is_stale():
         line = said(falling)
@@ -67,9 +67,10 @@ def status(station: Station) -> Line | None:
 def lines(station: Station) -> Iterator[Line]:
     """What the overview lists: each task with its model, what rules hold, what devices say of themselves."""
     predictions = station.predictions
+    told_by_task = predictions.told
     for task, title in TITLES.items():
-        if task in predictions.by_task:
-            shown = predictions.by_task[task]
+        if task in told_by_task:
+            shown = told_by_task[task]
             line = said(shown)
             told = filter(None, (line.detail, model_text(shown)))
             yield Line(line.mark, f"{title}: {line.text}", " · ".join(told))
@@ -88,10 +89,10 @@ def lines(station: Station) -> Iterator[Line]:
 
 def model_phases(station: Station) -> dict[Leg, LegPhase | None]:
     """Where each leg is in its stride by a model; None where it does not know."""
-    shown = station.predictions.by_task.get(GAIT_PHASE)
-    if shown is None or shown.is_stale() or shown.predicted.prediction.label in (UNKNOWN, ABNORMAL):
+    shown = station.predictions.told.get(GAIT_PHASE)
+    if shown is None or shown.is_stale() or shown.prediction.label in (UNKNOWN, ABNORMAL):
         return dict.fromkeys(Leg)
-    values = shown.predicted.prediction.values
+    values = shown.prediction.values
     percents = {leg: 100.0 * values[leg.value] for leg in Leg if leg.value in values}
     return {leg: LegPhase(percents[leg], phase_at(percents[leg])) if leg in percents else None for leg in Leg}
 
@@ -101,8 +102,10 @@ def label_text(label: str) -> str:
     return label.replace("_", " ").capitalize()
 
 
-def model_text(shown: Shown) -> str:
-    """Which model, how old, how far to believe it, from what it has learned."""
+def model_text(shown: Told) -> str:
+    """Which model, how old, from what it has learned; of a recording, that it was said then."""
+    if isinstance(shown, Recalled):
+        return f"said then by {shown.prediction.model}"
     card = shown.predicted.card
     days = (datetime.now(UTC) - card.made).days
     age = "new today" if days < 1 else "1 day old" if days == 1 else f"{days} days old"
@@ -114,16 +117,17 @@ def _as_predicted(line: Line) -> Line:
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 
 
-def _detail(shown: Shown) -> str:
+def _detail(shown: Told) -> str:
     """What speaks against believing it, and the runner-up, where there is one."""
-    prediction, trust = shown.predicted.prediction, shown.predicted.trust
+    prediction = shown.prediction
+    doubt = "" if isinstance(shown, Recalled) else _doubt(shown.predicted.trust)
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if prediction.label in (UNKNOWN, ABNORMAL):
         runner = f"likeliest {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
     else:
         others = [item for item in others if item[0] != prediction.label and item[1] >= LEAST]
         runner = f"next {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
-    return " · ".join(filter(None, (_doubt(trust), runner)))
+    return " · ".join(filter(None, (doubt, runner)))
 
 
 def _doubt(trust: Trust) -> str:

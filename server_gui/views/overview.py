@@ -158,10 +158,10 @@ class Overview(QWidget):
         """What it does: by a model where one says so, else by the steps that were seen."""
         gait = station.processing.derived().gait
         cadence = "" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f} steps/min"
-        shown = station.predictions.by_task.get(ACTIVITY)
+        shown = station.predictions.told.get(ACTIVITY)
         if shown is None or shown.is_stale():
             return ("Walking" if gait.walking else "Not walking"), cadence
-        prediction = shown.predicted.prediction
+        prediction = shown.prediction
         how_sure = "" if prediction.label in (UNKNOWN, ABNORMAL) else f"p {prediction.probability:.2f}"
         return label_text(prediction.label), " · ".join(filter(None, (how_sure, cadence)))
 

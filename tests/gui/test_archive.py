@@ -1,5 +1,6 @@
 """Recordings and cloud in the window: listed, played apart from what is live, labelled, uploaded."""
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -25,8 +26,10 @@ from server_gui.core.desk import library
 from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.stopping import StopState
+from server_gui.core.fleet.foreseeing import record as record_of
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
+from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
@@ -36,6 +39,7 @@ from server_gui.views.recordings.panel import Recordings
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, destroy, walking
+from tests.gui.foreseen import predicted
 from tests.gui.running import wait
 from tests.gui.test_recording import FakeKeeper, report
 
@@ -44,17 +48,26 @@ RATE_HZ = 50
 
 
 def record(settings: ServerSettings, *, sent: bool = True) -> str:
-    """Somebody who walks for `SECONDS`, a gap and a marker."""
+    """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker."""
     walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
     with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:
             units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}
             session = recorder.begin("exo-01", Facts(units=units, operator="Ada", notes="new insoles"))
             recorder.record("exo-01", 1, walk, 0)
+            recorder.add(
+                *(foretold(session, at_ns) for at_ns in walk.stamps_ns[: len(walk.stamps_ns) // 2 : 5])
+            )
             recorder.mark("exo-01", "stairs")
         for number in spool.waiting() if sent else ():
             send(spool, number, Store(settings.store.url))
     return session
+
+
+def foretold(session: str, stamp_ns: int) -> Record:
+    """That a model said then that somebody walks."""
+    utc_ns = stamp_ns + time.time_ns() - time.monotonic_ns()
+    return record_of(session, dataclasses.replace(predicted("walk", {"walk": 0.94}), utc_ns=utc_ns))
 
 
 @pytest.fixture
@@ -235,6 +248,23 @@ def test_playback_is_marked_and_never_mixed_with_what_is_live(
     bench.first.answer(Stopped({"left_knee": "confirmed"}, True))
     assert bench.station.stopping.state is StopState.CONFIRMED
     assert played.stopping.state is StopState.IDLE
+
+
+def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
+    whole: Shown, window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
+) -> None:
+    record(settings)
+    play(whole, archive)
+    tape, player = archive.playback.tape, window.recordings.player
+    assert tape is not None
+    archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
+    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk  0.94"), "showed it")
+    lines = player.overview.status_lines
+    whole.until(lambda: "Does: Walk  0.94 · said then by activity-3fa2c1" in lines.texts, "said by what")
+    archive.playback.seek(tape.last_ns)
+    whole.until(lambda: "predicted" not in player.banner.text(), "jumped")
+    whole.until(lambda: any(text.startswith("Not predicted") for text in lines.texts), "said so")
+    assert not bench.station.predictions.told
 
 
 def test_the_bar_of_time_is_used_by_keys_and_by_mouse(

@@ -9,7 +9,7 @@ import pytest
 from gateway.client import ConnectionState
 from ml.registry.card import Source
 from ml.serving.trust import Trust
-from server_gui.core.desk.predictions import OFF, Shown
+from server_gui.core.desk.predictions import OFF, Recalled, Shown
 from server_gui.core.desk.station import Station
 from server_gui.core.events import LinkChanged
 from server_gui.core.prediction.news import Ruled, Serves
@@ -152,3 +152,13 @@ def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: MainWindow, 
     station.take([LinkChanged(ConnectionState.WAITING, "no route", 0)])
     assert status(station) is None
     shown(window, lambda: not any("Walk" in text for text in window.overview.status_lines.texts))
+
+
+def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
+    window: MainWindow, station: Station
+) -> None:
+    walks = predicted("walk", WALKS).prediction
+    station.predictions.recalled = {"activity": Recalled(walks, 0.1)}
+    shown(window, lambda: window.overview._ring._word == "Walk")
+    said = "Does: Walk  0.94 · next turn 0.04 · said then by activity-3fa2c1"
+    assert window.overview.status_lines.texts[0] == said

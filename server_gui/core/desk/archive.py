@@ -1,5 +1,7 @@
 """Everything recorded, as the window works with it: what there is, one session played, its labels, jobs."""
 
+import functools
+
 from ml.store.sessions import Session
 from server_gui.core.background import Background
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
@@ -10,6 +12,7 @@ from server_gui.core.desk.labels import SessionLabels
 from server_gui.core.desk.library import Library
 from server_gui.core.desk.news import NewsKind
 from server_gui.core.desk.playback import Playback
+from server_gui.core.desk.recalling import said
 from server_gui.core.settings import ServerSettings
 
 WHO = "recordings"  # what the news name instead of a robot
@@ -51,7 +54,8 @@ class Archive:
         """Play the session that is chosen; False where it cannot be."""
         if self.tape is None:
             return False
-        self.playback.open(self.tape, self._words(self.tape.session.robot))
+        recall = functools.partial(said, self.settings, self.tape.session)
+        self.playback.open(self.tape, self._words(self.tape.session.robot), recall)
         self.labels.open(self.tape.session)
         return True
 

@@ -1,7 +1,8 @@
 """A recorded session played on a desk of its own: never among the live robots, and never taken for one."""
 
 import time
-from collections.abc import Callable, Mapping
+from bisect import bisect_left
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,6 +17,8 @@ from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.answers import Deliver, when_done
 from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.desk import Desk, Shown
+from server_gui.core.desk.predictions import Recalled
+from server_gui.core.desk.recalling import Said
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.events import Described, LinkChanged, Telemetry
@@ -27,7 +30,7 @@ PIECES: Final = 8  # that are kept
 LEAD_NS: Final = 12_000_000_000  # of the past that are shown after a jump
 LATE_S: Final = 0.5  # a frame that took longer does not make the recording jump
 SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-NOT_PREDICTED: Final = "a recording: see gwrms predict --session"
+NOT_PREDICTED: Final = "nothing was said then: gwrms predict --session says it now"
 KINDS: Final = {"cell_0": "insole", "force": "insole", "tilt_forward": "imu", "position": "joint"}
 
 
@@ -67,7 +70,27 @@ class PlayedRobot(Robot):
         return self.rows_per_s
 
 
-Read = Callable[[Callable[[], Rows]], "Future[Rows]"]  # does it in a thread
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of a recording: its rows, and what models said of them then, in time's order."""
+
+    rows: Rows
+    said: Sequence[Said]
+
+    def between(self, begin_ns: int, end_ns: int) -> "Piece":
+        """What is from `begin_ns` up to before `end_ns`."""
+        first, last = (bisect_left(self.said, at, key=lambda one: one.utc_ns) for at in (begin_ns, end_ns))
+        return Piece(self.rows.between(begin_ns, end_ns), self.said[first:last])
+
+
+Read = Callable[[Callable[[], Any]], "Future[Any]"]  # does it in a thread
+Recall = Callable[[int, int], Sequence[Said]]  # what was said from one instant up to before another; blocks
+
+
+def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[Said]:
+    """Of a recording without predictions."""
+    return ()
+
 
 
 class Playback:
@@ -89,16 +112,23 @@ class Playback:
         self._deliver = deliver
         self._robot = PlayedRobot()
         self._words: Mapping[str, dict[str, str]] = {}
-        self._pieces: dict[int, Rows] = {}
+        self._recall: Recall = nothing_said
+        self._said: dict[str, Said] = {}  # the newest of each task
+        self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
         self._fed_ns: int | None = None  # up to where the station has seen the recording; None: it jumps
         self._jumps = 0
         self._stepped_s: float | None = None
 
-    def open(self, tape: Tape, words: Mapping[str, dict[str, str]] = MappingProxyType({})) -> None:
+    def open(
+        self,
+        tape: Tape,
+        words: Mapping[str, dict[str, str]] = MappingProxyType({}),
+        recall: Recall = nothing_said,
+    ) -> None:
         """Show this one from its beginning; `words` are those of the channels that are states."""
         self.close()
-        self.tape, self._words = tape, words
+        self.tape, self._words, self._recall = tape, words, recall
         station = Station(
             tape.session.robot, "a recording", cast("Commands", NoRobot()), self._deliver, self.desk.news
         )
@@ -144,6 +174,7 @@ class Playback:
             target_ns = min(target_ns + round(took_s * self.speed * 1e9), self.tape.last_ns)
         if self._show_until(self.tape, target_ns):
             self.position_ns = self._robot.shown_ns = target_ns
+            self._show_said(target_ns)
             self.playing = self.playing and target_ns < self.tape.last_ns
 
     # --- what is shown
@@ -162,7 +193,9 @@ class Playback:
         if self._fed_ns is None:
             self._begin_anew(tape)
         if target_ns > begin_ns:
-            self._feed(Rows.joined([self._pieces[place].between(begin_ns, target_ns) for place in wanted]))
+            shown = [self._pieces[place].between(begin_ns, target_ns) for place in wanted]
+            self._feed(Rows.joined([piece.rows for piece in shown]))
+            self._said |= {one.prediction.task: one for piece in shown for one in piece.said}
         self._fed_ns = target_ns
         return True
 
@@ -170,9 +203,18 @@ class Playback:
         """To views, a jump is as if the robot's computer had started anew."""
         self._jumps += 1
         self._robot.row_ns = self._robot.stamp_ns = None
+        self._said = {}
         station = self.desk.stations[0]
         station.take([Described(_description(tape, self._jumps, self._words))])
         station.predictions.take(Serves(station.name, {}, {"": NOT_PREDICTED}))
+
+    def _show_said(self, now_ns: int) -> None:
+        """What models said last, as far as that was not too old."""
+        recalled = {
+            task: Recalled(one.prediction, (now_ns - one.utc_ns) / 1e9) for task, one in self._said.items()
+        }
+        shown = {task: one for task, one in recalled.items() if not one.is_stale()}
+        self.desk.stations[0].predictions.recalled = shown
 
     def _feed(self, rows: Rows) -> None:
         newest = self._robot.stamp_ns
@@ -193,20 +235,21 @@ class Playback:
     def _fetch(self, tape: Tape, place: int | None) -> None:
         if place is None or self._reading is not None:
             return
-        self._reading = place
+        self._reading, recall = place, self._recall
         begin_ns = tape.first_ns + place * PIECE_NS
+        end_ns = begin_ns + PIECE_NS
         when_done(
-            self._read(lambda: drawable(tape.read(begin_ns, begin_ns + PIECE_NS))),
+            self._read(lambda: Piece(drawable(tape.read(begin_ns, end_ns)), recall(begin_ns, end_ns))),
             self._deliver,
-            lambda rows: self._fetched(tape, place, rows),
+            lambda piece: self._fetched(tape, place, piece),
             lambda error: self._failed(tape, error),
         )
 
-    def _fetched(self, tape: Tape, place: int, rows: Rows) -> None:
+    def _fetched(self, tape: Tape, place: int, piece: Piece) -> None:
         if tape is not self.tape:
             return
         self._reading = None
-        self._pieces[place] = rows
+        self._pieces[place] = piece
         here = self._place(tape, self.position_ns)
         while len(self._pieces) > PIECES:
             del self._pieces[max(self._pieces, key=lambda known: abs(known - here))]

@@ -1,9 +1,11 @@
 """What models say of one robot, as the window shows it: the newest of each task, and the rules that hold."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from ml.serving.predictor import Prediction
 from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
 from server_gui.core.prediction.settings import RuleSettings
 
@@ -19,6 +21,11 @@ class Shown:
     predicted: Predicted
     came_ns: int  # our monotonic clock
 
+    @property
+    def prediction(self) -> Prediction:
+        """What the model says."""
+        return self.predicted.prediction
+
     def age_s(self, now_ns: int | None = None) -> float:
         """Seconds since the newest sample that it is about."""
         waited_ns = (time.monotonic_ns() if now_ns is None else now_ns) - self.came_ns
@@ -29,14 +36,35 @@ class Shown:
         return self.age_s(now_ns) > STALE_S
 
 
+@dataclass(frozen=True, slots=True)
+class Recalled:
+    """What a model said when a recording was made, so long before the instant of it that is shown."""
+
+    prediction: Prediction
+    old_s: float
+
+    def age_s(self) -> float:
+        """Seconds since the newest sample that it is about."""
+        return self.old_s
+
+    def is_stale(self) -> bool:
+        """Whether it was too old to be called live then."""
+        return self.old_s > STALE_S
+
+
+Told = Shown | Recalled
+
+
 @dataclass(slots=True)
 class StationPredictions:
     """For one thread; `take` and `clear` are the only writers, and `revision` rises with each.
 
     `why` says of each task without a model, or without the newest one, why that is so and what to do.
+    `recalled` belongs to who plays a recording; of a robot there is nothing in it.
     """
 
     by_task: dict[str, Shown] = field(default_factory=dict)
+    recalled: dict[str, Recalled] = field(default_factory=dict)
     why: dict[str, str] = field(default_factory=dict)
     off: bool = False
     revision: int = 0
@@ -48,9 +76,14 @@ class StationPredictions:
         """Why nothing is predicted, as a sentence; empty while a model serves."""
         if self.off:
             return OFF
-        if self.by_task:
+        if self.told:
             return ""
         return "; ".join(self.why.values()) if self._looked else NOT_YET
+
+    @property
+    def told(self) -> Mapping[str, Told]:
+        """What is shown of each task: of a robot what is said live, of a recording what was said then."""
+        return {**self.by_task, **self.recalled}
 
     @property
     def rules(self) -> tuple[Ruled, ...]:

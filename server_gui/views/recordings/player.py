@@ -22,6 +22,7 @@ from server_gui.core.cloud.tape import as_time
 from server_gui.core.cloud.work import FORMATS, export
 from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.playback import SPEEDS
+from server_gui.views.foreseen import status
 from server_gui.views.overview import Overview
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
@@ -44,7 +45,8 @@ class Player(QWidget):
         self._archive = archive
         self._playback = archive.playback
         self._frame = 0
-        self._views = (Overview(self._playback.desk, theme), Signals(self._playback.desk, theme))
+        self.overview = Overview(self._playback.desk, theme)
+        self._views = (self.overview, Signals(self._playback.desk, theme))
         self._stack = QStackedWidget()
         for view in self._views:
             self._stack.addWidget(scrolled(view))
@@ -146,7 +148,10 @@ class Player(QWidget):
         what = f"▶ PLAYBACK, not live: {tape.session.robot}, {day_text(playback.position_ns)}"
         if playback.problem:
             return f"{what}. It cannot be read: {playback.problem}"
-        return f"{what} · reading …" if playback.is_loading else what
+        if playback.is_loading:
+            return f"{what} · reading …"
+        then = status(playback.desk.stations[0])
+        return what if then is None else f"{what} · predicted then: {then.text}"
 
     def _tone(self, tone: str) -> None:
         if self.banner.property("tone") != tone:
