@@ -16,7 +16,7 @@ from gateway.cli.text import NONE, age, say, size, table
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.door import ask
 from server_gui.core.fleet.statistics import LinkReport
-from server_gui.core.prediction.state import PredictingState, TaskReport
+from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingState, TaskReport
 from server_gui.core.settings import ServerSettings, SettingsError, add_robots, default_file, load
 from server_gui.terminal.ending import Ended, Ending
 
@@ -30,6 +30,7 @@ HEADER = (
 )  # fmt: skip
 RIGHT = range(5, len(HEADER))
 PREDICTED = ("robot", "task", "says", "probability", "age", "trust", "model")
+LABELLED = ("robot", "task", "model", "labelled", "right", "wrong", "not said")
 
 EPILOG = """What comes from a robot is safe in the spool on this computer first, and goes to the store a batch
 at a time; nothing is decimated, and what is missing is recorded as an event. Robots are followed each by
@@ -150,9 +151,25 @@ def _predicted(state: PredictingState | None) -> list[str]:
     skipped = [f"{state.skipped} decisions were skipped: too much to do\n"] if state.skipped else []
     return [
         *([table(PREDICTED, rows, (3, 4))] if rows else []),
+        *([] if state.labelled is None else [_labelled(state.labelled)]),
         *skipped,
         *(f"{one}\n" for one in state.problems),
     ]
+
+
+def _labelled(found: Figures) -> str:
+    """How right predictions were, where labels say what was so."""
+    if not found:
+        return f"no prediction of the last {WITHIN_DAYS} days is labelled in the store (gwrms label)\n"
+    rows = [
+        (robot, task, model, str(quality.labelled), *quality.shares)
+        for robot, tasks in found.items()
+        for task, models in tasks.items()
+        for model, quality in models.items()
+    ]
+    return (
+        f"predictions of the last {WITHIN_DAYS} days that are labelled\n{table(LABELLED, rows, range(3, 7))}"
+    )
 
 
 def _task(name: str, known: TaskReport) -> tuple[str, ...]:

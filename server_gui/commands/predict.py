@@ -163,7 +163,8 @@ def fields(one: Foreseen) -> dict[str, Any]:
                 "age_days": round(age_days(one.card), 2),
             }
             took = {"utc_ns": one.utc_ns, "took_s": None if one.took_ns is None else one.took_ns / 1e9}
-            return {"robot": one.robot} | dataclasses.asdict(one.prediction) | trust | made | took
+            quality = {"quality": one.quality}
+            return {"robot": one.robot} | dataclasses.asdict(one.prediction) | trust | made | took | quality
         case Ruled():
             return {"robot": one.robot, "rule": one.rule, "holds": one.began, "text": one.text}
         case Serves():

@@ -1,7 +1,7 @@
 """What models say, as text: of a robot that is followed, and of a session that was predicted again."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
@@ -12,7 +12,8 @@ from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from server_gui.core.desk.predictions import Shown
 from server_gui.core.prediction.live import Watched
-from server_gui.core.prediction.replay import Quality, Replayed
+from server_gui.core.prediction.replay import Replayed
+from server_gui.core.prediction.state import WITHIN_DAYS, Quality
 
 HEADER: Final = ("TASK", "SAYS", "PROBABILITY", "AGE", "NOVELTY", "TRUST", "MODEL", "MADE")
 RIGHT: Final = (2, 3, 4)
@@ -26,6 +27,7 @@ def told(name: str, watched: Watched) -> str:
     if known.by_task:
         lines.append(table(HEADER, [_row(shown) for shown in known.by_task.values()], RIGHT).rstrip())
     lines += [f"{task}: {why}" for task, why in known.why.items()] or [known.problem] * (not known.by_task)
+    lines += [f"RIGHT {line}" for line in _right(known.by_task.values())]
     lines += [f"RULE {rule.text}" for rule in known.rules]
     drifted = {channel for shown in known.by_task.values() for channel in shown.predicted.trust.drifted}
     lines += [
@@ -54,6 +56,13 @@ def _row(shown: Shown) -> tuple[str, ...]:
         card.id,
         made(card),
     )
+
+
+def _right(found: Iterable[Shown]) -> Iterator[str]:
+    """How right models were of late, where labels say what was so."""
+    for shown in found:
+        if (quality := shown.predicted.quality) is not None:
+            yield f"{shown.predicted.prediction.task}: {quality.text} of the last {WITHIN_DAYS} days"
 
 
 def said(prediction: Prediction) -> str:
@@ -109,18 +118,12 @@ def _labels(predictions: Sequence[Prediction]) -> str:
 
 
 def _quality(quality: Quality) -> str:
-    said_at_all = quality.right + quality.wrong
-    right = f"{100 * quality.right / said_at_all:.1f} %" if said_at_all else NONE
-    head = (
-        f"labels: {quality.labelled} decisions are labelled; {right} of what it says of them is right,"
-        f" of {quality.unsaid} it says nothing"
-    )
     columns = sorted({label for row in quality.confusion.values() for label in row})
     rows = [
         (was, *(str(row.get(label, 0)) for label in columns))
         for was, row in sorted(quality.confusion.items())
     ]
-    return f"{head}\n" + table(
+    return f"labels: {quality.text}\n" + table(
         ("WAS", *(f"SAYS {label}" for label in columns)), rows, range(1, len(columns) + 1)
     )
 

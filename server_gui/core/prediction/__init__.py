@@ -2,7 +2,10 @@
 
 settings     `[prediction]` and `[[rules]]` of the server's file
 inbox        what feeds tell, on its way to the thread that predicts
-serving      a thread that looks which models serve, and loads them
+looking      a thread that looks somewhere again and again
+serving      looks which models serve, and loads them
+comparing    what of predictions was right, as labels say
+track_record that of the last days, from the store; tracking: looks whether there is more
 following    one robot: its rows, windows, trust and rules
 rules        when a rule on predictions begins and ends to hold
 predicting   the thread that judges all robots together, and tells

@@ -13,6 +13,7 @@ from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
 from server_gui.core.prediction.rules import Rule
 from server_gui.core.prediction.serving import Model
 from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
+from server_gui.core.prediction.state import Quality
 
 LATE_NS: Final = 500_000_000  # a decision that is due so long before the newest one is skipped
 
@@ -52,8 +53,10 @@ class Watched:
         """From now on nothing has been seen."""
         self._windows = Windows(self.model.learned.recipe, self._every_ns)
 
-    def predicted(self, robot: str, clock: "Clock", predictions: Sequence[Prediction]) -> Iterator[Foreseen]:
-        """What these predictions, of what was due, say."""
+    def predicted(
+        self, robot: str, clock: "Clock", quality: Quality | None, predictions: Sequence[Prediction]
+    ) -> Iterator[Foreseen]:
+        """What these predictions, of what was due, say; `quality` is how right the model was of late."""
         samples = [window.samples[0, :, -1] for window in self.due]
         self.due = []
         self._trusting.take(predictions, samples)
@@ -66,6 +69,7 @@ class Watched:
                 self._trusting.trust,
                 clock.utc_ns(stamp_ns),
                 clock.age_ns(stamp_ns),
+                quality,
             )
             for rule in self._rules:
                 if (began := rule.take(prediction)) is not None:

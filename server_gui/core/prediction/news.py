@@ -7,6 +7,7 @@ from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from server_gui.core.prediction.settings import RuleSettings
+from server_gui.core.prediction.state import Quality
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +15,8 @@ class Predicted:
     """What a model says of a robot now.
 
     `utc_ns` is when the window ended; `took_ns` how long after that the prediction was there, None where the
-    robot's clock is not known.
+    robot's clock is not known. `quality` is how right the model was on this robot within the last days, None
+    where nobody has labelled any of that.
     """
 
     robot: str
@@ -23,6 +25,7 @@ class Predicted:
     trust: Trust
     utc_ns: int
     took_ns: int | None
+    quality: Quality | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.serving import Model, Serving
 from server_gui.core.prediction.settings import Action
 from server_gui.core.prediction.state import PredictingState, TaskReport
+from server_gui.core.prediction.tracking import Tracking
 from server_gui.core.settings import ServerSettings
 
 log = logging.getLogger(__name__)
@@ -44,6 +45,7 @@ class Predicting:
         self._tell = tell
         self._stop = stop
         self._serving = Serving(settings.store.url, settings.prediction.poll_s)
+        self._tracking = Tracking(settings.store.url, lambda: {robot for robot, _ in self._serving.models})
         self._inbox = Inbox()
         self._robots: dict[str, Following] = {}
         self._broken: dict[str, str] = {}  # models, and why
@@ -53,12 +55,14 @@ class Predicting:
 
     def __enter__(self) -> Self:
         self._serving.__enter__()
+        self._tracking.__enter__()
         self._thread.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
         self._inbox.close()
         self._thread.join()
+        self._tracking.__exit__(*exc)
         self._serving.__exit__(*exc)
 
     def take(self, robot: str, event: Event) -> None:
@@ -73,12 +77,13 @@ class Predicting:
     @property
     def state(self) -> PredictingState:
         """How it goes now; from any thread."""
-        problems = [] if self._serving.problem is None else [self._serving.problem]
+        problems = [one for one in (self._serving.problem, self._tracking.problem) if one is not None]
         problems += [f"{robot}: {task}: {why}" for (robot, task), why in self._serving.problems.items()]
         robots = {robot: _reports(known) for robot, known in self._robots.copy().items()}
         return PredictingState(
             robots,
             (*problems, *self._broken.copy().values()),
+            self._tracking.figures,
             self._judged,
             self._skipped + self._inbox.lost,
         )
@@ -128,6 +133,8 @@ class Predicting:
         }
         whole = {task: model for task, model in models.items() if task not in broken}
         news = robot.serve(whole, why | broken)
+        if news is not None:
+            self._tracking.wake()
         if news is not None and (whole or news.why):
             self._tell([news])
 
@@ -154,7 +161,8 @@ class Predicting:
         news: list[Foreseen] = []
         for robot, watched in due:
             own = [next(predictions) for _ in watched.due]
-            news += watched.predicted(robot.robot, robot.clock, own)
+            quality = self._tracking.quality(robot.robot, model.card)
+            news += watched.predicted(robot.robot, robot.clock, quality, own)
         self._judged += len(windows)
         return news
 

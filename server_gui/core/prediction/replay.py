@@ -10,8 +10,7 @@ from ml.errors import UnusableData
 from ml.registry.card import check_robot
 from ml.registry.registry import Registry
 from ml.robot.learned import Learned
-from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
-from ml.serving.grid import Stamps
+from ml.robot.task import TASKS
 from ml.serving.predictor import Prediction, replayed
 from ml.serving.trust import Trust, Trusting
 from ml.store import NoSuchTable, Store, sessions
@@ -19,19 +18,11 @@ from ml.store.labels import Label
 from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS
 from ml.training.recorded import Recorded, recorded
-from ml.training.truth import NOBODY, Said, activities
+from ml.training.truth import NOBODY
+from server_gui.core.prediction.comparing import counted, quality, truth
 from server_gui.core.prediction.serving import Model
 from server_gui.core.prediction.settings import PredictionSettings
-
-
-class Quality(Struct, frozen=True):
-    """How predictions compare with labels: of `labelled` decisions, what was right, wrong, and not said."""
-
-    labelled: int
-    right: int
-    wrong: int
-    unsaid: int  # unknown or abnormal
-    confusion: dict[str, dict[str, int]]  # what it was → what was said → decisions
+from server_gui.core.prediction.state import Quality
 
 
 class Live(Struct, frozen=True):
@@ -94,15 +85,17 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
     rows = recorded(store, session.robot, session.session, channels)
     found = replayed(model.card.id, model.learned, rows.stamps_ns, rows.values, every_ns)
     stamps_ns = np.array([one.stamp_ns for one in found], np.int64)
-    truth = _truth(sessions.labels(store, session), rows, model, stamps_ns)
+    labels = [Label.of(row) for row in sessions.labels(store, session)]
+    was = truth(labels, rows, model.learned.task, model.learned.classes, stamps_ns)
+    counts = counted(was, [one.label for one in found])
     return Replayed(
         model,
         found,
         rows.to_utc(stamps_ns).tolist() if found else [],
         _live(store, session, model, found),
-        _quality(found, truth) if truth else None,
+        quality(counts) if counts else None,
         _trust(model, found, rows),
-        truth,
+        {stamp: str(name) for stamp, name in zip(stamps_ns.tolist(), was, strict=True) if name != NOBODY},
     )
 
 
@@ -114,39 +107,6 @@ def _live(store: Store, session: Session, model: Model, found: Iterable[Predicti
     said = {row["stamp_ns"]: row["label"] for row in rows if row["model"] == model.card.id}
     same = sum(said.get(one.stamp_ns) == one.label for one in found)
     return Live(len(said), same)
-
-
-def _truth(
-    rows: Sequence[Mapping[str, object]],
-    recording: Recorded,
-    model: Model,
-    stamps_ns: Stamps,
-) -> dict[int, str]:
-    """What was so when each decision is about, by its stamp, as classes of the task."""
-    labels = [Label.of(row) for row in rows]
-    task = model.learned.task
-    if not labels or not len(stamps_ns) or not task.fold:
-        return {}
-    times = np.array([(one.began_utc_ns, one.ended_utc_ns) for one in labels], np.int64)
-    begins, ends = recording.at_utc(times[:, 0]).tolist(), recording.at_utc(times[:, 1]).tolist()
-    spans = zip(begins, ends, labels, strict=True)
-    said = [Said(begin, end, one.label, one.source) for begin, end, one in spans]
-    names, _ = activities(said, stamps_ns - task.delay_ms * 1_000_000)
-    folded = [task.fold.get(str(name), NOBODY) for name in names]
-    known = zip(stamps_ns.tolist(), folded, strict=True)
-    return {stamp_ns: name for stamp_ns, name in known if name in model.learned.classes}
-
-
-def _quality(found: Iterable[Prediction], truth: Mapping[int, str]) -> Quality:
-    confusion: dict[str, dict[str, int]] = {}
-    for one in found:
-        if (was := truth.get(one.stamp_ns)) is not None:
-            said = confusion.setdefault(was, {})
-            said[one.label] = said.get(one.label, 0) + 1
-    labelled = sum(sum(said.values()) for said in confusion.values())
-    right = sum(said.get(was, 0) for was, said in confusion.items())
-    unsaid = sum(said.get(UNKNOWN, 0) + said.get(ABNORMAL, 0) for said in confusion.values())
-    return Quality(labelled, right, labelled - right - unsaid, unsaid, confusion)
 
 
 def _trust(model: Model, found: Sequence[Prediction], rows: Recorded) -> Trust:

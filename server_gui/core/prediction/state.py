@@ -1,8 +1,38 @@
 """How prediction goes, for `gwrms collect --status` and whoever shows it; needs no scikit-learn."""
 
 from datetime import datetime
+from typing import Final
 
 from msgspec import Struct
+
+WITHIN_DAYS: Final = 7  # of predictions that are compared with labels
+
+
+class Quality(Struct, frozen=True):
+    """How predictions compare with labels: of `labelled` decisions, what was right, wrong, and not said."""
+
+    labelled: int
+    right: int
+    wrong: int
+    unsaid: int  # unknown or abnormal
+    confusion: dict[str, dict[str, int]]  # what it was → what was said → decisions
+
+    @property
+    def shares(self) -> tuple[str, str, str]:
+        """Right, wrong and not said, in percent."""
+        right, wrong, unsaid = (
+            100 * count / self.labelled for count in (self.right, self.wrong, self.unsaid)
+        )
+        return f"{right:.1f} %", f"{wrong:.1f} %", f"{unsaid:.1f} %"
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        right, wrong, unsaid = self.shares
+        return f"{right} right, {wrong} wrong, {unsaid} not said, of {self.labelled} labelled decisions"
+
+
+Figures = dict[str, dict[str, dict[str, Quality]]]  # by robot, task and model
 
 
 class TaskReport(Struct, frozen=True):
@@ -26,5 +56,6 @@ class PredictingState(Struct, frozen=True):
 
     robots: dict[str, dict[str, TaskReport]] = {}
     problems: tuple[str, ...] = ()
+    labelled: Figures | None = None  # None: nobody has looked yet
     judged: int = 0  # decisions since the start
     skipped: int = 0  # decisions that were due while too much was to do

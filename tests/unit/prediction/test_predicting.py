@@ -2,6 +2,7 @@
 
 import dataclasses
 import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,16 @@ import pytest
 from ml.registry.pointers import Pointers
 from ml.registry.registry import Registry
 from ml.serving.predictor import Prediction, Window, judged, replayed
+from ml.store import Store, StoreUnreachable
 from ml.store.objects import Objects
 from server_gui.core.prediction import following
 from server_gui.core.prediction import predicting as module
 from server_gui.core.prediction.news import Serves
 from server_gui.core.prediction.predicting import Predicting
+from server_gui.core.prediction.state import Quality
+from server_gui.core.prediction.track_record import TrackRecord
 from tests.unit.ml.serving.small import MS, STEP_MS, Floats, hips, learned
+from tests.unit.prediction.lab import Lab
 from tests.unit.prediction.robots import (
     ROBOT,
     card,
@@ -247,3 +252,38 @@ def test_without_a_model_nothing_is_said(folder_url: str) -> None:
         },
         "falling": "falling cannot be told from this robot's channels",
     }
+
+
+def test_what_labels_say_of_the_model_is_told_with_its_predictions(folder_url: str) -> None:
+    lab = Lab(folder_url, time.time_ns() - 3600 * 10**9)
+    lab.say(["walk", "walk", "unknown"])
+    lab.label("walk", -1000, 1000)
+    sent = iter(telemetry(hips(600, walks=True)))
+    with predicting(settings(folder_url)) as (one, told):
+        served(one, told)
+        told.until(
+            lambda: told.predicted() and told.predicted()[-1].quality, lambda: one.take(ROBOT, next(sent))
+        )
+        state = one.state
+    quality = Quality(3, 2, 0, 1, {"walk": {"unknown": 1, "walk": 2}})
+    assert told.predicted()[-1].quality == quality
+    assert state.labelled == {ROBOT: {"activity": {lab.model: quality}}}
+    assert not state.problems
+
+
+def test_labels_that_cannot_be_read_are_a_problem_and_prediction_goes_on(
+    folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unreachable(*_: object) -> None:
+        raise StoreUnreachable("the store does not answer")
+
+    Store(folder_url)
+    publish(folder_url)
+    monkeypatch.setattr(TrackRecord, "figures", unreachable)
+    sent = iter(telemetry(hips(600, walks=True)))
+    with predicting(settings(folder_url)) as (one, told):
+        served(one, told)
+        told.until(lambda: told.predicted() and one.state.problems, lambda: one.take(ROBOT, next(sent)))
+        state = one.state
+    assert state.problems == ("predictions are not compared with labels: the store does not answer",)
+    assert state.labelled is None

@@ -4,17 +4,20 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import msgspec
 import pytest
 
 from ml.store import Store, sessions
-from ml.store.tables import PREDICTIONS
+from ml.store.labels import Label, utc_ns
+from ml.store.tables import LABELS, PREDICTIONS
 from server_gui.commands import predict
 from server_gui.commands.collect import status_text
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.prediction.settings import Action, PredictionSettings, RuleSettings
+from server_gui.core.prediction.track_record import TrackRecord
 from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
 from tests.unit.prediction.robots import SteadyRobot, publish
 
@@ -52,12 +55,22 @@ def judged(report: CollectorReport) -> int:
     return 0 if report.prediction is None else report.prediction.judged
 
 
+def says(report: CollectorReport) -> str | None:
+    """What was said last."""
+    robots = {} if report.prediction is None else report.prediction.robots
+    newest = robots.get("exo-fake", {}).get("activity")
+    return None if newest is None else newest.label
+
+
 def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
     server: ServerSettings, robot: SteadyRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = publish(server.store.url)
     with Collector(server) as collector:
-        report = until(collector, lambda report: judged(report) >= ENOUGH and robot.called("robot.stop"))
+        report = until(
+            collector,
+            lambda report: judged(report) >= ENOUGH and robot.called("robot.stop") and says(report) == "walk",
+        )
         told = msgspec.json.decode(msgspec.json.encode(report), type=CollectorReport)
     assert "activity  walk" in status_text(told)
     assert model in status_text(told)
@@ -95,3 +108,17 @@ def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
     assert lines[-1]["quality"] is None
     assert predict.main(["--session", session.session, "--config", str(config)]) == 0
     assert f"said live: {len(rows)}, of which {len(rows)} are the same here" in capsys.readouterr().out
+
+    # what labels say of it is the same live and over the recording
+    begin, end = (row["utc"] - timedelta(milliseconds=250) for row in (rows[5], rows[-5]))
+    label = Label("exo-fake", session.session, utc_ns(begin), utc_ns(end), "walk", "ada")
+    data = LABELS.rows([label.row(utc_ns(end))])
+    store.append(LABELS, "labels", data.schema, data.to_reader, "ada", 1)
+    assert predict.main(["--session", session.session, "--config", str(config), "--json"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    live = {row["stamp_ns"] for row in rows}
+    own = Counter(line["label"] for line in lines if "truth" in line and line["stamp_ns"] in live)
+    assert own.total() == len(rows) - 10
+    figures = TrackRecord(store.url).figures({"exo-fake"}, datetime.now(UTC))
+    assert figures["exo-fake"]["activity"][model].confusion == {"walk": own}
+    assert lines[-1]["quality"]["confusion"].keys() == {"walk"}

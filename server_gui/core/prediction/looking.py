@@ -1,0 +1,40 @@
+"""A thread that looks somewhere again and again, and that nobody waits for without end."""
+
+import threading
+from collections.abc import Callable
+from typing import Final, Self
+
+BREAK_OFF_S: Final = 20.0  # longer than it takes to import what models need, in a window 7 s of a core
+
+
+class Looking:
+    """Calls `look` at once, then every `every_s` and after each `wake`; use it as a context manager.
+
+    What hangs in a look holds leaving up for no longer than `BREAK_OFF_S`; then it ends with the process.
+    """
+
+    def __init__(self, name: str, look: Callable[[], None], every_s: float) -> None:
+        self.ending = False
+        self._look = look
+        self._every_s = every_s
+        self._wake = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.ending = True
+        self._wake.set()
+        self._thread.join(BREAK_OFF_S)
+
+    def wake(self) -> None:
+        """Look now; from any thread."""
+        self._wake.set()
+
+    def _run(self) -> None:
+        while not self.ending:
+            self._look()
+            self._wake.wait(self._every_s)
+            self._wake.clear()

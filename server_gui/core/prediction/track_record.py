@@ -1,0 +1,166 @@
+"""How right the predictions of the last days were, as labels say that have come into the store."""
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from datetime import UTC, datetime, timedelta
+from typing import Final, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset
+
+from ml.errors import UnusableModel
+from ml.registry.registry import Registry
+from ml.robot.task import TASKS
+from ml.store import NoSuchTable, Store
+from ml.store.errors import translated
+from ml.store.fragments import DataFile, data_files
+from ml.store.labels import ACTIVITIES, Label, holding
+from ml.store.tables import LABELS, PREDICTIONS, Table
+from ml.training.recorded import Recorded
+from server_gui.core.prediction.comparing import Counts, counted, quality, truth
+from server_gui.core.prediction.state import WITHIN_DAYS, Figures
+
+Key = tuple[str, str, str]  # robot, task, model
+DELAY: Final = timedelta(milliseconds=max(task.delay_ms for task in TASKS.values()))
+COMPARED: Final = tuple(task.name for task in TASKS.values() if task.fold)
+_COLUMNS: Final = ["utc", "stamp_ns", "task", "model", "label"]
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+_field = pyarrow.dataset.field
+
+
+class Stretch(NamedTuple):
+    """What is labelled of a session, and the files of what was said then: while these stay, counts do."""
+
+    labels: tuple[Label, ...]
+    begin: datetime
+    end: datetime
+    files: tuple[str, ...]
+
+
+class TrackRecord:
+    """Of one store; for one thread at a time. It reads again only what has changed."""
+
+    def __init__(self, store_url: str) -> None:
+        self._store = Store.existing(store_url)
+        self._registry = Registry(store_url)
+        self._seen: object = None  # what `_figures` are of
+        self._figures: Figures = {}
+        self._counts: Mapping[Stretch, Mapping[Key, Counts]] = {}
+
+    def figures(self, robots: Set[str], now: datetime, ending: Callable[[], bool] = lambda: False) -> Figures:
+        """What was said of these robots within the last days; nothing new where it is `ending`.
+
+        A session that a model has learned from proves nothing of it, and is left out.
+
+        Raises:
+            StoreError: the store cannot be read.
+
+        """
+        since = now.replace(minute=0, second=0, microsecond=0) - timedelta(days=WITHIN_DAYS)
+        labels, said = self._version(LABELS), self._version(PREDICTIONS)
+        if (robots, since, labels, said) == self._seen:
+            return self._figures
+        counts: dict[Stretch, Mapping[Key, Counts]] = {}
+        if labels is not None and said is not None:
+            for stretch in self._stretches(robots, since, labels, said):
+                if ending():
+                    return self._figures
+                known = self._counts.get(stretch)
+                counts[stretch] = self._compared(stretch, said) if known is None else known
+        self._seen, self._counts = (robots, since, labels, said), counts
+        self._figures = _figures(counts.values())
+        return self._figures
+
+    def _version(self, table: Table) -> int | None:
+        try:
+            return self._store.table(table.name).version()
+        except NoSuchTable:
+            return None
+
+    def _stretches(self, robots: Set[str], since: datetime, labels: int, said: int) -> Iterator[Stretch]:
+        """A stretch a session, from its first label to its last."""
+        delta = self._store.table(PREDICTIONS.name, said)
+        with translated(f"{self._store.url}/{PREDICTIONS.name} cannot be read"):
+            files = list(data_files(delta, PREDICTIONS.name))
+        found = sorted(self._labels(robots, since, labels), key=_session)
+        for _, each in itertools.groupby(found, _session):
+            own = tuple(each)
+            begin = max(since, _utc(min(one.began_utc_ns for one in own)))
+            end = _utc(max(one.ended_utc_ns for one in own)) + DELAY
+            yield Stretch(own, begin, end, tuple(sorted(_between(files, begin, end))))
+
+    def _labels(self, robots: Set[str], since: datetime, version: int) -> list[Label]:
+        wanted = (
+            _field("robot").isin(list(robots)) & _field("label").isin(ACTIVITIES) & (_field("ended") >= since)
+        )
+        with translated(f"{self._store.url}/{LABELS.name} cannot be read"):
+            rows = self._store.dataset(LABELS.name, version).to_table(filter=wanted).to_pylist()
+        return [Label.of(row) for row in holding(rows)]
+
+    def _compared(self, stretch: Stretch, version: int) -> Mapping[Key, Counts]:
+        """What was said in a stretch, against what was so, by robot, task and model."""
+        robot, session = _session(stretch.labels[0])
+        rows = self._said(stretch, version)
+        clock = Recorded(
+            rows["stamp_ns"].to_numpy(),
+            pc.cast(rows["utc"], pa.int64()).to_numpy() * 1000,
+            np.empty((len(rows), 0)),
+        )
+        found = {}
+        for one in rows.group_by(["task", "model"]).aggregate([]).to_pylist():
+            task, model = one["task"], one["model"]
+            classes = self._classes(model, session)
+            mine = rows.filter((_field("task") == task) & (_field("model") == model))
+            was = truth(stretch.labels, clock, TASKS[task], classes, mine["stamp_ns"].to_numpy())
+            found[robot, task, model] = counted(was, mine["label"].to_pylist())
+        return found
+
+    def _said(self, stretch: Stretch, version: int) -> pa.Table:
+        robot, session = _session(stretch.labels[0])
+        wanted = (
+            (_field("robot") == robot)
+            & (_field("session") == session)
+            & (_field("utc") >= stretch.begin)
+            & (_field("utc") <= stretch.end)
+            & _field("task").isin(COMPARED)
+        )
+        with translated(f"{self._store.url}/{PREDICTIONS.name} cannot be read"):
+            rows = self._store.dataset(PREDICTIONS.name, version).to_table(columns=_COLUMNS, filter=wanted)
+        return rows.sort_by("stamp_ns")
+
+    def _classes(self, model: str, session: str) -> Sequence[str]:
+        """Those that the model knows; none where this session can prove nothing of it."""
+        try:
+            card = self._registry.card(model)
+        except UnusableModel:
+            return ()  # it is gone
+        return () if session in card.learned else card.classes
+
+
+def _session(label: Label) -> tuple[str, str]:
+    return label.robot, label.session
+
+
+def _utc(utc_ns: int) -> datetime:
+    return _EPOCH + timedelta(microseconds=utc_ns // 1000)
+
+
+def _between(files: Sequence[DataFile], begin: datetime, end: datetime) -> Iterator[str]:
+    for file in files:
+        if (file.first is None or file.first <= end) and (file.last is None or file.last >= begin):
+            yield file.path
+
+
+def _figures(found: Iterable[Mapping[Key, Counts]]) -> Figures:
+    totals: dict[Key, Counts] = {}
+    for counts in found:
+        for key, count in counts.items():
+            totals[key] = totals.get(key, Counter()) + count
+    figures: Figures = {}
+    for (robot, task, model), total in sorted(totals.items()):
+        if total:
+            figures.setdefault(robot, {}).setdefault(task, {})[model] = quality(total)
+    return figures
