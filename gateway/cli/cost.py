@@ -1,9 +1,9 @@
 """`gwrms cost`: what monitoring costs the robot now, in all and for each client."""
 
-import argparse
 import time
 from collections.abc import Iterator
 
+from gateway.cli.arguments import seconds
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, budget, percent, say, say_json, size, table
 from gateway.messages import BusCost, ClientCost, GatewayCost, StreamCost
@@ -22,7 +22,7 @@ examples:
 def main(argv: list[str]) -> int:
     """Run `gwrms cost`."""
     made = parser("cost", "What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.", EPILOG)
-    made.add_argument("--seconds", type=_seconds, default=SECONDS, help="to look for (default: %(default)g)")
+    made.add_argument("--seconds", type=seconds, default=SECONDS, help="to look for (default: %(default)g)")
     arguments = made.parse_args(argv)
     with reach(arguments, "cost") as robot:
         robot.cost()  # rates are from here on
@@ -33,16 +33,6 @@ def main(argv: list[str]) -> int:
     else:
         say(text(cost))
     return 0
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.1 <= seconds <= 3600:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time from 0.1 to 3600 s")
-    return seconds
 
 
 def text(cost: GatewayCost) -> str:

@@ -5,6 +5,7 @@ import fnmatch
 import itertools
 from collections.abc import Iterator, Sequence
 
+from gateway.cli.arguments import number
 from gateway.cli.reach import channel_names, check_names, parser, reach
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
@@ -48,10 +49,7 @@ def main(argv: list[str]) -> int:
 
 
 def _rate(text: str) -> float:
-    try:
-        rate_hz = float(text)
-    except ValueError:
-        rate_hz = 0.0
+    rate_hz = number(text)
     if not 0.1 <= rate_hz <= 1000.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a rate from 0.1 to 1000 Hz")
     return rate_hz

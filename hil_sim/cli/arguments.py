@@ -8,10 +8,7 @@ def speed(text: str) -> float | None:
     """Simulated over real time; `None` for `max`, as fast as it goes."""
     if text == "max":
         return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number(text)
     if not 0.01 <= value <= 100.0:
         raise argparse.ArgumentTypeError(f"{text} is no speed: give a number from 0.01 to 100, or max")
     return value
@@ -19,7 +16,15 @@ def speed(text: str) -> float | None:
 
 def seconds(text: str) -> float:
     """A time greater than 0."""
-    value = float(text)
+    value = number(text)
     if not (math.isfinite(value) and value > 0):
         raise argparse.ArgumentTypeError(f"{text} is no time: give seconds greater than 0")
     return value
+
+
+def number(text: str) -> float:
+    """NaN, which lies in no range, where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

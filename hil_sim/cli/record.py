@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from hil_sim.channels import UNITS, reported
+from hil_sim.cli.arguments import number
 from hil_sim.clock import SECOND_NS
 from hil_sim.controller.objects import ControllerState
 from hil_sim.errors import SimulatorError
@@ -121,7 +122,7 @@ def _subjects(text: str) -> list[int]:
 
 
 def _minutes(text: str) -> float:
-    value = float(text)
+    value = number(text)
     if not 0.0 < value <= 600.0:
         raise argparse.ArgumentTypeError(f"{text} is no time: give minutes up to 600")
     return value

@@ -144,7 +144,11 @@ def test_as_text() -> None:
     )
 
 
-def test_times_that_make_no_sense_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("command", ["cost", "blame"])
+@pytest.mark.parametrize("seconds", ["0", "nan", "inf", "soon"])
+def test_times_that_make_no_sense_are_refused(
+    capsys: pytest.CaptureFixture[str], command: str, seconds: str
+) -> None:
     with pytest.raises(SystemExit):
-        main(["cost", "--seconds", "0"])
+        main([command, "--seconds", seconds])
     assert "no time from" in capsys.readouterr().err

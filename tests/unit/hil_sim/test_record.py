@@ -70,7 +70,9 @@ def test_the_command_writes_every_wearer(tmp_path: Path, capsys: pytest.CaptureF
     assert list(heads[0]["columns"][4:]) == list(UNITS)
 
 
-@pytest.mark.parametrize("wrong", [["--subjects", "4-3"], ["--subjects", "all"], ["--minutes", "0"]])
+@pytest.mark.parametrize(
+    "wrong", [["--subjects", "4-3"], ["--subjects", "all"], ["--minutes", "0"], ["--minutes", "x"]]
+)
 def test_wrong_usage_is_refused(wrong: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sim-record", "--out", str(tmp_path / "x"), *wrong]) == 2
     assert wrong[0] in capsys.readouterr().err

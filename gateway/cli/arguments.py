@@ -1,0 +1,22 @@
+"""What people type after an option, checked as it is read."""
+
+import argparse
+import math
+
+MOST_S = 86_400.0
+
+
+def number(text: str) -> float:
+    """NaN, which lies in no range, where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def seconds(text: str) -> float:
+    """How long something is looked at."""
+    value = number(text)
+    if not 0.1 <= value <= MOST_S:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time from 0.1 to {MOST_S:.0f} s")
+    return value
