@@ -19,7 +19,7 @@ from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
 from ml.store import Store, upkeep
-from ml.store.objects import Objects
+from ml.store.objects import Object, Objects
 
 FOLDER: Final = "models"
 CARD: Final = "model.json"
@@ -113,6 +113,11 @@ class Registry:
             if data is not None:
                 return data
         raise UnusableModel(f"{model}: there is no {name} of it in {self.url} (gwrms models ls lists models)")
+
+    def files(self, model: str) -> list[Object]:
+        """A model's files in the store as it lists them: other ones when something is written anew."""
+        found = self._objects.listing(f"{FOLDER}/{checked_name(model, 'model')}")
+        return sorted(found, key=lambda each: each.path)
 
     def shipped(self) -> frozenset[str]:
         """The models that come with GWRMS and that nobody has promoted."""

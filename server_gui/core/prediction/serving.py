@@ -5,8 +5,9 @@ serves stays, and `problems` says why.
 """
 
 import logging
-import threading
-from collections.abc import Mapping
+import math
+import time
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -15,13 +16,14 @@ from ml.registry.card import Card, check_robot
 from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
+from server_gui.core.prediction.looking import Looking
 
 if TYPE_CHECKING:
     from ml.registry.registry import Registry
 
 log = logging.getLogger(__name__)
 
-BREAK_OFF_S: Final = 20.0  # longer than it takes to import what models need, in a window 7 s of a core
+RETRY_S: Final = 600.0  # between attempts to load what was refused, while nothing of it has changed
 
 Key = tuple[str, str]  # robot and task
 
@@ -35,10 +37,7 @@ class Model:
 
 
 class Serving:
-    """The models of every robot that `robot` named; use it as a context manager, which ends its thread.
-
-    A store that hangs holds that thread up for no longer than `BREAK_OFF_S`; then it ends with the process.
-    """
+    """The models of every robot that `robot` named; use it as a context manager, which ends its thread."""
 
     def __init__(self, store_url: str, poll_s: float) -> None:
         self.models: Mapping[Key, Model] = {}  # replaced as a whole, for any thread
@@ -46,40 +45,32 @@ class Serving:
         self.problems: Mapping[Key, str] = {}  # those of `why` that are something wrong
         self.problem: str | None = None  # why nobody knows what serves
         self._url = store_url
-        self._poll_s = poll_s
         self._registry: Registry | None = None
         self._robots: dict[str, dict[str, str]] = {}  # units by channel
         self._loaded: dict[str, Model | UnusableModel] = {}
-        self._seen: Any = None  # what served and which robots there were, at the newest look
-        self._wake = threading.Event()
-        self._ending = False
-        self._thread = threading.Thread(target=self._run, name="models", daemon=True)
+        self._chosen_for: Mapping[str, dict[str, str]] = {}  # the robots at the newest look
+        self._seen: Any = None  # what should serve then, and the files of what was refused
+        self._retry_s = math.inf  # when that is tried again, on our monotonic clock
+        self._looking = Looking("models", self._look, poll_s)
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self._looking.__enter__()
         return self
 
     def __exit__(self, *exc: object) -> None:
-        self._ending = True
-        self._wake.set()
-        self._thread.join(BREAK_OFF_S)
+        self._looking.__exit__(*exc)
 
     def robot(self, name: str, units: dict[str, str]) -> None:
         """A robot has these channels, by their units; from any thread."""
         if self._robots.get(name) != units:
             self._robots = self._robots | {name: units}
-            self._wake.set()
+            self._looking.wake()
 
     # --- its thread
 
-    def _run(self) -> None:
-        while not self._ending:
-            if self._robots:
-                self._look()
-            self._wake.wait(self._poll_s)
-            self._wake.clear()
-
     def _look(self) -> None:
+        if not self._robots:
+            return
         try:
             from ml.registry.registry import Registry  # brings scikit-learn, which takes a second or more
 
@@ -98,7 +89,10 @@ class Serving:
     def _update(self, registry: "Registry") -> None:
         robots = self._robots
         served = [(task, robot, pointer.model) for task, robot, pointer in registry.served()]
-        if (served, robots) == self._seen:
+        anew = (served, self._files(registry, served)) != self._seen or time.monotonic() >= self._retry_s
+        if anew:
+            self._loaded = {name: one for name, one in self._loaded.items() if isinstance(one, Model)}
+        elif robots == self._chosen_for:
             return
         models, problems, why = dict(self.models), {}, {}
         for robot, units in robots.items():
@@ -111,7 +105,13 @@ class Serving:
                     if self.problems.get((robot, task)) != str(error):
                         log.warning("%s: %s: %s", robot, task, error)
         self.models, self.problems, self.why = models, problems, why | problems
-        self._seen = (served, robots)
+        self._chosen_for, self._seen = robots, (served, self._files(registry, served))
+        self._retry_s = time.monotonic() + RETRY_S if problems else math.inf
+
+    def _files(self, registry: "Registry", served: Iterable[tuple[str, str, str]]) -> object:
+        """Those of the models that should serve where something is wrong: written anew, they may be right."""
+        wrong = {task for _, task in self.problems}
+        return {model: registry.files(model) for task, _, model in served if task in wrong}
 
     def _choose(
         self, registry: "Registry", key: Key, units: Mapping[str, str], models: dict[Key, Model]
@@ -130,7 +130,7 @@ class Serving:
         return True
 
     def _load(self, registry: "Registry", name: str) -> Model:
-        """A model, loaded once; one that was refused is not asked for again."""
+        """A model, loaded once; one that was refused is not asked for again until something changes."""
         if name not in self._loaded:
             try:
                 card, state = registry.load(name)
