@@ -18,7 +18,8 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from server_gui.app import FOLLOWING, App, Record
+from server_gui.app import FOLLOWING, App
+from server_gui.core.desk.feeds import Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.stopping import StopState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings

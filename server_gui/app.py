@@ -1,12 +1,8 @@
-"""The window's wiring: one network thread, a mailbox a robot, one 30 Hz timer that drains them and draws.
-
-Where the window records, each robot is followed by a collector, which keeps what comes before it is shown.
-"""
+"""The window's wiring: a mailbox a robot, filled by the network's thread; a 30 Hz timer drains and draws."""
 
 import collections
 import concurrent.futures
 import contextlib
-import functools
 import os
 import signal
 import sys
@@ -14,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from msgspec.structs import replace
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
@@ -22,21 +17,16 @@ from gateway.client import Address
 from gateway.messages import ResourceSnapshotParams
 from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.link import Link
-from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
-from server_gui.core.events import Event, without_processes
-from server_gui.core.feed import Feed, Following
-from server_gui.core.fleet.collector import Collector, whole
-from server_gui.core.fleet.elsewhere import Elsewhere
+from server_gui.core.events import Event
+from server_gui.core.feed import Following
 from server_gui.core.mailbox import Mailbox
-from server_gui.core.network import Network
 from server_gui.core.prediction.news import Foreseen
-from server_gui.core.prediction.predicting import Predicting
 from server_gui.core.processing.units import Units
-from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.settings import RecordingSettings, ServerSettings, name_of
+from server_gui.core.settings import ServerSettings, name_of
 from server_gui.own_robot import OwnRobot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
@@ -55,7 +45,6 @@ FOLLOWING: Final = Following(
 )
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 FORESEEN: Final = 4096  # what may wait for a window that hangs
-RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 
 
 class Poster(QObject):
@@ -81,22 +70,14 @@ class Followed:
 
     station: Station
     mailbox: Mailbox
-    tasks: tuple["concurrent.futures.Future[None]", ...]
-    ticks: Ticks | None  # where single sources' samples are recorded
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """That the window records what it shows; who does so, and why."""
-
-    operator: str = ""
-    notes: str = ""
+    link: "concurrent.futures.Future[None]"
+    ticks: Ticks  # for where single sources' samples are recorded
 
 
 class App:
     """Everything from the robots of the server's file to the window that shows them.
 
-    Without `record` it only shows, and so it does where another program records into the same spool.
+    Without `record` it only shows, and so it does as long as another program records into the same spool.
     """
 
     def __init__(
@@ -109,21 +90,13 @@ class App:
     ) -> None:
         self.desk = Desk()
         self._qt = qt
-        self._following = following
         self._followed: list[Followed] = []
         self._mailboxes: dict[str, Mailbox] = {}
         self._foreseen: collections.deque[Foreseen] = collections.deque(maxlen=FORESEEN)
         self._poster = Poster()
-        self._collector, self._elsewhere, why = None, None, "the window was started to show only"
-        if record is not None:
-            self._collector, why = self._collect(settings, record)
-            self._elsewhere = None if self._collector else Elsewhere(settings.recorder.spool)
-        self.desk.recording = self._recording(self._collector or self._elsewhere, why)
-        self.network = self._collector.network if self._collector else Network()
+        self.feeds = Feeds(settings, following, record, self._show, self._foreseen.extend)
+        self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self._foresees = settings.prediction.enabled
-        here = self._foresees and self._collector is None  # else the collector does it
-        self._predicting = Predicting(settings, self._foreseen.extend) if here else None
-        self._by_source = self._collector is not None and settings.recorder.rate_hz == 0
         self._own = OwnRobot(self._own_ready, self._own_failed)
         self._desk_units(kept)
         self.theme = Theme(
@@ -145,9 +118,7 @@ class App:
         self._robots = settings.robots
 
     def __enter__(self) -> "App":
-        (self._collector or self.network).__enter__()
-        if self._predicting is not None:
-            self._predicting.__enter__()
+        self.feeds.__enter__()
         for name, robot in self._robots.items():
             self.follow(name, robot.where)
         self._timer.start()
@@ -157,26 +128,23 @@ class App:
         self._timer.stop()
         self._own.close()
         self._ended = self._archive.close(BREAK_OFF_S)
-        if self._elsewhere is not None:
-            self._elsewhere.close()
-        (self._collector or self.network).__exit__(*exc)
-        if self._predicting is not None:
-            self._predicting.__exit__(*exc)
+        self.feeds.__exit__(*exc)
 
     @property
     def hangs(self) -> bool:
         """Whether something still runs after all was ended, which only the end of the process ends."""
-        return not self._ended or (self._collector is not None and self._collector.hangs)
+        return not self._ended or self.feeds.hangs
 
     def follow(self, name: str, address: Address) -> Station:
         """Another robot, from now on."""
         mailbox = Mailbox()
-        link = Link(self.network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
+        network = self.feeds.network
+        link = Link(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
         station.predictions.off = not self._foresees
         self._mailboxes[name] = mailbox
-        tasks = (self.network.run(link.run()), self._follow_feed(name, address))
-        self._followed.append(Followed(station, mailbox, tasks, Ticks() if self._by_source else None))
+        self._followed.append(Followed(station, mailbox, network.run(link.run()), Ticks()))
+        self.feeds.follow(name, address)
         self.desk.add(station)
         return station
 
@@ -191,49 +159,18 @@ class App:
         """Take what has come, and draw."""
         for followed in self._followed:
             events = followed.mailbox.drain()
-            followed.station.take(events if followed.ticks is None else followed.ticks.take(events))
-            for task in followed.tasks:
-                if task.done() and not task.cancelled():
-                    task.result()  # it ends only by a mistake of ours, which must not stay unseen
+            followed.station.take(followed.ticks.take(events) if self.feeds.by_source else events)
+            if followed.link.done():
+                followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
         stations = {station.name: station for station in self.desk}
         for foreseen in [self._foreseen.popleft() for _ in range(len(self._foreseen))]:
             stations[foreseen.robot].foresee(foreseen)
-        if self._collector is not None:
-            self._collector.wait(0.0)
-        self.desk.recording.look()
+        self.feeds.look(self.desk.recording)
         self.window.refresh()
 
-    # --- recording
-
-    def _collect(self, settings: ServerSettings, record: Record) -> tuple[Collector | None, str]:
-        """A collector, or why there can be none."""
-        following = shown_and_recorded(settings.recorder)
-        nobody = replace(settings, robots={})  # each is told when the window follows it
-        try:
-            return Collector(
-                nobody, record.operator, record.notes, following, self._show, self._foreseen.extend
-            ), ""
-        except SpoolUnusable as error:
-            return None, str(error)
-
-    def _recording(self, keeper: Collector | Elsewhere | None, why: str) -> Recording:
-        by = {Collector: By.WINDOW, Elsewhere: By.OTHER}.get(type(keeper), By.NOBODY)
-        return Recording(by, keeper, self._poster.deliver, self.desk.news, why)
-
-    def _follow_feed(self, name: str, address: Address) -> "concurrent.futures.Future[None]":
-        if self._collector is not None:
-            return self._collector.follow(name, address)
-        return self.network.run(Feed(address, functools.partial(self._shown, name), self._following).run())
-
-    def _shown(self, robot: str, event: Event) -> None:
-        """What is not recorded, in the network's thread."""
-        if self._predicting is not None:
-            self._predicting.take(robot, event)
-        self._mailboxes[robot].put(event)
-
     def _show(self, robot: str, event: Event) -> None:
-        """What was kept is shown; in the network's thread. The table of processes has a look of its own."""
-        self._mailboxes[robot].put(without_processes(event))
+        """What has come; in the network's thread."""
+        self._mailboxes[robot].put(event)
 
     # --- the simulated robot
 
@@ -251,13 +188,6 @@ class App:
         by_si = kept.value("units")
         if isinstance(by_si, dict):
             self.desk.shown.units = Units(by_si=by_si)
-
-
-def shown_and_recorded(recorder: RecordingSettings) -> Following:
-    """What is asked of a robot that this window shows and records: by one link, once."""
-    resources_s = min(recorder.resources_s, RESOURCES_S)
-    shown = replace(whole(recorder), client="gwrms gui", look_s=FOLLOWING.look_s)
-    return replace(shown, resources_s=resources_s, journal_s=FOLLOWING.journal_s)
 
 
 def run(

@@ -29,7 +29,8 @@ def main(argv: list[str]) -> int:
     settings = add_robots(load(arguments.config), dict(arguments.robot))
     prefer_x()
     check()
-    from server_gui.app import Record, run
+    from server_gui.app import run
+    from server_gui.core.desk.feeds import Record
     from server_gui.views.theme import Look
 
     look = None if arguments.look is None else Look(arguments.look)

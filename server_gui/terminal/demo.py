@@ -59,7 +59,8 @@ def run(options: Options) -> int:
 
 def _window(address: str, seconds: float | None, folder: Path) -> int:
     """What it records stays in the demo's folder: nothing simulated comes among real recordings."""
-    from server_gui.app import Record, run  # Qt is only here when it is wanted
+    from server_gui.app import run  # Qt is only here when it is wanted
+    from server_gui.core.desk.feeds import Record
 
     store = StoreSettings((folder / "store").absolute().as_uri())
     recorder = RecordingSettings(spool=folder / "spool", batch_s=DEMO_BATCH_S)

@@ -8,7 +8,8 @@ from PySide6.QtCore import QSettings
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from server_gui.app import FOLLOWING, App, Record
+from server_gui.app import FOLLOWING, App
+from server_gui.core.desk.feeds import Record
 from server_gui.core.settings import ServerSettings
 from tests.gui.fakes import destroy
 

@@ -1,6 +1,7 @@
 """What the window says of recording, and that it records: once, in one store, and not where another does."""
 
 import concurrent.futures
+import contextlib
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -13,9 +14,11 @@ from PySide6.QtWidgets import QApplication
 from gateway.client import Address
 from ml.store import Store
 from ml.store.tables import TELEMETRY
-from server_gui.app import App, Record
+from server_gui.app import App
+from server_gui.core.desk import feeds
+from server_gui.core.desk.feeds import Record
 from server_gui.core.desk.news import News
-from server_gui.core.desk.recording import By, Recording, Tone
+from server_gui.core.desk.recording import SOON, By, Recording, Tone
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.statistics import LinkStatistics
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
@@ -122,7 +125,7 @@ def test_a_robot_that_the_other_program_does_not_follow_is_said_not_to_be_record
 def test_nobody_who_answers_is_bad_and_nobody_at_all_is_said() -> None:
     recording, _ = looked(FakeKeeper(ConnectionError("gone")), By.OTHER, "the folder cannot be used")
     said = recording.said(ADDRESS)
-    assert (said.tone, said.detail) == (Tone.BAD, "the folder cannot be used")
+    assert (said.tone, said.detail) == (Tone.BAD, f"{SOON}: the folder cannot be used")
     nobody = Recording(By.NOBODY, None, lambda call: call(), News(), "to show only")
     assert (nobody.said(None).tone, nobody.said(None).text) == (Tone.OFF, "Not recording")
 
@@ -207,8 +210,56 @@ def test_where_a_collector_records_the_window_shows_and_says_who_records(
     assert "here" in Store(settings.store.url).dataset("events").to_table()["text"].to_pylist()
 
 
+def test_the_window_records_when_whoever_did_has_ended(
+    qt: QApplication,
+    settings: ServerSettings,
+    kept: QSettings,
+    robot: FakeRobot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(feeds, "GIVE_WAY_S", 0.1)
+    with contextlib.ExitStack() as other:
+        other.enter_context(Collector(settings))
+        with running(qt, settings, kept, Record("Ada", "after")) as app:
+            recording, station = app.desk.recording, app.desk.stations[0]
+            wait(lambda: recording.report is not None and not station.robot.is_stale(), "asked the collector")
+            before = len(station.rings.times(60.0))
+            other.close()
+            wait(lambda: recording.by is By.WINDOW, "took over")
+            wait(lambda: rows(app, "exo-01") > 20, "recorded")
+            assert recording.said(station.address).tone is Tone.GOOD
+            assert len(station.rings.times(60.0)) > before > 0, "what was shown stays"
+            recording.mark("mine")
+            wait(lambda: any("marked in" in item.text for item in app.desk.news.items), "marked")
+            told = [item.text for item in app.desk.news.items]
+            assert sum("this window does from now on" in text for text in told) == 1
+    store = Store(settings.store.url)
+    sessions = {row["session"]: row["operator"] for row in store.dataset("sessions").to_table().to_pylist()}
+    assert sorted(sessions.values()) == ["", "Ada"]
+    recorded = store.dataset(TELEMETRY.location("exo-01", 1)).to_table(["session", "stamp_ns"]).to_pylist()
+    stamps = [(row["session"], row["stamp_ns"]) for row in recorded]
+    assert len(stamps) == len(set(stamps)), "no row is there twice"
+    assert {session for session, _ in stamps} == set(sessions)
+    assert "mine" in store.dataset("events").to_table()["text"].to_pylist()
+
+
+def test_a_window_that_only_shows_never_records(
+    qt: QApplication, settings: ServerSettings, kept: QSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(feeds, "GIVE_WAY_S", 0.0)
+    with running(qt, settings, kept) as app:
+        wait(lambda: not app.desk.stations[0].robot.is_stale(), "was live")
+        assert app.desk.recording.said(None).text == "Not recording"
+        with Collector(settings):
+            pass  # the spool was free
+
+
 def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
-    qt: QApplication, settings: ServerSettings, kept: QSettings, tmp_path: Path
+    qt: QApplication,
+    settings: ServerSettings,
+    kept: QSettings,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (tmp_path / "spool").write_text("no folder")
     with running(qt, settings, kept, Record()) as app:
@@ -218,3 +269,6 @@ def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
         said = app.desk.recording.said(station.address)
         assert (said.tone, said.text) == (Tone.BAD, "NOT RECORDING")
         assert "cannot be used" in said.detail
+        monkeypatch.setattr(feeds, "GIVE_WAY_S", 0.0)
+        (tmp_path / "spool").unlink()
+        wait(lambda: rows(app, "exo-01") > 0, "recorded, once it could")

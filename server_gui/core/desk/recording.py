@@ -14,6 +14,7 @@ from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.recording.recorder import AlarmKind
 
 LOOK_NS: Final = 1_000_000_000  # between looks
+SOON: Final = "this window records as soon as it can"
 WHO: Final = "recording"  # what the news name instead of a robot
 STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
 
@@ -73,6 +74,7 @@ class Recording:
         self._news = news
         self._asked_ns: int | None = None
         self._asking = False
+        self._alone_since_ns: int | None = None  # when whoever records elsewhere did not answer any more
         self._trouble: dict[str, str] = {}  # kind → what was told of it
 
     def look(self) -> None:
@@ -82,12 +84,29 @@ class Recording:
         if self._keeper is None or self._asking or not due:
             return
         self._asked_ns, self._asking = now_ns, True
-        when_done(self._keeper.report(), self._deliver, self._reported, self._failed)
+        keeper = self._keeper
+        when_done(
+            keeper.report(),
+            self._deliver,
+            lambda report: self._reported(keeper, report),
+            lambda error: self._failed(keeper, error),
+        )
 
     @property
     def can_ask(self) -> bool:
         """Whether there is somebody to mark and upload."""
         return self._keeper is not None and self.problem is None
+
+    def is_alone(self, for_s: float) -> bool:
+        """Whether nobody has recorded for so long, as far as one can ask."""
+        since_ns = self._alone_since_ns
+        return since_ns is not None and time.monotonic_ns() - since_ns >= for_s * 1e9
+
+    def taken_over(self, keeper: Keeper) -> None:
+        """Nobody else records any more, and this window does from now on."""
+        self.by, self._keeper, self.why = By.WINDOW, keeper, ""
+        self.report, self.problem, self._alone_since_ns, self._asking = None, None, None, False
+        self._news.add(NewsKind.STATE, WHO, "nobody else records any more: this window does from now on")
 
     def mark(self, text: str) -> None:
         """Mark this instant in every robot's recording."""
@@ -103,7 +122,7 @@ class Recording:
         if self._keeper is None:
             return Said(Tone.OFF, "Not recording", self.why)
         if self.problem is not None:
-            return Said(Tone.BAD, "NOT RECORDING", self.why or self.problem)
+            return Said(Tone.BAD, "NOT RECORDING", f"{SOON}: {self.why or self.problem}")
         if report is None:
             return Said(Tone.OFF, "Recording: not known yet", self.why)
         stopped = [alarm.text for alarm in report.recorder.alarms if alarm.kind in STOPPED]
@@ -130,8 +149,11 @@ class Recording:
             Tone.WARNING if problems else Tone.GOOD, " · ".join(facts), "\n".join(filter(None, detail))
         )
 
-    def _reported(self, report: CollectorReport) -> None:
+    def _reported(self, keeper: Keeper, report: CollectorReport) -> None:
+        if keeper is not self._keeper:
+            return
         self._asking, self.report, self.problem = False, report, None
+        self._alone_since_ns = None
         now = {alarm.kind.value: alarm.text for alarm in report.recorder.alarms}
         now |= {} if report.uploader.problem is None else {"store": report.uploader.problem}
         for kind in now.keys() - self._trouble.keys():
@@ -140,8 +162,13 @@ class Recording:
             self._news.add(NewsKind.STATE, WHO, f"over: {self._trouble[kind]}")
         self._trouble = now
 
-    def _failed(self, error: Exception) -> None:
+    def _failed(self, keeper: Keeper, error: Exception) -> None:
+        if keeper is not self._keeper:
+            return
         self._asking, self.report, self.problem = False, None, str(error)
+        if self.by is By.OTHER and self._alone_since_ns is None:
+            self._alone_since_ns = time.monotonic_ns()
+            self._news.add(NewsKind.WARNING, WHO, f"nobody else records any more; {SOON}")
 
     def _ask(self, ask: Callable[[Keeper], "Future[int]"], done: Callable[[int], str]) -> None:
         if self._keeper is None:

@@ -1,0 +1,191 @@
+"""How robots' facts come to the window, and who records and predicts on the way.
+
+The window's own collector does, which keeps what comes before it is shown. While another program records into
+the same spool, the window follows robots without; it takes over when that program has ended.
+"""
+
+import concurrent.futures
+import functools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Self
+
+from msgspec.structs import replace
+
+from gateway.client import Address
+from server_gui.core.desk.answers import Deliver
+from server_gui.core.desk.news import News
+from server_gui.core.desk.recording import By, Recording
+from server_gui.core.events import Event, without_processes
+from server_gui.core.feed import Feed, Following
+from server_gui.core.fleet.collector import Collector, whole
+from server_gui.core.fleet.elsewhere import Elsewhere
+from server_gui.core.network import Network
+from server_gui.core.prediction.news import Foreseen
+from server_gui.core.prediction.predicting import Predicting
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.settings import RecordingSettings, ServerSettings
+
+RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
+GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first
+AGAIN_S: Final = 1.0  # between attempts
+
+Show = Callable[[str, Event], None]  # in the network's thread
+Foresee = Callable[[Sequence[Foreseen]], None]  # in the thread that predicts
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """That the window records what it shows; who does so, and why."""
+
+    operator: str = ""
+    notes: str = ""
+
+
+class Feeds:
+    """For the window's thread; use it as a context manager, which ends every thread.
+
+    Without `record` it only shows. `network` is for other links, too.
+    """
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        following: Following,
+        record: Record | None,
+        show: Show,
+        foresee: Foresee,
+    ) -> None:
+        self._settings = settings
+        self._following = following
+        self._record = record
+        self._show = show
+        self._foresee = foresee
+        self._robots: dict[str, Address] = {}
+        self._tasks: list[concurrent.futures.Future[None]] = []  # that follow them where no collector does
+        self._tried_s = 0.0
+        self._ending = concurrent.futures.ThreadPoolExecutor(1, "ending")
+        self._collector, self._why = self._collect()
+        self._own: Network | None = None
+        self._elsewhere: Elsewhere | None = None
+        self._predicting: Predicting | None = None
+        if self._collector is not None:
+            self.network = self._collector.network
+        else:
+            self.network = self._own = Network()
+            self._elsewhere = None if record is None else Elsewhere(settings.recorder.spool)
+            self._predicting = Predicting(settings, foresee) if settings.prediction.enabled else None
+
+    def __enter__(self) -> Self:
+        for part in (self._collector, self._own, self._predicting):
+            if part is not None:
+                part.__enter__()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        for part in (self._collector, self._own):
+            if part is not None:
+                part.__exit__(*exc)
+        self._end_showing_only()
+        self._ending.shutdown()
+
+    @property
+    def hangs(self) -> bool:
+        """Whether something still runs after all was ended, which only the end of the process ends."""
+        return self._collector is not None and self._collector.hangs
+
+    @property
+    def by_source(self) -> bool:
+        """Whether single sources' samples come, which views cannot draw."""
+        return self._collector is not None and self._settings.recorder.rate_hz == 0
+
+    def recording(self, deliver: Deliver, news: News) -> Recording:
+        """What there is to say of who records; `look` keeps it right."""
+        keeper = self._collector or self._elsewhere
+        by = {Collector: By.WINDOW, Elsewhere: By.OTHER}.get(type(keeper), By.NOBODY)
+        return Recording(by, keeper, deliver, news, self._why)
+
+    def follow(self, name: str, address: Address) -> None:
+        """Another robot, from now on."""
+        self._robots[name] = address
+        if self._collector is not None:
+            self._tasks.append(self._collector.follow(name, address))
+        else:
+            feed = Feed(address, functools.partial(self._shown, name), self._following)
+            self._tasks.append(self.network.run(feed.run()))
+
+    def look(self, recording: Recording) -> None:
+        """Now and then: see how it goes, and record where nobody does any more."""
+        for task in self._tasks:
+            if task.done() and not task.cancelled():
+                task.result()  # it ends only by a mistake of ours, which must not stay unseen
+        if self._collector is not None:
+            self._collector.wait(0.0)
+        elif self._record is not None and recording.is_alone(GIVE_WAY_S):
+            self._take_over(recording)
+        recording.look()
+
+    # --- inside
+
+    def _collect(self) -> tuple[Collector | None, str]:
+        """A collector, or why there can be none."""
+        if self._record is None:
+            return None, "the window was started to show only"
+        following = shown_and_recorded(self._following, self._settings.recorder)
+        nobody = replace(self._settings, robots={})  # each is told when the window follows it
+        operator, notes = self._record.operator, self._record.notes
+        try:
+            return Collector(nobody, operator, notes, following, self._kept, self._foresee), ""
+        except SpoolUnusable as error:
+            return None, str(error)
+
+    def _take_over(self, recording: Recording) -> None:
+        """Record from now on, if the spool can be had: it is given to one at a time."""
+        now_s = time.monotonic()
+        if now_s - self._tried_s < AGAIN_S:
+            return
+        self._tried_s = now_s
+        collector, recording.why = self._collect()
+        if collector is None:
+            return
+        collector.__enter__()
+        self._collector = collector  # what the feeds of before still tell is dropped from now on
+        for task in self._tasks:
+            task.cancel()
+        self._tasks = [collector.follow(name, address) for name, address in self._robots.items()]
+        self._end_showing_only()
+        recording.taken_over(collector)
+
+    def _end_showing_only(self) -> None:
+        """In a thread: it may take a while."""
+        predicting, elsewhere = self._predicting, self._elsewhere
+        self._predicting = self._elsewhere = None
+        if elsewhere is not None:
+            self._ending.submit(elsewhere.close)
+        if predicting is not None:
+            self._ending.submit(predicting.__exit__)
+
+    def _shown(self, robot: str, event: Event) -> None:
+        """What is not recorded."""
+        predicting = self._predicting
+        if self._collector is not None:
+            return
+        if predicting is not None:
+            predicting.take(robot, event)
+        self._show(robot, event)
+
+    def _kept(self, robot: str, event: Event) -> None:
+        """What was kept is shown. The table of processes has a look of its own."""
+        self._show(robot, without_processes(event))
+
+
+def shown_and_recorded(shown: Following, recorder: RecordingSettings) -> Following:
+    """What is asked of a robot that the window shows and records: by one link, once."""
+    return replace(
+        whole(recorder),
+        client=shown.client,
+        look_s=shown.look_s,
+        resources_s=min(recorder.resources_s, RESOURCES_S),
+        journal_s=shown.journal_s,
+    )
