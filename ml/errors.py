@@ -7,3 +7,7 @@ class UnusableData(Exception):
 
 class UnusableModel(ValueError):
     """A model cannot be used here; the message says which, what is wrong with it, and what to do."""
+
+
+class Overtaken(UnusableModel):
+    """Another model serves by now than the one that it was to take the place of; the message says which."""

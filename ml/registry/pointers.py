@@ -5,6 +5,7 @@ So two who promote at once both find their place in the history, and neither und
 
 import contextlib
 import re
+from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
@@ -63,8 +64,10 @@ class Pointers:
         last = self._last()
         return self._read(last) if last else None
 
-    def promote(self, model: str, who: str, why: str) -> Pointer:
+    def promote(self, model: str, who: str, why: str, check: Callable[[], None] = lambda: None) -> Pointer:
         """Let this model serve, after whatever is promoted at the same time; nothing new where it does.
+
+        What `check` has found to be so when it raised nothing, of what is kept here, is so until then.
 
         Raises:
             UnusableModel: others promote without end.
@@ -75,6 +78,7 @@ class Pointers:
             with contextlib.suppress(UnusableModel):  # a damaged one is what this remedies
                 if last and (now := self._read(last)).model == model:
                     return now
+            check()  # who changes something after that takes our number
             pointer = Pointer(model, datetime.now(UTC), who, why, before=last)
             if self._create(last + 1, pointer):
                 return pointer

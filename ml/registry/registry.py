@@ -6,12 +6,13 @@ models/serving/<task>/<robot, or _all>/<n>.json
 
 import hashlib
 from collections.abc import Iterator, Set
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
-from ml.errors import UnusableModel
+from ml.errors import Overtaken, UnusableModel
 from ml.registry.card import Card, checked_name, content_id, decoded, encoded
 from ml.registry.code import features_hash
 from ml.registry.lasting import create
@@ -145,10 +146,13 @@ class Registry:
         ]
         return max(fitting, key=lambda card: (len(card.channels), card.made)).id if fitting else None
 
-    def promote(self, model: str, robot: str = "", *, who: str, why: str) -> Pointer:
+    def promote(self, model: str, robot: str = "", *, who: str, why: str, over: str | None = None) -> Pointer:
         """Let a model serve one robot, or all that have no model of their own.
 
+        With `over` only in the place of that model, or of none where it is empty.
+
         Raises:
+            Overtaken: another one than `over` serves now; it stays.
             UnusableModel: it cannot be loaded, or was adapted to another robot; what serves stays.
 
         """
@@ -158,7 +162,8 @@ class Registry:
         if model in self.shipped():  # the next version of GWRMS may bring another in its place
             for name in (*card.sha256, CARD):
                 self._create(model, name, self.file(model, name))
-        return Pointers(self._objects, card.task, robot).promote(model, who, why)
+        check = partial(self._check_serves, card, robot, over)
+        return Pointers(self._objects, card.task, robot).promote(model, who, why, check)
 
     def rollback(self, task: str, robot: str = "", *, who: str, why: str = "") -> Pointer:
         """Let that serve which did before; after another rollback, what did before that.
@@ -189,6 +194,17 @@ class Registry:
                 yield task, robot, now
 
     # --- inside
+
+    def _check_serves(self, card: Card, robot: str, over: str | None) -> None:
+        if over is None:
+            return
+        now = self.serving(card.task, robot, set(card.channels)) or ""
+        if now != over:
+            raise Overtaken(
+                f"{card.id} was to serve {robot or 'every robot'} in the place of {over or 'nothing'}, and "
+                f"{now or 'nothing'} serves by now (gwrms models history {card.task}): train again, or "
+                "gwrms models promote without --instead-of"
+            )
 
     def _places(self) -> Iterator[Objects]:
         yield self._objects

@@ -41,6 +41,7 @@ class Trained:
     learned: Learned
     card: Card
     serving: str  # the model that it was compared with; "" where nothing serves
+    over: str  # what served then, which it may take the place of; "" for nothing
     held_out: Judged
     regression: Judged | None
     decision: Decision
@@ -98,7 +99,7 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     if not regression:
         remarks.append("there is no regression set to judge by (gwrms label SESSION --regression)")
     card = _card(found, learned, lessons, [*judges, *regression], people.new)
-    return _trained(learned, card, serving, people, fixed, left_out, remarks)
+    return _trained(learned, card, serving, serving, people, fixed, left_out, remarks)
 
 
 def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
@@ -112,14 +113,15 @@ def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
     parts, left_out = found.parts(base.learned.recipe)
     walk = divided([each for each in parts if not each.regression])
     learned = adapted(base.learned, walk.early, SEED)
-    serving = _serving(registry, found.task, wish.robot, base.learned.recipe) or base
+    serves = _serving(registry, found.task, wish.robot, base.learned.recipe)
+    serving = serves or base
     its = _its_parts(found, serving, base.learned.recipe, walk.later)
     later = judge("later walking", learned, walk.later, serving.learned, its)
     old, new = (judge("alone", each, walk.later, None, ()).new for each in (base.learned, learned))
     card = _card(found, learned, walk.early, walk.later, later.new)
     card = replace(card, robot=wish.robot, parent=base.name, source=_both(card.source, base.card.source))
     nothing = Judged("regression set", 0, Metrics(), None)
-    return _trained(learned, card, serving, later, nothing, left_out, [_cut(old, new)])
+    return _trained(learned, card, serving, serves, later, nothing, left_out, [_cut(old, new)])
 
 
 def told(left_out: LeftOut) -> str:
@@ -246,6 +248,7 @@ def _trained(
     learned: Learned,
     card: Card,
     serving: _Model | None,
+    over: _Model | None,
     people: Judged,
     fixed: Judged,
     left_out: Sequence[LeftOut],
@@ -262,6 +265,7 @@ def _trained(
         learned,
         card,
         "" if serving is None else serving.name,
+        "" if over is None else over.name,
         people,
         regression,
         decide(learned.task, people, regression),

@@ -37,7 +37,7 @@ A model's name may be cut off where it is unique. gwrms models COMMAND --help sa
 """
 PROMOTE_EPILOG: Final = """Servers that run take it within seconds, without a restart. A model that cannot be
 verified is refused, and what serves goes on. `gwrms train --promote` does this where a model is judged
-better.
+better. With --instead-of it is refused where meanwhile another one serves than the one that you know of.
 
 examples
   gwrms models promote activity-5f0c
@@ -45,6 +45,7 @@ examples
 ROLLBACK_EPILOG: Final = """Said again, it goes back further. Before the first model of a robot's own serves
 that for all robots, and before the first of these what comes with GWRMS."""
 EVERY: Final = "every robot"
+NOTHING: Final = "nothing"  # that serves
 
 
 def main(argv: list[str]) -> int:
@@ -135,6 +136,9 @@ def promote(argv: list[str]) -> int:
     """Run `gwrms models promote`."""
     made = _parser("promote", "Let a model serve.", PROMOTE_EPILOG)
     made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
+    made.add_argument(
+        "--instead-of", metavar="MODEL", help=f"only while this one serves; {NOTHING}: only while none does"
+    )
     _add_who(made, "this robot alone")
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
@@ -143,7 +147,9 @@ def promote(argv: list[str]) -> int:
     if arguments.robot and arguments.robot not in known:
         close = did_you_mean(arguments.robot, known)
         warn("models", f"the server's file has no robot {arguments.robot!r}{close}")
-    done = registry.promote(model, arguments.robot, who=arguments.who, why=arguments.why)
+    old = arguments.instead_of
+    over = "" if old == NOTHING else old and _named(registry, old)
+    done = registry.promote(model, arguments.robot, who=arguments.who, why=arguments.why, over=over)
     return _tell(arguments, registry.card(model).task, done)
 
 

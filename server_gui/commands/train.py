@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from gateway.cli.text import NONE, say, say_json, table
+from ml.errors import Overtaken
 from ml.registry.card import Metrics
 from ml.registry.registry import Registry
 from ml.robot.task import TASKS
@@ -13,6 +14,7 @@ from ml.training.judging import Judged
 from ml.training.material import Wish
 from ml.training.training import Trained, told, train
 from server_gui.commands.cloud_reach import add_url, parser, url
+from server_gui.commands.models import NOTHING
 
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
 EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
@@ -21,7 +23,8 @@ label SESSION --wearer NAME; else each session counts as somebody. Sessions of t
 learned from, and judge every model.
 
 The model is published (gwrms models ls), and with --promote it serves: where it is better on the held-out
-people than the model that serves now, and nowhere much worse. gwrms models rollback takes that back.
+people than the model that serves now, and nowhere much worse; and where that one still serves at its end.
+gwrms models rollback takes that back.
 
 examples
   gwrms train activity
@@ -48,17 +51,31 @@ def main(argv: list[str]) -> int:
     registry = Registry(url(arguments))
     trained = train(registry, wish, arguments.cluster)
     model = registry.publish(trained.learned.state(), trained.card)
-    promoted = arguments.promote and trained.decision.better
-    if promoted:
-        registry.promote(model, arguments.robot, who=getpass.getuser(), why="; ".join(trained.decision.why))
+    promoted, overtaken = _promoted(registry, model, trained, arguments)
     if arguments.json:
-        say_json(_answer(model, trained, promoted=promoted))
+        say_json(_answer(model, trained, overtaken, promoted=promoted))
     else:
-        say("\n".join(_text(model, trained, arguments, promoted=promoted)))
+        say("\n".join(_text(model, trained, overtaken, arguments, promoted=promoted)))
     return 0 if promoted or not arguments.promote else 1
 
 
-def _text(model: str, trained: Trained, arguments: argparse.Namespace, *, promoted: bool) -> Iterator[str]:
+def _promoted(
+    registry: Registry, model: str, trained: Trained, arguments: argparse.Namespace
+) -> tuple[bool, str]:
+    """Whether it serves now; why not, where it was better but something else serves since it was judged."""
+    if not (arguments.promote and trained.decision.better):
+        return False, ""
+    who, why = getpass.getuser(), "; ".join(trained.decision.why)
+    try:
+        registry.promote(model, arguments.robot, who=who, why=why, over=trained.over)
+    except Overtaken as error:
+        return False, str(error)
+    return True, ""
+
+
+def _text(
+    model: str, trained: Trained, overtaken: str, arguments: argparse.Namespace, *, promoted: bool
+) -> Iterator[str]:
     card, decision = trained.card, trained.decision
     yield f"{model}: {card.recipe}, from {len(card.learned)} sessions; {card.notes}"
     yield f"compared with: {trained.serving or 'nothing, for nothing serves'}"
@@ -74,8 +91,11 @@ def _text(model: str, trained: Trained, arguments: argparse.Namespace, *, promot
     yield from (f"  {why}" for why in decision.why)
     if promoted:
         yield f"it serves now, for {arguments.robot or 'every robot without a model of its own'}"
+    elif overtaken:
+        yield f"not promoted: {overtaken}"
     elif decision.better:
-        yield f"let it serve: gwrms models promote {model}"
+        whom = f" --robot {arguments.robot}" if arguments.robot else ""
+        yield f"let it serve: gwrms models promote {model}{whom} --instead-of {trained.over or NOTHING}"
     yield ""
 
 
@@ -94,12 +114,13 @@ def _flat(metrics: Metrics) -> Mapping[str, float]:
     return found | {f"for {name}": value for name, value in metrics.per_subject.items()}
 
 
-def _answer(model: str, trained: Trained, *, promoted: bool) -> dict[str, Any]:
+def _answer(model: str, trained: Trained, overtaken: str, *, promoted: bool) -> dict[str, Any]:
     return {
         "model": model,
         "compared_with": trained.serving,
         "better": trained.decision.better,
         "promoted": promoted,
+        "overtaken": overtaken or None,
         "why": trained.decision.why,
         "held_out": trained.held_out,
         "regression": trained.regression,

@@ -100,6 +100,17 @@ def test_a_rollback_brings_back_what_served_before(desk: Desk) -> None:
     assert [each["model"] for each in desk.ask("history", "falling")] == [one.id, other.id, one.id, ""]
 
 
+def test_a_model_takes_the_place_of_the_one_that_is_named_or_of_none(desk: Desk) -> None:
+    one, other = desk.publish(), desk.publish(seed=1)
+    shipped = desk.ask("ls")["models"][0]["id"]
+    said = desk.run("promote", one.id, "--instead-of", "nothing", status=1)
+    assert f"in the place of nothing, and {shipped} serves by now (gwrms models history falling)" in said
+    desk.run("promote", one.id, "--instead-of", shipped[:12])
+    said = desk.run("promote", other.id, "--instead-of", shipped, status=1)
+    assert f"in the place of {shipped}, and {one.id} serves by now" in said
+    assert [each["model"] for each in desk.ask("history", "falling")] == [one.id]
+
+
 def test_a_model_is_shown_with_all_that_says_how_far_to_trust_it(desk: Desk) -> None:
     rows, truth = features(seed=5)
     model = learned()

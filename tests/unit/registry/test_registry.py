@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from ml.errors import UnusableModel
+from ml.errors import Overtaken, UnusableModel
 from ml.registry import archive
 from ml.registry.card import Card, Metrics, Source, TableVersion, content_id, encoded
 from ml.registry.pointers import Pointers
@@ -342,6 +342,44 @@ def test_all_who_promote_at_once_are_in_the_history(store_url: str) -> None:
     assert sorted(now.model for now in history) == sorted(models)
     assert [now.before for now in history] == [0, 1, 2]
     assert serves(registry) == history[-1].model
+
+
+def test_of_several_who_replace_the_same_model_at_once_one_does(store_url: str) -> None:
+    registry = Registry(store_url, NOWHERE)  # not a fixture: its connections end with it
+    first, *others = (published(registry, seed=seed) for seed in range(3))
+    registry.promote(first, **BY, over="")
+    start = threading.Barrier(2)
+
+    def promote(model: str) -> str:
+        own = Registry(registry.url, NOWHERE)
+        start.wait()
+        try:
+            own.promote(model, **BY, over=first)
+        except Overtaken as error:
+            return str(error)
+        return model
+
+    with ThreadPoolExecutor(2) as pool:
+        told = list(pool.map(promote, others))
+    winner = serves(registry)
+    assert [now.model for now in registry.history("falling")] == [first, winner]
+    assert told.count(str(winner)) == 1
+    assert sum(f"in the place of {first}, and {winner} serves by now" in one for one in told) == 1
+
+
+def test_a_model_for_one_robot_takes_the_place_of_that_for_all_only_while_it_serves(
+    in_folder: Registry,
+) -> None:
+    one, other, own = (published(in_folder, seed=seed) for seed in range(3))
+    in_folder.promote(one, **BY)
+    with pytest.raises(Overtaken, match=f"the place of nothing, and {one} serves"):
+        in_folder.promote(own, "exo-01", **BY, over="")
+    in_folder.promote(other, **BY)
+    with pytest.raises(Overtaken, match=f"exo-01 in the place of {one}, and {other} serves"):
+        in_folder.promote(own, "exo-01", **BY, over=one)
+    in_folder.promote(own, "exo-01", **BY, over=other)
+    assert serves(in_folder, "exo-01") == own
+    assert serves(in_folder) == other
 
 
 def test_of_two_who_roll_back_at_once_one_is_told(in_folder: Registry) -> None:

@@ -4,9 +4,14 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from gateway import main
 from ml.registry.registry import Registry
+from ml.training import training
+from ml.training.material import Wish
+from ml.training.training import Trained
+from server_gui.commands import train as command
 from tests.unit.training.walkers import day, put
 
 
@@ -39,6 +44,32 @@ def test_a_better_model_serves_and_an_equal_one_does_not(
     assert (told["model"], told["compared_with"], told["promoted"]) == (model, model, False)
     assert told["held_out"]["new"] == told["held_out"]["serving"]
     assert len(registry.history("activity", "exo")) == 1
+
+
+def test_a_model_that_another_one_has_overtaken_while_it_was_judged_is_not_promoted(
+    config: str,
+    folder_url: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    put(folder_url, tmp_path / "spool", [day(f"s{number}", number, each_s=5.0) for number in range(4)])
+    teach = training.train
+
+    def overtaken(registry: Registry, wish: Wish, cluster: str) -> Trained:
+        trained = teach(registry, wish, cluster)
+        faster = registry.publish(trained.learned.state(), replace(trained.card, notes="faster"))
+        registry.promote(faster, who="Ada", why="a test")
+        return trained
+
+    monkeypatch.setattr(command, "train", overtaken)
+    arguments = ["train", "activity", "--config", config, "--held-out", "s3", "--promote"]
+    assert main.main(arguments) == 1
+    said = capsys.readouterr().out
+    (pointer,) = Registry(folder_url).history("activity")
+    assert pointer.who == "Ada"
+    assert "better, and nowhere much worse" in said
+    assert f"in the place of nothing, and {pointer.model} serves by now" in said
 
 
 @pytest.mark.parametrize(
