@@ -1,4 +1,7 @@
-"""Stores for tests: a folder, and a real S3 server that is started for them."""
+"""Stores for tests: a folder, and a real S3 server that is started for them.
+
+Every test imports this file, so the store's libraries are imported only by those that ask for a store.
+"""
 
 import contextlib
 import gc
@@ -17,11 +20,6 @@ from typing import Self
 
 import msgspec
 import pytest
-
-from ml.store import Store
-from ml.store.objects import Objects
-from ml.store.store import About
-from ml.store.tables import EVENTS
 
 KEY, SECRET = "tests-key", "tests-secret-0123456789"
 BUCKET = "tests"
@@ -145,6 +143,9 @@ def _ports(count: int) -> list[int]:
 @pytest.fixture(scope="session")
 def store_libraries(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Their threads and wake-up sockets, which stay for as long as the process lives."""
+    from ml.store import Store
+    from ml.store.tables import EVENTS
+
     store = Store(tmp_path_factory.mktemp("first").as_uri())
     data = EVENTS.rows([{"robot": "nobody"}])
     store.append(EVENTS, "events", data.schema, data.to_reader, "tests", 1)
@@ -165,6 +166,8 @@ def backend(
     if request.param == "folder":
         yield None
         return
+    from ml.store import Store
+
     with SeaweedFS(tmp_path_factory.mktemp("seaweedfs")) as server:
         with pytest.MonkeyPatch.context() as patch:
             for name, value in server.environment.items():
@@ -190,5 +193,8 @@ def new_store_url(
 @pytest.fixture
 def store_url(new_store_url: str) -> str:
     """A store that is still empty, and known to keep writers apart: the probe takes seconds on SeaweedFS."""
+    from ml.store.objects import Objects
+    from ml.store.store import About
+
     Objects(new_store_url).create("store.json", msgspec.json.encode(About()))
     return new_store_url
