@@ -6,6 +6,7 @@ lives in a process of its own, forked before the module was imported.
 
 import ast
 import copy
+import gc
 import importlib
 import importlib.abc
 import importlib.machinery
@@ -14,17 +15,19 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 
 import canopen  # noqa: F401 - what takes long is imported once, here, and not in every child
-import hypothesis  # noqa: F401
 import psutil  # noqa: F401
 import pytest
+from hypothesis import Phase, settings
 
-# Hypothesis was imported before pytest could look at it.
-_OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
+# Only whether they pass is asked: nothing is rewritten, traced or searched for to say it better.
+_OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-p", "pytest_timeout", "--assert", "plain", "--tb", "no")
+settings.register_profile("noticed", phases=(Phase.explicit, Phase.generate), database=None)
 MOST_S = 60  # a mutant that makes a test hang is noticed too
 # What each operator becomes: where there is a boundary, its neighbour there, which is the hardest to notice.
 _COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -94,7 +97,7 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(self._code, vars(module))  # our own code, changed in one place
 
 
-def start(name: str, tree: ast.Module, path: str, tests: Sequence[str]) -> int:
+def start(name: str, tree: ast.Module, path: str, tests: Sequence[str], folder: str) -> int:
     """Run the tests in a child, with this in place of the module; its id. It ends with 0 if they pass."""
     child = os.fork()
     if child == 0:
@@ -102,8 +105,10 @@ def start(name: str, tree: ast.Module, path: str, tests: Sequence[str]) -> int:
         silence = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silence, 1)
         os.dup2(silence, 2)
+        os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+        settings.load_profile("noticed")
         sys.meta_path.insert(0, _Finder(name, tree, path))
-        os._exit(pytest.main([*_OPTIONS, *tests]))
+        os._exit(pytest.main([*_OPTIONS, "--basetemp", f"{folder}/{os.getpid()}", *tests]))
     return child
 
 
@@ -122,15 +127,17 @@ def main(name: str, *tests: str) -> None:
     if spec is None or spec.origin is None:
         raise SystemExit(f"there is no module {name}")
     tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
-    if os.waitpid(start(name, tree, spec.origin, tests), 0)[1]:
-        raise SystemExit(f"{', '.join(tests)}: do not pass with {name} as it is")
-    running: dict[int, str] = {}
-    for what, mutant in mutants(tree):
-        if len(running) >= (os.cpu_count() or 1):
+    gc.freeze()  # what is here already is no child's to collect
+    with tempfile.TemporaryDirectory() as folder:
+        if os.waitpid(start(name, tree, spec.origin, tests, folder), 0)[1]:
+            raise SystemExit(f"{', '.join(tests)}: do not pass with {name} as it is")
+        running: dict[int, str] = {}
+        for what, mutant in mutants(tree):
+            if len(running) >= (os.cpu_count() or 1):
+                _tell_next(running)
+            running[start(name, mutant, spec.origin, tests, folder)] = what
+        while running:
             _tell_next(running)
-        running[start(name, mutant, spec.origin, tests)] = what
-    while running:
-        _tell_next(running)
 
 
 def _tell_next(running: dict[int, str]) -> None:
