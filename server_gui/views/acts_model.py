@@ -14,23 +14,36 @@ from server_gui.views.parameters.tree import brief, exact
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.rows import SORT_ROLE, Index, RowsModel
 
-TITLES: Final = ("Time", "Robot", "Who", "What", "Of", "Old", "New", "Read back", "Unit", "What came of it")
-TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, OUTCOME = range(len(TITLES))
+TITLES: Final = (
+    "Time",
+    "Robot",
+    "Who",
+    "What",
+    "Of",
+    "Old",
+    "New",
+    "Read back",
+    "Unit",
+    "Told by",
+    "What came of it",
+)
+TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, TOLD_BY, OUTCOME = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, READ_BACK)
 BAD: Final = ("NOT ", "FAILED", "refused", "write taken back")  # in an outcome that is looked at first
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One act on one robot, and the unit that its values are shown in."""
+    """One act on one robot, the unit that its values are shown in, and who tells of it: robot or store."""
 
     robot: str
     act: Act
     unit: Unit
+    told_by: str
 
     @property
-    def key(self) -> tuple[str, int, str]:
-        return self.robot, self.act.n, self.act.thing
+    def key(self) -> tuple[str, str, str]:
+        return self.robot, self.act.hash, self.act.thing
 
 
 class ActsModel(RowsModel[Line]):
@@ -76,7 +89,7 @@ def _tip(line: Line) -> str:
     values = (
         f"{name} {exact(unit, value)} {unit.symbol}" for name, value in known.items() if value is not None
     )
-    return "\n".join((*values, act.outcome, f"entry {act.n} of the journal"))
+    return "\n".join((*values, act.outcome, f"entry {act.n} of the journal, told by the {line.told_by}"))
 
 
 _TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
@@ -89,6 +102,7 @@ _TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
     lambda line: _number(line, line.act.new),
     lambda line: _number(line, line.act.read_back),
     lambda line: line.unit.symbol if line.act.new is not None else "",
+    lambda line: line.told_by,
     lambda line: line.act.outcome,
 )
 

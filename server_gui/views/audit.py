@@ -2,7 +2,7 @@
 
 import csv
 import datetime
-from collections.abc import Iterable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -17,11 +17,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.desk.acts import acts
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
+from server_gui.core.desk.histories import History, histories
+from server_gui.core.desk.kept_journals import Found, KeptJournals
 from server_gui.core.desk.news import NewsKind
-from server_gui.core.desk.station import Station
 from server_gui.views.acts_model import OUTCOME, ROBOT, TIME, ActsModel, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
@@ -29,6 +29,8 @@ from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.rows import Filtered, Index, RowsTable
 
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
+MOST: Final = 4  # robots of which everything is said at once
+AWAY: Final = "What was collected before cannot be read now, and is tried again"
 CSV_TITLES: Final = (
     "utc",
     "robot",
@@ -40,6 +42,7 @@ CSV_TITLES: Final = (
     "new",
     "read_back",
     "unit",
+    "told_by",
     "outcome",
 )
 
@@ -70,13 +73,14 @@ class Chosen(Filtered):
 
 
 class Audit(QWidget):
-    """Every robot's journal as far as it has been read, newest first."""
+    """Every robot's journal as far as it has been read, newest first; with what is `kept` of it, if given."""
 
-    def __init__(self, desk: Desk, theme: Theme) -> None:
+    def __init__(self, desk: Desk, theme: Theme, kept: KeptJournals | None = None) -> None:
         super().__init__()
         self._desk = desk
+        self._kept = kept
         self._seen: tuple[object, ...] = ()
-        self._called: dict[str, Station] = {}
+        self._called: dict[str, History] = {}
         self.setObjectName("page")
         self.model = ActsModel(theme)
         self.chosen = Chosen(self.model)
@@ -111,13 +115,21 @@ class Audit(QWidget):
 
     def refresh(self) -> None:
         """Show what has come."""
-        self._called = {station.title: station for station in self._desk}
-        revisions = (station.audit.revision for station in self._called.values())
-        seen = (self._desk.shown.revision, *self._called.items(), *revisions)
+        if self._kept is not None:
+            self._kept.look()
+        kept = Found() if self._kept is None else self._kept.found
+        known = self._called
+        self._called = {
+            name: known[name] if known.get(name) == history else history
+            for name, history in histories(self._desk, kept).items()
+        }
+        seen = (kept.problem, self._desk.shown.revision, *self._called.items())
         if seen == self._seen:
             return
         self._seen = seen
-        self.model.take([line for name in self._called for line in self._lines(name)])
+        self.model.take(
+            [line for name, history in self._called.items() for line in self._lines(name, history)]
+        )
         self.table.setColumnHidden(ROBOT, len(self._called) < 2)
         _offer(self.robot, list(self._called))
         _offer(self.who, sorted({line.act.who for line in self.model.rows}))
@@ -134,22 +146,27 @@ class Audit(QWidget):
     def _export(self, path: Path) -> None:
         self._desk.news.add(NewsKind.STATE, "audit", save_whole(self.save_csv, path))
 
-    def _lines(self, name: str) -> Iterable[Line]:
-        station = self._called[name]
-        description, units = station.robot.description, self._desk.shown.units
-        infos = {} if description is None else {info.name: info for info in description.parameters}
-        for act in acts(station.audit.entries):
-            info = infos.get(act.thing)
-            si = "" if info is None else info.unit
-            yield Line(name, act, unit_of(act.thing, si, units))
+    def _lines(self, name: str, history: History) -> Iterator[Line]:
+        units = self._desk.shown.units
+        parameters = [] if history.description is None else history.description.parameters
+        si_of = {info.name: info.unit for info in parameters}
+        for act, told_by in history.acts:
+            yield Line(name, act, unit_of(act.thing, si_of.get(act.thing, ""), units), told_by)
 
     def _filter(self) -> None:
         robot = "" if self.robot.currentIndex() <= 0 else self.robot.currentText()
         who = "" if self.who.currentIndex() <= 0 else self.who.currentText()
         self.chosen.show(robot, who, self.words.text())
-        asked = {name: one.audit for name, one in self._called.items() if robot in ("", name)}
-        set_text(self.verdict, "\n".join(f"{name}: {audit.verdict}" for name, audit in asked.items()))
-        broken = any(audit.problem is not None for audit in asked.values())
+        asked = {name: history for name, history in self._called.items() if robot in ("", name)}
+        told = {name: one for name, one in asked.items() if len(asked) <= MOST or one.is_altered}
+        said = [f"{name}: {one.verdict}" for name, one in told.items()]
+        said += [f"{len(asked) - len(told)} robots: nothing altered; choose one for more"][
+            : len(asked) - len(told)
+        ]
+        problem = None if self._kept is None else self._kept.found.problem
+        said += [] if problem is None else [f"{AWAY}: {problem}"]
+        set_text(self.verdict, "\n".join(said))
+        broken = any(one.is_altered for one in asked.values())
         self.verdict.setProperty("tone", "bad" if broken else "good")
         self.verdict.style().polish(self.verdict)
 
@@ -189,4 +206,15 @@ def _cells(line: Line) -> tuple[object, ...]:
     act = line.act
     when = datetime.datetime.fromtimestamp(act.utc_ns / 1e9, datetime.UTC).isoformat(timespec="milliseconds")
     values = ("" if value is None else value for value in (act.old, act.new, act.read_back))
-    return (when, line.robot, act.n, act.who, act.what, act.thing, *values, line.unit.si, act.outcome)
+    return (
+        when,
+        line.robot,
+        act.n,
+        act.who,
+        act.what,
+        act.thing,
+        *values,
+        line.unit.si,
+        line.told_by,
+        act.outcome,
+    )

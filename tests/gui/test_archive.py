@@ -40,6 +40,7 @@ from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, destroy, walking
 from tests.gui.foreseen import predicted
+from tests.gui.journals import RobotsJournal
 from tests.gui.running import wait
 from tests.gui.test_recording import FakeKeeper, report
 
@@ -265,6 +266,20 @@ def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
     whole.until(lambda: "predicted" not in player.banner.text(), "jumped")
     whole.until(lambda: any(text.startswith("Not predicted") for text in lines.texts), "said so")
     assert not bench.station.predictions.told
+
+
+def test_the_audit_shows_the_journal_of_a_robot_that_is_away(
+    whole: Shown, window: MainWindow, settings: ServerSettings, tmp_path: Path
+) -> None:
+    (tmp_path / "robot").mkdir()
+    journal = RobotsJournal(tmp_path / "robot")
+    journal.say("stop", reason="STOP key")
+    with Spool(settings.recorder.spool, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        recorder.journal("exo-07", journal.told().journal.entries)
+    journal.close()
+    whole.open("Audit")
+    whole.until(lambda: window.audit.chosen.rowCount() == 1, "showed it")
+    assert "exo-07: collected were 1 entry" in window.audit.verdict.text()
 
 
 def test_the_bar_of_time_is_used_by_keys_and_by_mouse(

@@ -7,9 +7,23 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 
+from server_gui.core.desk.chains import chained, problem
+from server_gui.core.desk.kept_journals import Found, Kept, KeptJournals
 from server_gui.core.events import Journalled
 from server_gui.core.processing.units import Units
-from server_gui.views.acts_model import NEW, OLD, OUTCOME, READ_BACK, THING, TIME, UNIT, WHAT, WHO
+from server_gui.views.acts_model import (
+    NEW,
+    OLD,
+    OUTCOME,
+    READ_BACK,
+    ROBOT,
+    THING,
+    TIME,
+    TOLD_BY,
+    UNIT,
+    WHAT,
+    WHO,
+)
 from server_gui.views.audit import Audit
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, described, destroy
@@ -138,3 +152,81 @@ def test_a_robot_whose_journal_has_not_been_read_says_so(theme: Theme, bench: Be
     made = Audit(bench.desk, theme)
     made.refresh()
     assert made.verdict.text() == "exo-01: Nothing of the robot's journal has been read yet."
+
+
+# --- what was collected before
+
+
+class Collected(KeptJournals):
+    """Has what the test gives it."""
+
+    def __init__(self) -> None:
+        self.found = Found()
+
+    def look(self) -> None:
+        pass
+
+    def keep(self, robot: str, told: Journalled) -> None:
+        stretches = chained(told.journal.entries)
+        self.found = Found({**self.found.by_robot, robot: Kept(tuple(stretches), problem(stretches))})
+
+
+@pytest.fixture
+def collected() -> Collected:
+    return Collected()
+
+
+@pytest.fixture
+def whole(theme: Theme, bench: Bench, collected: Collected) -> Iterator[Audit]:
+    made = Audit(bench.desk, theme, collected)
+    made.show()
+    yield made
+    destroy(made)
+
+
+def test_what_the_store_has_is_shown_once_with_where_it_comes_from(
+    whole: Audit, bench: Bench, journal: RobotsJournal, collected: Collected
+) -> None:
+    collected.keep("exo-01", journal.told())
+    assert column(whole, TOLD_BY) == ["store"] * 3
+    newest = journal.told(2)
+    bench.station.take([newest])
+    assert column(whole, THING) == [ANGLE, "", STEP]
+    assert column(whole, TOLD_BY) == ["robot", "store", "store"]
+    assert whole.verdict.text() == (
+        "exo-01: Entries 4 to 5 are unaltered and in their places: the chain of hashes holds; "
+        "collected were 5 entries, unaltered, without a hole."
+    )
+
+
+def test_a_robot_that_is_away_is_there_by_what_was_collected_of_it(
+    whole: Audit, journal: RobotsJournal, collected: Collected
+) -> None:
+    collected.keep("exo-07", journal.told())
+    assert column(whole, ROBOT) == ["exo-07"] * 3
+    assert column(whole, NEW)[2] == "0.43", "in SI: nobody tells its unit"
+    whole.robot.setCurrentText("exo-07")
+    assert whole.verdict.text() == "exo-07: collected were 5 entries, unaltered, without a hole."
+
+
+def test_what_was_altered_on_the_robot_after_it_was_collected_shows(
+    whole: Audit, bench: Bench, journal: RobotsJournal, collected: Collected, tmp_path: Path
+) -> None:
+    collected.keep("exo-01", journal.told())
+    (tmp_path / "fork").mkdir()
+    lines = (tmp_path / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "fork" / "journal.jsonl").write_bytes(b"".join(lines[:2]))
+    fork = RobotsJournal(tmp_path / "fork")
+    fork.say("stop", reason="another one")
+    bench.station.take([fork.told()])
+    fork.close()
+    whole.refresh()
+    assert "robot and store differ, entry 3 is there in two versions" in whole.verdict.text()
+    assert whole.verdict.property("tone") == "bad"
+
+
+def test_a_store_that_is_away_is_said_calmly(whole: Audit, collected: Collected) -> None:
+    collected.found = Found(problem="s3://lab cannot be reached: Connection refused")
+    whole.refresh()
+    assert "cannot be read now, and is tried again: s3://lab cannot be reached" in whole.verdict.text()
+    assert whole.verdict.property("tone") == "good"

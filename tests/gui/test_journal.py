@@ -37,7 +37,16 @@ def test_a_write_is_told_with_old_new_and_what_was_read_back(journal: RobotsJour
     audit.take(journal.told().journal.entries)
     first, second = acts(audit.entries)
     assert first == Act(
-        1, first.utc_ns, "ada at 10.0.0.3", "write", STEP, "written and read back", 0.4, 0.43, 0.43
+        1,
+        first.hash,
+        first.utc_ns,
+        "ada at 10.0.0.3",
+        "write",
+        STEP,
+        "written and read back",
+        0.4,
+        0.43,
+        0.43,
     )
     assert (second.thing, second.old, second.new, second.read_back) == ("gait.trunk_angle", 0.05, 0.06, 0.06)
 

@@ -15,10 +15,11 @@ OPEN: Final = "NOT KNOWN how it ended"
 class Act:
     """What somebody did to one thing; values are SI, None where the journal has none.
 
-    `thing` is a parameter, a component or nothing; `n` is the journal's number of the entry that began it.
+    `thing` is a parameter, a component or nothing; `n` and `hash` are those of the entry that began it.
     """
 
     n: int
+    hash: str
     utc_ns: int
     who: str
     what: str
@@ -50,7 +51,9 @@ def acts(entries: Iterable[Entry]) -> list[Act]:
 def _begun(entry: Entry, what: str) -> Iterable[Act]:
     after, before = _numbers(entry, "after"), _numbers(entry, "before")
     said = OPEN if what in _LASTING else _words(entry.get("result") or entry.get("reason") or "")
-    base = Act(entry["n"], int(entry.get("utc_ns") or 0), str(entry.get("who")), what, "", said)
+    base = Act(
+        entry["n"], entry["hash"], int(entry.get("utc_ns") or 0), str(entry.get("who")), what, "", said
+    )
     if what in ("write", "write refused"):
         trial_s = entry.get("trial_s")
         word = "write" if trial_s is None else f"trial of {trial_s:g} s"

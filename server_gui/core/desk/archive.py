@@ -8,6 +8,7 @@ from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.answers import Deliver, when_done
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.kept_journals import KeptJournals
 from server_gui.core.desk.labels import SessionLabels
 from server_gui.core.desk.library import Library
 from server_gui.core.desk.news import NewsKind
@@ -24,6 +25,7 @@ class Archive:
     def __init__(self, settings: ServerSettings, desk: Desk, deliver: Deliver, author: str = "") -> None:
         self.settings = settings
         self.library = Library(settings, deliver)
+        self.journals = KeptJournals(settings, self.library.reading.do, deliver)
         self._reading = Background("playback")
         self.playback = Playback(self._reading.do, deliver, desk.shown)
         self.labels = SessionLabels(settings, self._reading.do, deliver, author)
