@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import unquote, urlsplit
 
 import obstore
 import pyarrow as pa
 from obstore.exceptions import AlreadyExistsError, NotFoundError
-from obstore.store import ObjectStore, from_url
+from obstore.store import MemoryStore, ObjectStore, from_url
 
 from ml.store.errors import translated
 
@@ -41,18 +42,22 @@ class Object:
 
 
 class Objects:
-    """Objects under a URL: small ones read and written at once, large ones piece by piece."""
+    """Objects under a URL: small ones read and written at once, large ones piece by piece.
+
+    A folder that is not there is empty, and made when something is written.
+    """
 
     def __init__(self, url: str) -> None:
         self.url = url
-        with translated(f"the store {url} cannot be opened"):
-            self._objects = _open(url)
+        self._folder = Path(unquote(urlsplit(url).path)) if url.startswith("file://") else None
+        self._opened: ObjectStore | None = None
+        self._objects()
 
     def create(self, path: str, data: bytes) -> bool:
         """Write an object that is not there yet; False where it is."""
         with translated(f"{self.url}/{path} cannot be written"):
             try:
-                obstore.put(self._objects, path, data, mode="create", use_multipart=False)
+                obstore.put(self._objects(write=True), path, data, mode="create", use_multipart=False)
             except AlreadyExistsError:
                 return False
             return True
@@ -60,15 +65,14 @@ class Objects:
     def put(self, path: str, data: pa.Buffer) -> None:
         """Write an object that is in memory; for any thread."""
         with translated(f"{self.url}/{path} cannot be written"):
-            obstore.put(
-                self._objects, path, memoryview(data).cast("B"), chunk_size=PIECE_BYTES, max_concurrency=2
-            )
+            to, content = self._objects(write=True), memoryview(data).cast("B")
+            obstore.put(to, path, content, chunk_size=PIECE_BYTES, max_concurrency=2)
 
     def read(self, path: str) -> bytes | None:
         """An object's content, None where it is not there."""
         with translated(f"{self.url}/{path} cannot be read"):
             try:
-                return bytes(obstore.get(self._objects, path).bytes())
+                return bytes(obstore.get(self._objects(), path).bytes())
             except (NotFoundError, FileNotFoundError):
                 return None
 
@@ -79,7 +83,7 @@ class Objects:
     def listing(self, folder: str = "") -> Iterator[Object]:
         """Every object below a folder, in no order."""
         with translated(f"{self.url}/{folder} cannot be listed"):
-            for found in itertools.chain.from_iterable(obstore.list(self._objects, folder or None)):
+            for found in itertools.chain.from_iterable(obstore.list(self._objects(), folder or None)):
                 tag = (found["e_tag"] or "").strip('"')
                 yield Object(found["path"], found["size"], found["last_modified"], tag)
 
@@ -88,25 +92,33 @@ class Objects:
         for start in range(offset, found.size_bytes, PIECE_BYTES):
             end = min(start + PIECE_BYTES, found.size_bytes)
             with translated(f"{self.url}/{found.path} cannot be read"):
-                piece = bytes(obstore.get_range(self._objects, found.path, start=start, end=end))
+                piece = bytes(obstore.get_range(self._objects(), found.path, start=start, end=end))
             yield piece
 
     def write(self, path: str, pieces: Iterable[bytes]) -> str:
         """Write an object, whole or not at all, over what is there; the service's entity tag."""
         with translated(f"{self.url}/{path} cannot be written"):
-            writer = obstore.open_writer(self._objects, path, buffer_size=PIECE_BYTES)
+            writer = obstore.open_writer(self._objects(write=True), path, buffer_size=PIECE_BYTES)
             for piece in pieces:
                 writer.write(piece)
             writer.close()  # without that, after an error, nothing is there
-            return (obstore.head(self._objects, path)["e_tag"] or "").strip('"')
+            return (obstore.head(self._objects(), path)["e_tag"] or "").strip('"')
 
     def remove(self, path: str) -> None:
         """Delete an object, if it is there."""
         with translated(f"{self.url}/{path} cannot be removed"):
             try:
-                obstore.delete(self._objects, path)
+                obstore.delete(self._objects(), path)
             except (NotFoundError, FileNotFoundError):
                 return
+
+    def _objects(self, *, write: bool = False) -> ObjectStore:
+        if self._opened is None:
+            if self._folder is not None and not write and not self._folder.is_dir():
+                return MemoryStore()
+            with translated(f"the store {self.url} cannot be opened"):
+                self._opened = _open(self.url)
+        return self._opened
 
 
 def s3_options() -> dict[str, str]:

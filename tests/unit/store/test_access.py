@@ -183,3 +183,15 @@ def test_keys_are_in_no_object_of_ours(backend: SeaweedFS | None, store_url: str
 def test_advice_is_about_what_is_wrong(error: OSError, said: str) -> None:
     with pytest.raises(StoreError, match=said), translated("the store cannot be written"):
         raise error
+
+
+def test_a_folder_that_is_not_there_is_empty_and_made_by_the_first_who_writes(tmp_path: Path) -> None:
+    folder = tmp_path / "a b"
+    one, other = Objects(folder.as_uri()), Objects(folder.as_uri())
+    assert one.read("labels/x.json") is None
+    assert one.names("labels") == []
+    one.remove("labels/x.json")
+    assert not folder.exists()
+    assert one.create("labels/x.json", b"{}")
+    assert other.read("labels/x.json") == b"{}"
+    assert other.names("labels") == ["labels/x.json"]

@@ -81,7 +81,12 @@ def test_a_model_that_another_one_has_overtaken_while_it_was_judged_is_not_promo
     ],
 )
 def test_what_cannot_be_is_a_sentence(
-    config: str, capsys: pytest.CaptureFixture[str], arguments: list[str], status: int, words: str
+    config: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    status: int,
+    words: str,
 ) -> None:
     try:
         ended: object = main.main(["train", *arguments, "--config", config])
@@ -89,6 +94,7 @@ def test_what_cannot_be_is_a_sentence(
         ended = error.code
     assert ended == status
     assert words in capsys.readouterr().err
+    assert not (tmp_path / "store").exists()
 
 
 def test_a_store_without_labels_says_how_to_give_some(
