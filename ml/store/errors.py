@@ -51,7 +51,7 @@ _REASONS: Final = (
     "Connection refused",
     "dns error",
     "timed out",
-    "timeout",
+    "TimedOut",
     "connection closed",
     "connection reset",
     "No space left on device",

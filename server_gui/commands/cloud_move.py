@@ -58,7 +58,7 @@ def upload(argv: list[str]) -> int:
         )
     return _tell(
         arguments,
-        f"the collector that runs uploads now; batches that wait: {waiting}",
+        "the collector that runs uploads what it has; gwrms collect --status tells how that goes",
         uploaded=0,
         waiting=waiting,
     )

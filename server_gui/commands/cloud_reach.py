@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Final
 
 from gateway.cli.text import warn
 from ml.store import StoreError
@@ -15,6 +16,7 @@ from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.settings import load
 
 Advance = Callable[[int], object]
+NO_SPOOL: Final = Path("/dev/null/spool")  # of a store that another server writes
 
 
 def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser:
@@ -57,8 +59,11 @@ def spool(arguments: argparse.Namespace) -> Path:
 
 
 def recordings(command: str, arguments: argparse.Namespace) -> Recordings:
-    """What is in the store and in this computer's spool; says so where the store cannot be reached."""
-    found = Recordings(url(arguments), spool(arguments))
+    """What is in the server's store and in its spool, or in another store by its URL.
+
+    Says so where the store cannot be reached.
+    """
+    found = Recordings(url(arguments), NO_SPOOL if arguments.url else spool(arguments))
     if found.problem is not None:
         warn(command, f"{found.problem}; here is what this computer's spool has")
     return found

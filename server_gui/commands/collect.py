@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from gateway.cli.text import NONE, age, say, size, table
+from gateway.cli.text import NONE, age, say, size, table, warn
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.door import ask
 from server_gui.core.fleet.statistics import LinkReport
@@ -78,15 +78,24 @@ def main(argv: list[str]) -> int:
     if arguments.status:
         return _status(spool, as_json=arguments.json)
     if arguments.upload:
-        say(f"the collector uploads; batches that wait: {ask(spool, 'upload').decode()}")
+        ask(spool, "upload")
+        say("the collector uploads what it has; gwrms collect --status tells how that goes\n")
         return 0
     if arguments.mark is not None:
-        say(f"marked in the recordings of {ask(spool, 'mark', arguments.mark).decode().strip()} robots\n")
-        return 0
+        return _mark(spool, arguments.mark)
     if not settings.robots:
         file = arguments.config or default_file()
         raise SettingsError(f"no robot is named: write it into [robots] of {file}, or --robot NAME=HOST:PORT")
     return _collect(settings, arguments.operator, arguments.notes)
+
+
+def _mark(spool: Path, text: str) -> int:
+    count = int(ask(spool, "mark", text))
+    if not count:
+        warn("collect", "not marked: nothing is being recorded; gwrms collect --status says why")
+        return 1
+    say(f"marked in the {'recording of 1 robot' if count == 1 else f'recordings of {count} robots'}\n")
+    return 0
 
 
 def _collect(settings: ServerSettings, operator: str, notes: str) -> int:

@@ -61,7 +61,8 @@ def ls(argv: list[str]) -> int:
     if arguments.json:
         say_json([_fields(session) for session in found])
     else:
-        say(table(HEADER, map(_row, found), right=(3, 4, 5)))
+        away = known.problem is not None
+        say(table(HEADER, [_row(session, away=away) for session in found], right=(3, 4, 5)))
     return 0 if known.problem is None else 1
 
 
@@ -75,7 +76,7 @@ def _wanted(session: Session, arguments: argparse.Namespace) -> bool:
     )
 
 
-def _row(session: Session) -> tuple[str, ...]:
+def _row(session: Session, *, away: bool) -> tuple[str, ...]:
     return (
         session.session,
         session.robot,
@@ -83,7 +84,7 @@ def _row(session: Session) -> tuple[str, ...]:
         _length(session) if session.rows else NONE,
         str(session.rows) if session.rows else NONE,
         size(session.size_bytes) if session.rows else NONE,
-        _state(session),
+        "store away" if away else _state(session),
         session.operator,
         session.notes,
     )
@@ -120,11 +121,15 @@ def show(argv: list[str]) -> int:
         happened = {"events": list(map(_bare, events)), "labels": list(map(_bare, labels))}
         say_json(_fields(recorded.session) | more | happened)
     else:
-        say("\n".join(_told(recorded, events, labels)))
+        alone = "not uploaded" if known.problem is None else "found here"
+        say("\n".join(_told(recorded, alone, events, labels)))
     return 0
 
 
-def _told(recorded: Recorded, events: list[dict[str, Any]], labels: list[dict[str, Any]]) -> Iterator[str]:
+def _told(
+    recorded: Recorded, alone: str, events: list[dict[str, Any]], labels: list[dict[str, Any]]
+) -> Iterator[str]:
+    """`alone` says what is so of rows that only this computer's spool has."""
     session = recorded.session
     facts = {
         "robot": session.robot,
@@ -133,7 +138,7 @@ def _told(recorded: Recorded, events: list[dict[str, Any]], labels: list[dict[st
         if session.ended
         else "not: it goes on, or its server was killed",
         "telemetry": f"{_length(session)}, {session.rows} rows, {size(session.size_bytes)} in the store",
-        "not uploaded": f"{recorded.waiting} of these rows" if recorded.waiting else "",
+        alone: f"{recorded.waiting} of these rows" if recorded.waiting else "",
         "operator": session.operator,
         "notes": session.notes,
         "configuration": session.configuration_hash,

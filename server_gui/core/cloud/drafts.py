@@ -5,6 +5,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from ml.store import StoreError
+
 
 @contextlib.contextmanager
 def draft(file: Path) -> Iterator[Path]:
@@ -15,5 +17,9 @@ def draft(file: Path) -> Iterator[Path]:
     try:
         yield written
         written.replace(file)
+    except OSError as error:
+        if error.errno is None or isinstance(error, StoreError):  # of what is read
+            raise
+        raise OSError(f"{file} cannot be written: {os.strerror(error.errno)}") from error
     finally:
         written.unlink(missing_ok=True)

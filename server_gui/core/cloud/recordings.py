@@ -20,7 +20,7 @@ import pyarrow.dataset
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
 from ml.store.errors import translated
 from ml.store.labels import holding
-from ml.store.sessions import Channel, NoSuchSession, Session, Source
+from ml.store.sessions import Channel, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
 from server_gui.core.cloud import spooled
@@ -43,11 +43,12 @@ class Recordings:
     """
 
     def __init__(self, url: str, spool: Path) -> None:
+        """`spool` is the one that goes to this store; a folder that is not there has nothing."""
         self.problem: StoreError | None = None
         self._url = url
         self._spool = spool
-        self._batches = spooled.waiting(spool)
-        self._name = spooled.identity(spool)
+        self._batches = spooled.waiting(self._spool)
+        self._name = spooled.identity(self._spool)
         self._store: Snapshot | None = None
         self._reach()
 
@@ -79,10 +80,9 @@ class Recordings:
 
         """
         known = [each for each in self.sessions() if robot in (None, each.robot)]
-        try:
-            return sessions.among(known, name, self._url)
-        except NoSuchSession as error:
-            raise (self.problem or error) from None
+        if self.problem is not None and not any(each.session.startswith(name) for each in known):
+            raise self.problem
+        return sessions.among(known, name, self._url)
 
     def happenings(self, session: Session, table: Table = EVENTS) -> list[Row]:
         """The session's rows of this table, in time's order."""

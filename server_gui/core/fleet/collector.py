@@ -133,8 +133,8 @@ class Collector:
         return self._do(lambda: self._fleet.follow(robot, address))
 
     def mark(self, text: str) -> "concurrent.futures.Future[int]":
-        """Mark this instant in the recording of every robot; how many there are."""
-        return self._do(lambda: self._mark(text))
+        """Mark this instant in the recording of every robot; in how many that is on the disk."""
+        return self.network.run(self._mark(text))
 
     def upload(self) -> "concurrent.futures.Future[int]":
         """Bring everything that was recorded until now into the store; how many batches waited."""
@@ -176,11 +176,12 @@ class Collector:
                 quiet = newest_ns is None or time.monotonic_ns() - newest_ns > QUIET_S * 1e9
                 return quiet or self._uploader.state.backlog_bytes > MOST_BACKLOG_BYTES
 
-    def _mark(self, text: str) -> int:
-        robots = self._fleet.robots
+    async def _mark(self, text: str) -> int:
+        lost = self._recorder.state.lost
+        robots = list(self._fleet.robots)
         for name in robots:
             self._recorder.mark(name, text)
-        return len(robots)
+        return len(robots) if await self._on_disk(lost) else 0
 
     async def _keep(self, text: str) -> bool:
         """Keep rows of other tables, such as labels; whether they are on the disk now."""
@@ -188,6 +189,10 @@ class Collector:
         lost = self._recorder.state.lost
         for row in rows:
             self._recorder.add(row)
+        return await self._on_disk(lost)
+
+    async def _on_disk(self, lost: int) -> bool:
+        """Whether everything until now is safe, where so many rows had been lost before."""
         flushed = self._disk.submit(self._recorder.flush, ON_DISK_S)
         return await asyncio.wrap_future(flushed) and self._recorder.state.lost == lost
 

@@ -69,6 +69,35 @@ def test_sessions_are_listed_before_anything_was_uploaded(desk: Desk) -> None:
     assert [each["session"] for each in desk.ask("sessions", "ls")] == [recorded.session]
 
 
+def test_what_this_computer_has_is_told_where_the_store_is_away(
+    desk: Desk, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorded = desk.record()
+    for name, value in {
+        "ENDPOINT_URL": "http://127.0.0.1:9",
+        "ACCESS_KEY_ID": "k",
+        "SECRET_ACCESS_KEY": "s",
+    }.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    desk.config.write_text(desk.config.read_text().replace(desk.url, "s3://nowhere/lab"))
+    assert main(["sessions", "ls", "--config", str(desk.config)]) == 1
+    told = capsys.readouterr()
+    assert "Connection refused" in told.err
+    assert "store away" in told.out
+    assert f"found here     {ROWS} of these rows" in desk.run("sessions", "show", "2")
+    desk.run("sessions", "export", recorded.session, "--out", str(tmp_path / "walk.csv"))
+    assert "nowhere" in desk.run("sessions", "show", "1999", status=1)
+
+
+def test_a_store_by_its_url_is_looked_into_without_this_computers_spool(
+    desk: Desk, capsys: pytest.CaptureFixture[str]
+) -> None:
+    desk.record("exo-01")
+    desk.record("exo-02", sent=False)
+    assert len(desk.ask("sessions", "ls")) == 2
+    assert [each["robot"] for each in desk.ask("sessions", "ls", "--url", desk.url)] == ["exo-01"]
+
+
 def test_a_session_is_shown(desk: Desk) -> None:
     recorded = desk.record()
     text = desk.run("sessions", "show", recorded.session)

@@ -1,6 +1,7 @@
 """Sessions as files that others read: CSV, Parquet, and MCAP as ROS 2 understands it."""
 
 import csv
+import errno
 import json
 import math
 from collections.abc import Iterator
@@ -15,10 +16,11 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from ml.store import StoreError
+from ml.store import StoreError, StoreUnreachable
 from ml.store.sessions import Channel, Session
 from server_gui.core.cloud import ros
 from server_gui.core.cloud.chosen import Choice, Recording, choose
+from server_gui.core.cloud.drafts import draft
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded as Opened
 from server_gui.core.cloud.recordings import Recordings
@@ -175,6 +177,17 @@ def test_an_export_that_breaks_off_leaves_what_was_there(tmp_path: Path, kind: s
         WRITERS[kind](file, cut)
     assert [each.name for each in tmp_path.iterdir()] == [file.name]
     assert file.read_text() == "before"
+
+
+def test_a_disk_that_is_full_is_told_with_the_files_name(tmp_path: Path) -> None:
+    full = OSError(errno.ENOSPC, "Error writing bytes to file")
+    for error, words in (
+        (full, "walk.csv cannot be written: No space left"),
+        (StoreUnreachable("away"), "away"),
+    ):
+        with pytest.raises(OSError, match=words), draft(tmp_path / "walk.csv"):
+            raise error
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_choice_takes_channels_by_glob_and_refuses_one_that_means_none(

@@ -159,6 +159,7 @@ def test_where_the_store_is_away_what_this_computer_has_is_found(
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
     known = Recordings(NOWHERE, tmp_path / "spool")
     assert isinstance(known.problem, StoreUnreachable)
+    assert "Connection refused; check the network" in str(known.problem)
     assert sorted(values(known.open(known.find(recorded.session)))) == ALL
     with pytest.raises(StoreUnreachable):  # it may well be there
         known.find("2020")

@@ -1,14 +1,17 @@
 """The collector as a whole: it records, answers, uploads when it may, and ends in bounded time."""
 
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import msgspec
 import pytest
 
 from gateway.client import Address
+from gateway.main import main
 from ml.store import Store
 from ml.store.tables import TELEMETRY
 from server_gui.core.fleet import collector as module
@@ -87,6 +90,20 @@ def test_a_mark_is_in_the_recording(settings: ServerSettings) -> None:
         Store(settings.store.url).dataset("events").to_table(columns=["robot", "kind", "text"]).to_pylist()
     )
     assert {"robot": "exo-fake", "kind": "marker", "text": "stairs"} in events
+
+
+def test_a_mark_that_cannot_be_kept_is_none(
+    settings: ServerSettings, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
+    with Collector(settings) as collector:
+        until(collector, lambda: answers(settings))
+        until(collector, lambda: collector.report().result(WAIT_S).recorder.alarms)
+        assert ask(settings.recorder.spool, "mark", "stairs") == b"0\n"
+        config = settings.recorder.spool.parent / "server.toml"
+        config.write_text(f'[recorder]\nspool = "{settings.recorder.spool}"\n')
+        assert main(["collect", "--config", str(config), "--mark", "stairs"]) == 1
+    assert "not marked: nothing is being recorded" in capsys.readouterr().err
 
 
 def test_a_robot_that_joins_later_is_recorded_marked_and_shown(settings: ServerSettings) -> None:
