@@ -31,7 +31,7 @@ USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL]
   promote MODEL  let it serve every robot, or with --robot one
   rollback TASK  let that serve again which did before
   history TASK   what has served, who said so, and why
-  export MODEL   a classifier as ONNX, for other programs
+  export MODEL   a model as ONNX, for other programs
 
 A model's name may be cut off where it is unique. gwrms models COMMAND --help says more.
 """
@@ -192,7 +192,7 @@ def history(argv: list[str]) -> int:
 
 def export(argv: list[str]) -> int:
     """Run `gwrms models export`."""
-    made = _parser("export", "A classifier as ONNX; both judge the same rows before the file is written.")
+    made = _parser("export", "A model as ONNX; both judge the same rows before the file is written.")
     made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
     made.add_argument("--onnx", type=Path, required=True, metavar="FILE", help="where to; replaced if there")
     arguments = made.parse_args(argv)
