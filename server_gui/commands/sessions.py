@@ -137,7 +137,7 @@ def _told(
         "ended": f"{when(session.ended)} UTC"
         if session.ended
         else "not: it goes on, or its server was killed",
-        "telemetry": f"{_length(session)}, {session.rows} rows, {size(session.size_bytes)} in the store",
+        "telemetry": f"{_length(session)}, {session.rows} rows{_stored(session)}",
         alone: f"{recorded.waiting} of these rows" if recorded.waiting else "",
         "operator": session.operator,
         "notes": session.notes,
@@ -157,6 +157,10 @@ def _told(
         )
     if labels:
         yield table(("LABEL", "FROM (UTC)", "TO", "BY"), map(_label, labels))
+
+
+def _stored(session: Session) -> str:
+    return f", {size(session.size_bytes)} in the store" if session.size_bytes else ""
 
 
 def _channel(channel: Channel) -> tuple[str, ...]:

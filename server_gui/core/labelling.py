@@ -60,7 +60,8 @@ class Labelling:
 
     def session(self, name: str, robot: str | None = None) -> Session:
         """The session whose name is this, or alone begins so, uploaded or not; raises `NoSuchSession`."""
-        return self._recordings().find(name, robot)
+        known = self._recordings()
+        return known.counted(known.find(name, robot))
 
     def ls(self, session: Session) -> list[Label]:
         """The labels of a session that hold, in time's order."""

@@ -95,9 +95,13 @@ class Recordings:
         """What somebody says that robot and wearer did, as far as it has not been taken back."""
         return holding(self.happenings(session, LABELS))
 
+    def counted(self, session: Session) -> Session:
+        """The session with the extent of all of its rows."""
+        return self._looked_into(session).added_to(session)
+
     def open(self, session: Session) -> "Recorded":
         """Look into its telemetry."""
-        waiting = _Waiting(self._spool, self._missing(self._location(session)), session, self._units(session))
+        waiting = self._looked_into(session)
         known = [] if self._store is None else sessions.channels(self._store, session)
         sources = [] if self._store is None else [sessions.stored(self._store, session)]
         return Recorded(
@@ -110,6 +114,11 @@ class Recordings:
 
     # --- inside
 
+    def _looked_into(self, session: Session) -> "_Waiting":
+        location = TELEMETRY.location(session.robot, 1 if self._store is None else self._store.about.shards)
+        units = {} if self._store is None else self._store.units(location)
+        return _Waiting(self._spool, self._missing(location), session, units)
+
     def _waiting(self, table: Table) -> list[Row]:
         return spooled.rows(self._spool, table, self._missing(table.name))
 
@@ -118,12 +127,6 @@ class Recordings:
         if self._store is None:
             return self._batches
         return [each for each in self._batches if not self._store.has(location, self._name, each)]
-
-    def _location(self, session: Session) -> str:
-        return TELEMETRY.location(session.robot, 1 if self._store is None else self._store.about.shards)
-
-    def _units(self, session: Session) -> dict[str, str | None]:
-        return {} if self._store is None else self._store.units(self._location(session))
 
 
 @dataclass(frozen=True, slots=True)

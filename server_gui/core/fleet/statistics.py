@@ -21,7 +21,7 @@ class LinkReport(Struct, frozen=True):
     address: str
     state: str
     problem: str | None  # why there is no link
-    since_utc_s: float | None  # when the state began
+    since_utc_s: float | None  # when it was made, or for how long there has been none
     calls_itself: str | None
     links: int  # made since the start
     session: str
@@ -74,8 +74,11 @@ class LinkStatistics:
             case Described():
                 self._calls_itself = event.description.robot
             case LinkChanged():
-                self._links += event.state is ConnectionState.CONNECTED
-                self.state, self._problem, self._since_s = event.state, event.problem, time.time()
+                linked = event.state is ConnectionState.CONNECTED
+                self._links += linked
+                if self._since_s is None or linked or self.state is ConnectionState.CONNECTED:
+                    self._since_s = time.time()
+                self.state, self._problem = event.state, event.problem
                 self._received_per_s = None
                 self._monitor.state(event.state, event.problem, event.at_ns)
 

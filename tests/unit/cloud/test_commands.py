@@ -89,6 +89,14 @@ def test_what_this_computer_has_is_told_where_the_store_is_away(
     assert "nowhere" in desk.run("sessions", "show", "1999", status=1)
 
 
+def test_what_waits_for_upload_is_labelled_by_seconds(desk: Desk) -> None:
+    desk.record(sent=False)
+    assert desk.run("label", "2", "right_heel_strike", "--from", "0", "--author", "bob")
+    shown = desk.ask("sessions", "show", "2")
+    [label] = [each for each in shown["labels"] if each["author"] == "bob"]
+    assert label["utc"] == shown["first"]
+
+
 def test_a_store_by_its_url_is_looked_into_without_this_computers_spool(
     desk: Desk, capsys: pytest.CaptureFixture[str]
 ) -> None:

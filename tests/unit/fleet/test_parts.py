@@ -131,3 +131,8 @@ def test_a_link_says_what_it_is_and_since_when() -> None:
     )
     assert report.since_utc_s is not None
     assert before_s <= report.since_utc_s <= time.time()
+    for again in (ConnectionState.CONNECTING, ConnectionState.WAITING):  # it is still away
+        counted.take(LinkChanged(again, "refused", 3))
+        assert counted.report("").since_utc_s == report.since_utc_s
+    counted.take(LinkChanged(ConnectionState.CONNECTED, None, 4))
+    assert (counted.report("").since_utc_s or 0) > report.since_utc_s
