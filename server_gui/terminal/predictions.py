@@ -8,6 +8,7 @@ from typing import Final
 from gateway.cli.text import NONE, age, table
 from gateway.client import ConnectionState
 from ml.registry.card import Card, age_days
+from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from server_gui.core.desk.predictions import Shown
@@ -15,21 +16,30 @@ from server_gui.core.prediction.live import Watched
 from server_gui.core.prediction.replay import Replayed
 from server_gui.core.prediction.state import WITHIN_DAYS, Quality
 
-HEADER: Final = ("TASK", "SAYS", "PROBABILITY", "AGE", "NOVELTY", "TRUST", "MODEL", "MADE")
+HEADER: Final = (
+    "TASK",
+    "SAYS".ljust(len("stride left 0.00 right 0.00")),
+    "PROB",
+    "   AGE",
+    "NOVELTY",
+    "TRUST",
+)
 RIGHT: Final = (2, 3, 4)
+MODELS: Final = ("MODEL", "MADE", "LEARNED FROM")
 SPELLS: Final = 40  # lines of what followed what
 
 
 def told(name: str, watched: Watched) -> str:
     """A robot now: what its models say and how far to believe it; faults and rules beside."""
     known = watched.predictions
+    shown = [known.by_task[task] for task in TASKS if task in known.by_task]
     lines = [f"{name}: {_link(watched)}"]
-    if known.by_task:
-        lines.append(table(HEADER, [_row(shown) for shown in known.by_task.values()], RIGHT).rstrip())
-    lines += [f"{task}: {why}" for task, why in known.why.items()] or [known.problem] * (not known.by_task)
-    lines += [f"RIGHT {line}" for line in _right(known.by_task.values())]
+    if shown:
+        lines += [table(HEADER, map(_row, shown), RIGHT), table(MODELS, map(_model, shown)).rstrip()]
+    lines += [f"{task}: {why}" for task, why in known.why.items()] or [known.problem] * (not shown)
+    lines += _right(shown)
     lines += [f"RULE {rule.text}" for rule in known.rules]
-    drifted = {channel for shown in known.by_task.values() for channel in shown.predicted.trust.drifted}
+    drifted = {channel for one in shown for channel in one.predicted.trust.drifted}
     lines += [
         f"DRIFT {channel} has values that its model has not learned from" for channel in sorted(drifted)
     ]
@@ -40,12 +50,13 @@ def told(name: str, watched: Watched) -> str:
 def _link(watched: Watched) -> str:
     link = watched.robot.link
     if link.state is ConnectionState.CONNECTED:
-        return f"{watched.robot.rate_hz():.0f} rows/s, {age(watched.robot.age_s())} old"
+        age_s = watched.robot.age_s()
+        return "no row yet" if age_s is None else f"{watched.robot.rate_hz():.0f} rows/s, {age(age_s)} old"
     return f"{link.state.value}: {link.problem}" if link.problem else link.state.value
 
 
 def _row(shown: Shown) -> tuple[str, ...]:
-    prediction, card = shown.predicted.prediction, shown.predicted.card
+    prediction = shown.predicted.prediction
     return (
         prediction.task,
         NONE if shown.is_stale() else said(prediction),
@@ -53,27 +64,31 @@ def _row(shown: Shown) -> tuple[str, ...]:
         age(shown.age_s()),
         f"{prediction.novelty:.2f}",
         shown.predicted.trust.level.value,
-        card.id,
-        made(card),
     )
+
+
+def _model(shown: Shown) -> tuple[str, ...]:
+    card = shown.predicted.card
+    return card.id, made(card), card.source.value
 
 
 def _right(found: Iterable[Shown]) -> Iterator[str]:
     """How right models were of late, where labels say what was so."""
     for shown in found:
         if (quality := shown.predicted.quality) is not None:
-            yield f"{shown.predicted.prediction.task}: {quality.text} of the last {WITHIN_DAYS} days"
+            yield f"{shown.predicted.prediction.task}: {quality.text} in {WITHIN_DAYS} days"
 
 
 def said(prediction: Prediction) -> str:
-    """The label, and further values."""
-    values = " ".join(f"{name} {value:.2f}" for name, value in prediction.values.items())
-    return f"{prediction.label} {values}".rstrip()
+    """The label, and further values where it says anything."""
+    values = {} if prediction.label in (UNKNOWN, ABNORMAL) else prediction.values
+    return " ".join([prediction.label, *(f"{name} {value:.2f}" for name, value in values.items())])
 
 
 def made(card: Card) -> str:
-    """How old a model is, and what it has learned from."""
-    return f"{age_days(card):.0f} days ago, {card.source.value}"
+    """How old a model is."""
+    days = round(age_days(card))
+    return f"{days} day{'s' * (days > 1)} ago" if days else "today"
 
 
 # --- a session
@@ -82,7 +97,7 @@ def made(card: Card) -> str:
 def replay_told(found: Replayed) -> str:
     """One task of a session."""
     card, predictions = found.model.card, found.predictions
-    lines = [f"{card.task}: {card.id}, made {made(card)}; {len(predictions)} decisions"]
+    lines = [f"{card.task}: {card.id}, made {made(card)}, {card.source.value}; {len(predictions)} decisions"]
     if predictions:
         lines += [f"trust: {_trust(found.trust)}", "", _labels(predictions)]
     if found.live.decisions:

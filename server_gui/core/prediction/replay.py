@@ -1,6 +1,7 @@
 """A recorded session, predicted again: what models say of it, what they said live, what of it is right."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -99,12 +100,18 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
     )
 
 
-def _live(store: Store, session: Session, model: Model, found: Iterable[Prediction]) -> Live:
+def _live(store: Store, session: Session, model: Model, found: Sequence[Prediction]) -> Live:
+    """Of a session that goes on, only up to here: by now there may be more in the store."""
     try:
         rows = sessions.happenings(store, session, PREDICTIONS)
     except NoSuchTable:
         rows = []
-    said = {row["stamp_ns"]: row["label"] for row in rows if row["model"] == model.card.id}
+    until_ns = found[-1].stamp_ns if found and session.ended is None else math.inf
+    said = {
+        row["stamp_ns"]: row["label"]
+        for row in rows
+        if row["model"] == model.card.id and row["stamp_ns"] <= until_ns
+    }
     same = sum(said.get(one.stamp_ns) == one.label for one in found)
     return Live(len(said), same)
 

@@ -29,7 +29,7 @@ class Quality(Struct, frozen=True):
     def text(self) -> str:
         """In words."""
         right, wrong, unsaid = self.shares
-        return f"{right} right, {wrong} wrong, {unsaid} not said, of {self.labelled} labelled decisions"
+        return f"{right} right, {wrong} wrong, {unsaid} not said of {self.labelled} labelled"
 
 
 Figures = dict[str, dict[str, dict[str, Quality]]]  # by robot, task and model

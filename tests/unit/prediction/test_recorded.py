@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from ml.store import Store, sessions
 from ml.store.labels import Label, utc_ns
@@ -16,6 +17,7 @@ from ml.store.tables import LABELS, PREDICTIONS
 from server_gui.commands import predict
 from server_gui.commands.collect import status_text
 from server_gui.core.fleet.collector import Collector, CollectorReport
+from server_gui.core.prediction.replay import Live, replay
 from server_gui.core.prediction.settings import Action, PredictionSettings, RuleSettings
 from server_gui.core.prediction.track_record import TrackRecord
 from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
@@ -122,3 +124,9 @@ def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
     figures = TrackRecord(store.url).figures({"exo-fake"}, datetime.now(UTC))
     assert figures["exo-fake"]["activity"][model].confusion == {"walk": own}
     assert lines[-1]["quality"]["confusion"].keys() == {"walk"}
+
+    # more has been said, and kept, since the recording was read: no difference where it goes on
+    late = PREDICTIONS.rows([rows[-1] | {"utc": utc_ns(end), "stamp_ns": rows[-1]["stamp_ns"] + 10**10}])
+    store.append(PREDICTIONS, "predictions", late.schema, late.to_reader, "late", 1)
+    for one, said in ((replace(session, ended=None), len(rows)), (session, len(rows) + 1)):
+        assert replay(store, one, PredictionSettings())[0].live == Live(said, len(rows))
