@@ -5,7 +5,7 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
-from gateway.cli.text import say, say_json, size
+from gateway.cli.text import say, say_json, size, warn
 from ml.store import sessions
 from ml.store.errors import StoreError
 from ml.store.sessions import Session
@@ -13,7 +13,7 @@ from ml.store.store import Store, checked_url
 from server_gui.commands.cloud_reach import add_url, parser, progress, reach, url
 from server_gui.core.cloud import parts, transfer
 from server_gui.core.fleet.door import NobodyCollects, ask
-from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings import load
@@ -74,16 +74,24 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     )
     with Spool(folder) as spool:
         waiting = spool.waiting()
+        damaged = []
         with progress("batches", len(waiting)) as advance:
             for number in waiting:
-                send(spool, number, store)
+                try:
+                    send(spool, number, store)
+                except Damaged as error:
+                    damaged.append(str(error))
                 advance(1)
-    return _tell(
+    for problem in damaged:
+        warn("cloud", problem)
+    uploaded = len(waiting) - len(damaged)
+    _tell(
         arguments,
-        f"{len(waiting)} batches uploaded to {store.url}; nothing waits",
-        uploaded=len(waiting),
+        f"{uploaded} batches uploaded to {store.url}; nothing waits",
+        uploaded=uploaded,
         waiting=0,
     )
+    return 1 if damaged else 0
 
 
 def download(argv: list[str]) -> int:

@@ -143,6 +143,7 @@ def status_text(report: CollectorReport) -> str:
         f"store  {report.store}: {batches}; backlog {size(uploader.backlog_bytes)}",
         *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
         *([f"ALARM  {uploader.problem}"] if uploader.problem else []),
+        *(f"ALARM  {file} is damaged: its rows are not in the store" for file in uploader.damaged),
     ]
     robots = report.robots.items()
     links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)

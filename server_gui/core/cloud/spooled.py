@@ -13,8 +13,9 @@ import msgspec
 from ml.store import Table
 from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
-from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
+from server_gui.core.recording.segment import translated
 
 _NUMBER: Final = "[0-9]" * 8
 _decoder = msgspec.msgpack.Decoder(Record)
@@ -99,13 +100,16 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
     """
     for file in (spool / f"{batch:08}.db", spool / f"{batch:08}.uploaded.db"):
         try:
-            with contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True)) as database:
+            with (
+                translated(file),
+                contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True)) as database,
+            ):
                 return database.execute(sql, values).fetchall()
-        except sqlite3.Error as error:
+        except Damaged as error:
+            raise Damaged(f"{error}; gwrms cloud upload sets it aside") from error
+        except SpoolUnusable as error:
             if "no such table" in str(error):
                 return []
             if file.exists():
-                raise SpoolUnusable(
-                    f"the spool's file {file} cannot be read: {error}; move it away to go on without its rows"
-                ) from error
+                raise
     raise SpoolUnusable(f"batch {batch} of the spool {spool} has just gone to the store; ask again")

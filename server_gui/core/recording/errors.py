@@ -2,6 +2,7 @@
 
 RecordingError
 └── SpoolUnusable   the spool's folder or one of its files cannot be used; says what to do
+    └── Damaged     a file of it is no database any more, or not one of ours
 """
 
 
@@ -11,3 +12,7 @@ class RecordingError(Exception):
 
 class SpoolUnusable(RecordingError):
     """The spool's folder or one of its files cannot be used."""
+
+
+class Damaged(SpoolUnusable):
+    """A file of the spool does not hold what was written to it."""

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import msgspec
 
-from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
 
 SCHEMA: Final = """
@@ -30,9 +30,24 @@ MAPPED_BYTES: Final = 1 << 28
 _NAME: Final = operator.itemgetter(slice(5))
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
+_DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+
 _encoder = msgspec.msgpack.Encoder()
 _layout_decoder = msgspec.msgpack.Decoder(Layout)
 _record_decoder = msgspec.msgpack.Decoder(Record)
+
+
+@contextlib.contextmanager
+def translated(file: Path) -> Iterator[None]:
+    """Turn what a file of the spool raises within the block into `SpoolUnusable`, or `Damaged`."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        damaged = getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED
+        kind, how = (Damaged, "is damaged") if damaged else (SpoolUnusable, "cannot be used")
+        raise kind(f"the spool's file {file} {how}: {error}") from error
+    except (msgspec.MsgspecError, ValueError, LookupError) as error:
+        raise Damaged(f"the spool's file {file} is damaged: {error}") from error
 
 
 class Segment:
@@ -42,7 +57,7 @@ class Segment:
         self.path = path
         self.number = number
         self.rows = 0
-        try:
+        with translated(path):
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
             self._database.execute(f"PRAGMA page_size={PAGE_BYTES}")
             self._database.execute(f"PRAGMA mmap_size={MAPPED_BYTES}")
@@ -55,10 +70,6 @@ class Segment:
                 for number, robot, description in self._database.execute("SELECT * FROM layout")
             }
             self.rows = self._count()
-        except sqlite3.Error as error:
-            raise SpoolUnusable(
-                f"the spool's file {path} cannot be opened: {error}; move it away to go on without its rows"
-            ) from error
 
     def _count(self) -> int:
         runs = self._database.execute("SELECT coalesce(sum(rows), 0) FROM run").fetchone()[0]
@@ -124,23 +135,26 @@ class Segment:
         What follows each other with the same name and columns is one run, up to `ROWS_AT_ONCE`.
         """
         layouts = {number: layout for (_, layout), number in self._layouts.items()}
-        found = self._database.execute(
-            "SELECT robot, session, connection, stream, layout, rows, data FROM run "
-            "ORDER BY robot, connection, stream, seq, row"
-        )
-        for (robot, session, connection, stream, layout), alike in itertools.groupby(found, _NAME):
-            for data in _portions(alike):
-                yield unpack(robot, session, connection, stream, layouts[layout], data)
+        with translated(self.path):
+            found = self._database.execute(
+                "SELECT robot, session, connection, stream, layout, rows, data FROM run "
+                "ORDER BY robot, connection, stream, seq, row"
+            )
+            for (robot, session, connection, stream, layout), alike in itertools.groupby(found, _NAME):
+                for data in _portions(alike):
+                    yield unpack(robot, session, connection, stream, layouts[layout], data)
 
     def records(self) -> Iterator[Record]:
         """Every record, in the order in which it was recorded."""
-        for (content,) in self._database.execute("SELECT content FROM record ORDER BY number"):
-            yield _record_decoder.decode(content)
+        with translated(self.path):
+            for (content,) in self._database.execute("SELECT content FROM record ORDER BY number"):
+                yield _record_decoder.decode(content)
 
     def heads(self) -> dict[str, JournalHead]:
         """The newest journal entry of each robot that is known here."""
-        found = self._database.execute("SELECT robot, n, hash FROM journal_head")
-        return {robot: JournalHead(n, digest) for robot, n, digest in found}
+        with translated(self.path):
+            found = self._database.execute("SELECT robot, n, hash FROM journal_head")
+            return {robot: JournalHead(n, digest) for robot, n, digest in found}
 
     def close(self) -> None:
         """Let go of the file; SQLite brings its log home."""

@@ -2,10 +2,13 @@
 
 `00000007.db` is a segment; the highest number is written, all others are frozen, and a segment's number is
 the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in the store and goes when room
-is needed. The highest number is never removed, so that no number is given twice.
+is needed. `00000005.damaged.db` cannot be read: its rows are not in the store, and it stays for somebody to
+look at. The highest number is never removed, so that no number is given twice.
 """
 
+import contextlib
 import fcntl
+import logging
 import os
 import re
 import shutil
@@ -13,16 +16,27 @@ import sqlite3
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
 from pathlib import Path
 from typing import IO, Final, Self
 
-from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Record, Run
-from server_gui.core.recording.segment import Segment
+from server_gui.core.recording.segment import SUFFIXES, Segment
+
+log = logging.getLogger(__name__)
 
 RESERVE_BYTES: Final = 1 << 30  # what the disk must have left for recording to go on
 KEEP_BYTES: Final = 4 << 30  # uploaded segments that stay as a second copy, while there is room
-_NAME: Final = re.compile(r"(\d{8})(\.uploaded)?\.db")
+_NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged)?\.db")
+
+
+class Kept(Enum):
+    """What has become of a segment; as its file's name says."""
+
+    WAITING = ""
+    UPLOADED = ".uploaded"
+    DAMAGED = ".damaged"
 
 
 def _free_bytes(folder: Path) -> int:
@@ -122,7 +136,7 @@ class Spool:
     def waiting(self) -> list[int]:
         """Segments that are frozen and not uploaded, oldest first."""
         written = self._current.number  # a higher one may be in the making
-        return [number for number, uploaded in self._segments() if not uploaded and number < written]
+        return [number for number in self._all(Kept.WAITING) if number < written]
 
     def read(self, number: int) -> Segment:
         """A frozen segment; close it after use."""
@@ -130,17 +144,29 @@ class Spool:
 
     def uploaded(self, number: int) -> None:
         """The segment is in the store, durably: it may go when room is needed."""
-        self._path(number).rename(self._path(number, uploaded=True))
+        self._path(number).rename(self._path(number, Kept.UPLOADED))
         _sync(self.folder)
+
+    def set_aside(self, number: int) -> Path:
+        """The segment cannot be read: it waits no longer, so that those after it are uploaded; its file."""
+        for suffix in SUFFIXES:
+            name = self._path(number).name + suffix
+            if (self.folder / name).exists():
+                (self.folder / name).rename(self.folder / (self._path(number, Kept.DAMAGED).name + suffix))
+        _sync(self.folder)
+        return self._path(number, Kept.DAMAGED)
+
+    def damaged(self) -> list[Path]:
+        """Files that were set aside and are still there."""
+        return [self._path(number, Kept.DAMAGED) for number in self._all(Kept.DAMAGED)]
 
     def backlog_bytes(self) -> int:
         """What waits for upload, with what is being written."""
-        numbers = [number for number, uploaded in self._segments() if not uploaded]
-        return sum(Segment.size_bytes(self._path(number)) for number in numbers)
+        return sum(Segment.size_bytes(self._path(number)) for number in self._all(Kept.WAITING))
 
     def make_room(self) -> bool:
         """Remove the oldest uploaded segments as far as needed; False where the disk is still nearly full."""
-        paths = [self._path(number, uploaded=True) for number, uploaded in self._segments() if uploaded]
+        paths = [self._path(number, Kept.UPLOADED) for number in self._all(Kept.UPLOADED)]
         kept = sum(map(Segment.size_bytes, paths))
         for path in paths:
             if kept <= self._keep_bytes and self._roomy():
@@ -154,12 +180,16 @@ class Spool:
 
     # --- files
 
-    def _path(self, number: int, uploaded: bool = False) -> Path:
-        return self.folder / f"{number:08}{'.uploaded' if uploaded else ''}.db"
+    def _path(self, number: int, kept: Kept = Kept.WAITING) -> Path:
+        return self.folder / f"{number:08}{kept.value}.db"
 
-    def _segments(self) -> list[tuple[int, bool]]:
+    def _segments(self) -> list[tuple[int, Kept]]:
         names = (_NAME.fullmatch(path.name) for path in self.folder.iterdir())
-        return sorted((int(found[1]), bool(found[2])) for found in names if found)
+        found = [(int(name[1]), Kept(name[2] or "")) for name in names if name]
+        return sorted(found, key=lambda each: each[0])
+
+    def _all(self, wanted: Kept) -> list[int]:
+        return [number for number, kept in self._segments() if kept is wanted]
 
     def _identify(self) -> str:
         """The name of this spool at the store, given once."""
@@ -177,16 +207,24 @@ class Spool:
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}
         # Each begins with what the ones before it knew; the newest may have been cut off at its making.
-        for number, uploaded in self._segments()[-2:]:
-            segment = Segment(self._path(number, uploaded), number)
-            heads |= segment.heads()
-            segment.close()
+        for number, kept in self._segments()[-2:]:
+            if kept is not Kept.DAMAGED:
+                heads |= self._heads_of(number, kept)
         return heads
+
+    def _heads_of(self, number: int, kept: Kept) -> dict[str, JournalHead]:
+        try:
+            with contextlib.closing(Segment(self._path(number, kept), number)) as segment:
+                return segment.heads()
+        except Damaged as error:
+            if kept is Kept.WAITING:
+                log.error("%s; it is kept as %s", error, self.set_aside(number))
+            return {}
 
     def _resume(self) -> Segment:
         """The segment to write now: a new one, unless the newest is still empty."""
-        newest, uploaded = self._segments()[-1] if self._segments() else (0, True)
-        if uploaded:
+        newest, kept = self._segments()[-1] if self._segments() else (0, Kept.UPLOADED)
+        if kept is not Kept.WAITING:
             return self._begin(newest + 1)
         segment = self._begin(newest)
         if not segment.rows:

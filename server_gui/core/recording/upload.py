@@ -10,14 +10,22 @@ import pyarrow as pa
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from server_gui.core.recording.columns import Columns
+from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.segment import Segment
 from server_gui.core.recording.spool import Spool
 
 
 def send(spool: Spool, number: int, store: Store) -> None:
-    """Bring a frozen segment of the spool into the store, and tell the spool; raises as `upload` does."""
-    with contextlib.closing(spool.read(number)) as segment:
-        upload(segment, spool.id, store)
+    """Bring a frozen segment of the spool into the store, and tell the spool; raises as `upload` does.
+
+    One that is damaged is set aside, and raises `Damaged`: those after it may be sent.
+    """
+    try:
+        with contextlib.closing(spool.read(number)) as segment:
+            upload(segment, spool.id, store)
+    except Damaged as error:
+        aside = spool.set_aside(number)
+        raise Damaged(f"{error}; it is kept as {aside.name}, and its rows are not in the store") from error
     spool.uploaded(number)
 
 

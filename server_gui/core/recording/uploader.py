@@ -12,7 +12,7 @@ from gateway.client.backoff import Backoff
 from ml.store.errors import StoreError
 from ml.store.store import Store
 from server_gui.core.recording.compacting import Compacting
-from server_gui.core.recording.errors import RecordingError
+from server_gui.core.recording.errors import Damaged, RecordingError
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 
@@ -32,6 +32,7 @@ class UploaderState:
     backlog_bytes: int = 0  # with what is being written
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
+    damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
 
 
 class Uploader:
@@ -123,6 +124,10 @@ class Uploader:
                 return True
             try:
                 self._upload(number)
+            except Damaged as error:
+                log.error("batch %d is not uploaded: %s", number, error)
+                self._tell(waiting[done:])
+                continue
             except Exception as error:  # noqa: BLE001 - uploading goes on, whatever a library raises
                 self._store = None
                 problem = str(error) if isinstance(error, KNOWN) else _unknown(error)
@@ -147,7 +152,8 @@ class Uploader:
 
     def _tell(self, waiting: list[int]) -> None:
         backlog = self._spool.backlog_bytes()
-        self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog)
+        damaged = tuple(map(str, self._spool.damaged()))
+        self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog, damaged=damaged)
 
 
 def _unknown(error: Exception) -> str:

@@ -177,5 +177,5 @@ def test_a_name_that_is_nowhere_and_a_damaged_batch_are_told(folder_url: str, tm
         database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     database.close()
     file.write_bytes(b"x" * 20_000)
-    with pytest.raises(SpoolUnusable, match=r"00000001\.db cannot be read.*move it away"):
+    with pytest.raises(SpoolUnusable, match=r"00000001\.db is damaged.*gwrms cloud upload"):
         Recordings(folder_url, tmp_path / "spool").find(recorded.session)

@@ -84,7 +84,7 @@ def test_a_status_says_what_people_ask_first() -> None:
         disk_free_bytes=3 << 30,
         robots={"exo-01": LinkStatistics(Address("192.0.2.7")).report("")},
         recorder=RecorderState(12, 3, 4, 0.01, (alarm,)),
-        uploader=UploaderState(2, 7, 5 << 20, 0.5, "no network"),
+        uploader=UploaderState(2, 7, 5 << 20, 0.5, "no network", ("/spool/00000003.damaged.db",)),
     )
     text = status_text(report)
     for words in (
@@ -93,6 +93,7 @@ def test_a_status_says_what_people_ask_first() -> None:
         "ALARM  recording has stopped",
         "ALARM  no network",
         "2 batches uploaded, 7 wait (upload = idle)",
+        "ALARM  /spool/00000003.damaged.db is damaged: its rows are not in the store",
         "5.0 MiB",
         "192.0.2.7:7420",
         "exo-01: the link is idle",

@@ -115,10 +115,21 @@ def test_one_server_at_a_time(tmp_path: Path) -> None:
     Spool(tmp_path).close()
 
 
-def test_a_damaged_segment_is_named_with_what_to_do(tmp_path: Path) -> None:
-    (tmp_path / "00000001.db").write_bytes(b"not a database" * 100)
-    with pytest.raises(SpoolUnusable, match=r"00000001\.db cannot be opened.*move it away"):
-        Spool(tmp_path)
+def test_a_damaged_segment_is_set_aside_its_number_is_not_given_again_and_recording_begins(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([], [Record("journal", {"n": 7})], {"exo-01": JournalHead(7, "abc")})
+        spool.freeze()
+    (tmp_path / "00000002.db").write_bytes(b"not a database" * 100)
+    for _ in range(2):
+        with Spool(tmp_path) as spool:
+            assert spool._current.number == 3
+            assert spool.waiting() == [1]
+            assert spool.heads == {"exo-01": JournalHead(7, "abc")}
+            assert [file.name for file in spool.damaged()] == ["00000002.damaged.db"]
+    [said] = caplog.messages
+    assert "00000002.db is damaged: file is not a database; it is kept as" in said
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:

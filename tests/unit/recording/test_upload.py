@@ -1,5 +1,7 @@
 """From the spool to the store: every row once, as it was; problems are told, and end."""
 
+import contextlib
+import sqlite3
 import threading
 import time
 from collections import Counter
@@ -174,6 +176,36 @@ def test_a_store_that_cannot_be_reached_is_told_and_tried_again(spool: Spool, fo
         uploader.now()
         until(lambda: uploader.state.uploaded == 1)
         assert uploader.state.problem is None
+
+
+@pytest.mark.parametrize("part", ["header", "record", "run"])
+def test_a_damaged_batch_keeps_none_after_it_from_the_store(
+    spool: Spool, folder_url: str, part: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with Recorder(spool) as recorder:
+        for seq in range(3):
+            recorder.record("exo-01", 7, batch(seq))
+            recorder.mark("exo-01", f"{seq}")
+            recorder.cut(lambda: None)
+            assert recorder.flush(WAIT_S)
+    batches = len(spool.waiting())
+    damage(spool.folder / "00000002.db", part)
+    with Uploader(spool, lambda: Store(folder_url)) as uploader:
+        assert uploader.drain(WAIT_S)
+        assert [Path(file).name for file in uploader.state.damaged] == ["00000002.damaged.db"]
+        assert uploader.state.uploaded == batches - 1
+    assert "batch 2 is not uploaded: the spool's file" in caplog.text
+    texts = Store(folder_url).dataset("events").to_table()["text"].to_pylist()
+    assert sorted(texts) == ["0", "2"]
+
+
+def damage(file: Path, part: str) -> None:
+    if part == "header":
+        file.write_bytes(b"x" * 10_000)
+        return
+    column = {"record": "content", "run": "data"}[part]
+    with contextlib.closing(sqlite3.connect(file)) as database, database:
+        database.execute(f"UPDATE {part} SET {column} = x'c1'")
 
 
 def test_nothing_is_uploaded_before_it_is_wanted_unless_asked(spool: Spool, folder_url: str) -> None:
