@@ -65,6 +65,7 @@ class Header(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
+        self._is_short = False
         self.setObjectName("header")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._brand = QLabel("GWRMS")
@@ -96,11 +97,16 @@ class Header(QWidget):
         """What became of the STOP, as it is shown; empty while nothing is."""
         return self._outcome.main_text if self._outcome.isVisible() else ""
 
+    def be_short(self, is_short: bool) -> None:
+        """Leave out what stands elsewhere too, where there is little room: STOP names the robot."""
+        self._is_short = is_short
+        self._brand.setVisible(not is_short)
+
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
         for name, words in _WORDS.items():
-            self._chips[name].setVisible(station is not None)
+            self._chips[name].setVisible(station is not None and not (self._is_short and name == "robot"))
             if station is not None:
                 self._chips[name].show_words(*words(station))
         self._refresh_stop(station)

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from PySide6.QtCore import QByteArray, QSettings, Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtCore import QByteArray, QSettings, Signal
+from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QApplication,
-    QDockWidget,
+    QHBoxLayout,
     QMainWindow,
     QMenu,
     QPushButton,
@@ -22,6 +22,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.processing.units import UNITS, Units
 from server_gui.views.audit import Audit
 from server_gui.views.cloud.panel import Cloud
+from server_gui.views.docks import Area, Docks
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
@@ -34,9 +35,8 @@ from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.signals import Signals
 from server_gui.views.status_bar import StatusBar
 from server_gui.views.theme import Look, Theme
-from server_gui.views.widgets.scrolled import scrolled
+from server_gui.views.widgets.scrolled import Scrolled
 
-LAYOUT: Final = 1  # rises when a stored layout no longer fits
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 SLOW: Final = 6  # frames between two looks at what people read
 CHOICES: Final = (
@@ -95,24 +95,24 @@ class MainWindow(QMainWindow):
         self.tabs = QTabWidget()
         self._views: tuple[View, ...] = (self.overview, self.signals, self.resources, self.audit)
         for title, view in zip(("&Overview", "&Signals", "&Resources", "&Audit"), self._views, strict=True):
-            self.tabs.addTab(scrolled(view), title)
+            self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at
         if archive is not None:
             self.recordings = Recordings(archive, desk.recording, theme)
             self.cloud = Cloud(archive, desk.recording, theme)
             self._views += (self.recordings, self.cloud)
-            self.tabs.addTab(scrolled(self.recordings), "Re&cordings")
-            self.tabs.addTab(scrolled(self.cloud), "C&loud")
-        self._offer_help()
+            self.tabs.addTab(Scrolled(self.recordings), "Re&cordings")
+            self.tabs.addTab(Scrolled(self.cloud), "C&loud")
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
         self._pages.addWidget(self.empty)
         self._pages.addWidget(self.tabs)
         self._build()
+        self._offer_help()
         menu.setMenu(self._view_menu())
-        self._usual = self.saveState(LAYOUT)
         self._restore()
+        theme.scaled.connect(self._scaled)
 
     def refresh(self) -> None:
         """One frame: what moves each time, what is read now and then, and only what is visible."""
@@ -132,7 +132,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.kept.setValue("geometry", self.saveGeometry())
-        self.kept.setValue("state", self.saveState(LAYOUT))
+        self.kept.setValue("state", self._panels.state)
         self.kept.setValue("look", self._theme.look.value)
         self.kept.setValue("scale", round(self._theme.scale * 100))
         self.kept.setValue("units", dict(self._desk.shown.units.by_si))
@@ -142,9 +142,11 @@ class MainWindow(QMainWindow):
 
     def reset_layout(self) -> None:
         """Everything where it was at first."""
-        self.restoreState(self._usual, LAYOUT)
-        for dock in self.docks:
-            dock.show()
+        self._panels.reset(self.docks)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
 
     def show_help(self) -> None:
         """What the manual says of the panel that has the keyboard, or of the tab."""
@@ -166,37 +168,43 @@ class MainWindow(QMainWindow):
         column.addWidget(self._pages, 1)
         self.setCentralWidget(middle)
         self.setMenuWidget(self.header)
-        self.setCorner(Qt.Corner.BottomLeftCorner, Qt.DockWidgetArea.LeftDockWidgetArea)
-        self.setCorner(Qt.Corner.BottomRightCorner, Qt.DockWidgetArea.RightDockWidgetArea)
-        areas = Qt.DockWidgetArea
-        self.docks = [
-            self._dock("Robots", self.robots, areas.LeftDockWidgetArea),
-            self._dock("Parameters", self.parameters, areas.RightDockWidgetArea),
-            self._dock("Events", self.events, areas.BottomDockWidgetArea),
-        ]
-        self._manual = self._dock("Help", self.help, areas.RightDockWidgetArea)
-        self._manual.hide()
-        self._size_docks()
-        self._theme.scaled.connect(self._size_docks)
+        left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
+        panels = {
+            "Robots": (self.robots, left),
+            "Parameters": (self.parameters, right),
+            "Events": (self.events, below),
+            "Help": (self.help, right),
+        }
+        self._panels = Docks(self, self._theme, panels)
+        *self.docks, self._manual = self._panels.all
 
-    def _size_docks(self) -> None:
-        px = self._theme.px
-        self.resizeDocks([self.docks[0]], [px(225)], Qt.Orientation.Horizontal)
-        self.resizeDocks([self.docks[1]], [px(400)], Qt.Orientation.Horizontal)
-        self.resizeDocks([self.docks[2]], [px(120)], Qt.Orientation.Vertical)
+    def _scaled(self) -> None:
+        self._fit(scaled=True)
 
-    def _dock(self, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
-        dock = QDockWidget(title)
-        dock.setObjectName(title)
-        dock.setWidget(widget)
-        self.addDockWidget(area, dock)
-        return dock
+    def _fit(self, *, scaled: bool = False) -> None:
+        """Do with the room that there is."""
+        is_narrow = not self._panels.has_room
+        if is_narrow != self._panels.is_narrow:
+            for part in (self.header, self.parameters):
+                part.be_short(is_narrow)
+            self.panels_button.setVisible(is_narrow)
+        self._panels.fit(scaled=scaled)
 
     def _offer_help(self) -> None:
         self.help_button.setAccessibleName("Help")
         self.help_button.setToolTip("What the manual says of this (F1)")
         self.help_button.clicked.connect(self.show_help)
-        self.tabs.setCornerWidget(self.help_button)
+        self.panels_button = QPushButton("Panels")
+        self.panels_button.setToolTip("Hide robots, parameters and events, or show them again (F9)")
+        self.panels_button.clicked.connect(self._panels.put_away)
+        self.panels_button.hide()
+        corner = QWidget()
+        row = QHBoxLayout(corner)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(2)
+        row.addWidget(self.panels_button)
+        row.addWidget(self.help_button)
+        self.tabs.setCornerWidget(corner)
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
 
     def _view_menu(self) -> QMenu:
@@ -204,6 +212,9 @@ class MainWindow(QMainWindow):
         menu.setToolTipsVisible(True)
         for dock in (*self.docks, self._manual):
             menu.addAction(dock.toggleViewAction())
+        hide = menu.addAction("Hide panels, or show them")
+        hide.setShortcut(QKeySequence("F9"))
+        hide.triggered.connect(self._panels.put_away)
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
         looks = {look.value.capitalize(): look for look in Look}
@@ -233,7 +244,7 @@ class MainWindow(QMainWindow):
         if isinstance(geometry, QByteArray):
             self.restoreGeometry(geometry)
         if isinstance(state, QByteArray):
-            self.restoreState(state, LAYOUT)
+            self._panels.restore(state)
 
 
 def _within(panel: QWidget) -> bool:

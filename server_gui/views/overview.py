@@ -4,7 +4,8 @@ import time
 from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from ml.robot.task import ABNORMAL, UNKNOWN
@@ -28,6 +29,8 @@ from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
 
 SECONDS: Final = 10.0
+SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
+A_COLUMN: Final = 150  # wide at least, at text of 100 %
 STATUS_LINES: Final = 5
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
@@ -91,16 +94,34 @@ class Overview(QWidget):
         self._plots = [KeyPlot(desk, theme, *plot) for plot in PLOTS]
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
         self._joints.body.addWidget(JointTable(self._model, theme))
-        grid = QGridLayout(self)
-        grid.setContentsMargins(8, 8, 8, 8)
-        grid.setSpacing(8)
-        for column, top in enumerate((self._status, self._posture, self._pressure)):
-            grid.addWidget(top, 0, column)
-            grid.addWidget(self._plots[column], 1, column)
-            grid.setColumnStretch(column, (10, 9, 11)[column])
-        grid.addWidget(self._joints, 2, 0, 1, 3)
-        for row, share in enumerate((10, 6, 7)):
-            grid.setRowStretch(row, share)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(8, 8, 8, 8)
+        self._grid.setSpacing(8)
+        self._columns = 0
+        self._arrange(len(SHARES))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        columns = min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
+        if columns != self._columns:
+            self._arrange(columns)
+
+    def minimumSizeHint(self) -> QSize:
+        """As narrow as one column: then it is arranged for less."""
+        return QSize(self._theme.px(A_COLUMN), super().minimumSizeHint().height())
+
+    def _arrange(self, columns: int) -> None:
+        """The cards beside each other, as many as have room, and the joints below all of them."""
+        self._columns, grid = columns, self._grid
+        for place, card in enumerate((self._status, self._posture, self._pressure, *self._plots)):
+            grid.addWidget(card, place // columns, place % columns)
+        rows = -(-6 // columns)
+        grid.addWidget(self._joints, rows, 0, 1, columns)
+        for column, share in enumerate(SHARES):
+            grid.setColumnStretch(column, share if column < columns else 0)
+        for row in range(7):
+            is_plots = row * columns >= 3
+            grid.setRowStretch(row, 0 if row > rows else 7 if row == rows else 6 if is_plots else 10)
 
     def refresh(self) -> None:
         """Draw how it is now; what is read rather than seen changes more slowly."""

@@ -367,7 +367,7 @@ def test_the_store_is_shown_with_where_its_keys_come_from_and_never_the_keys(
     assert cloud._facts["URL"].text() == settings.store.url
     assert cloud._facts["Keys"].text() == "none needed: it is a folder"
     tops = below(cloud.browser.invisibleRootItem())
-    assert [top.text(0) for top in tops] == ["telemetry", "sessions", "events"]
+    assert [top.text(0) for top in tops] == ["telemetry", "sessions", "events", "predictions"]
     tops[0].setExpanded(True)
     robot = below(tops[0])[0]
     assert robot.text(0) == "exo-01"

@@ -116,3 +116,10 @@ def test_every_tab_is_whole_on_every_screen(
             assert len(colours(image)) > 60, name
             assert theme.colour("window").rgb() in colours(image), name
         assert stop_is_whole(full)
+        full.docks[1].raise_()
+        full.parameters.tree.select_name("gait.step_length")
+        page.draw()
+        save(full.grab().toImage(), f"parameters-{look.value}-{100 * scale:.0f}-{screen}.png")
+        panel = full.parameters
+        assert panel.rect().contains(panel.review_button.geometry())
+        assert panel.tree.viewport().height() >= 4 * panel.tree.sizeHintForRow(0), "some are in sight"

@@ -149,3 +149,46 @@ def luminance(colour: str) -> float:
     parts = [int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)]
     linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_back(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    window.resize(1366, 768)
+    bench.draw(window)
+    before = [dock.geometry() for dock in window.docks]
+    theme.set(scale=2.0)
+    bench.draw(window)
+    assert (window.width(), window.height()) == (1366, 768)
+    robots, parameters, events = window.docks
+    assert set(window.tabifiedDockWidgets(robots)) == {parameters, events}
+    parameters.raise_()
+    bench.draw(window)
+    assert window.overview.width() > 600
+    assert not window.parameters.visibleRegion().isEmpty()
+    assert stop_is_whole(window)
+    QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
+    bench.draw(window)
+    assert window.overview.width() > 1300
+    assert stop_is_whole(window)
+    QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
+    theme.set(scale=1.0)
+    bench.draw(window)
+    assert [dock.geometry() for dock in window.docks] == before
+    assert not window.panels_button.isVisible()
+
+
+def test_in_a_window_without_room_seldom_things_are_behind_one_button(
+    window: MainWindow, bench: Bench
+) -> None:
+    window.resize(900, 700)
+    bench.look_again([looked()])
+    bench.draw(window)
+    panel = window.parameters
+    panel.tree.select_name("gait.step_length")
+    menu = panel.more.menu()
+    menu.aboutToShow.emit()
+    actions = {action.text(): action for action in menu.actions()}
+    assert all(action.isEnabled() for action in actions.values())
+    actions["Store to flash …"].trigger()
+    assert panel.pages.currentWidget() is panel.storing

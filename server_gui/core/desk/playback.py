@@ -92,7 +92,6 @@ def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[Said]:
     return ()
 
 
-
 class Playback:
     """For the window's thread; `read` does what it is given in another one.
 

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -32,6 +34,7 @@ from server_gui.views.widgets.files import ask_folder
 from server_gui.views.widgets.mark import MarkIcon
 
 SLOW: Final = 6  # frames between two looks
+NARROW: Final = 480  # at text of 100 %: what is narrower has no room for two cards beside each other
 UPLOAD: Final = "Upload what waits"
 NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
@@ -45,6 +48,7 @@ class Cloud(QWidget):
     def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
         super().__init__()
         self._archive = archive
+        self._theme = theme
         self._recording = recording
         self._frame = 0
         self.setObjectName("page")
@@ -73,14 +77,20 @@ class Cloud(QWidget):
         self._cards["In the store"].body.addWidget(self.browser, 1)
         self._cards["In the store"].body.addLayout(self._actions())
         self._cards["Jobs"].body.addWidget(self.jobs)
-        top = QHBoxLayout()
-        top.addWidget(self._cards["Store"], 3)
-        top.addWidget(self._cards["Waiting for upload"], 2)
+        self._top = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._top.addWidget(self._cards["Store"], 3)
+        self._top.addWidget(self._cards["Waiting for upload"], 2)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
-        everything.addLayout(top)
+        everything.addLayout(self._top)
         everything.addWidget(self._cards["In the store"], 3)
         everything.addWidget(self._cards["Jobs"], 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_narrow = self.width() < self._theme.px(NARROW)
+        direction = QBoxLayout.Direction
+        self._top.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
 
     def refresh(self) -> None:
         """Look again where it is time, and show how it is."""

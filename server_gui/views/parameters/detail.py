@@ -15,6 +15,7 @@ from server_gui.core.desk.stored import RULE
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import exact
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.elided import ElidedLabel
 
 STEPS: Final = 200
 
@@ -42,6 +43,7 @@ class Detail(Card):
         self._desk = desk
         self._name: str | None = None
         self._range: tuple[float, float] | None = None
+        self._is_short = False
         self.slider = CalmSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, STEPS)
         self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -70,6 +72,16 @@ class Detail(Card):
         self._facts.setWordWrap(True)
         self._facts.setToolTip(f"Stored: {RULE}")
         self.body.addWidget(self._facts)
+        self._brief = ElidedLabel("dim")
+        self._brief.hide()
+        self.body.addWidget(self._brief)
+
+    def be_short(self, is_short: bool) -> None:
+        """Where there is little room: seen when one is chosen; one line says what is known, its tip all."""
+        self._is_short = is_short
+        self._facts.setVisible(not is_short)
+        self._brief.setVisible(is_short)
+        self.refresh()
 
     def choose(self, name: str | None) -> None:
         """Show this one."""
@@ -82,6 +94,7 @@ class Detail(Card):
         info = None if station is None or self._name is None else station.known.get(self._name)
         for widget in (self.slider, self.field, self._drop, self.pin):
             widget.setEnabled(info is not None)
+        self.setVisible(info is not None or not self._is_short)
         if station is None or info is None:
             return
         unit = unit_of(info.name, info.unit, self._desk.shown.units)
@@ -99,7 +112,11 @@ class Detail(Card):
             if self.field.text() != text:
                 self.field.setText(text)
         self._refresh_slider(info, current, value)
-        set_text(self._facts, _facts(station, info, unit, current))
+        facts = _facts(station, info, unit, current)
+        set_text(self._facts, facts)
+        set_text(self._brief, facts.rpartition("\n")[2])  # a problem stands in a line of its own
+        if self._brief.toolTip() != facts:
+            self._brief.setToolTip(facts)
 
     def _refresh_slider(self, info: ParameterInfo, current: Number | None, value: Number | None) -> None:
         self._range = reach(info, current)

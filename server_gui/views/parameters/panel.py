@@ -1,13 +1,14 @@
 """The parameters panel: filter, tree, chosen one; review, write or try, undo; a file; storing to flash."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QGridLayout,
     QLabel,
+    QMenu,
     QPushButton,
     QStackedWidget,
     QVBoxLayout,
@@ -79,6 +80,13 @@ class ParametersPanel(QWidget):
             self._refresh_review(station)
         elif self.pages.currentWidget() is self.storing:
             self.storing.refresh()
+
+    def be_short(self, is_short: bool) -> None:
+        """Where there is little room, what is done seldom is behind one button."""
+        self.more.setVisible(is_short)
+        for button in self._seldom:
+            button.setVisible(not is_short)
+        self.detail.be_short(is_short)
 
     def stage_text(self, name: str, text: str) -> None:
         """Stage what was typed, in the unit that is shown."""
@@ -169,8 +177,24 @@ class ParametersPanel(QWidget):
         grid.addWidget(self._compare, 1, 0)
         grid.addWidget(self._save, 1, 1)
         grid.addWidget(self.store_button, 1, 2)
+        grid.addWidget(self._more_button(), 0, 3)
         grid.setColumnStretch(2, 1)
         return grid
+
+    def _more_button(self) -> QPushButton:
+        """What its menu has is done by the buttons that it stands for."""
+        self._seldom = (self._compare, self._save, self.store_button)
+        self.more = QPushButton("More")
+        menu = QMenu(self.more)
+        actions = {button: menu.addAction(button.text()) for button in self._seldom}
+        for button, action in actions.items():
+            action.setToolTip(button.toolTip())
+            action.triggered.connect(button.click)
+        menu.setToolTipsVisible(True)
+        menu.aboutToShow.connect(lambda: _enable_alike(actions))
+        self.more.setMenu(menu)
+        self.more.hide()
+        return self.more
 
     def _connect(self) -> None:
         QShortcut(QKeySequence.StandardKey.Find, self, self.filters.words.setFocus)
@@ -267,6 +291,11 @@ class ParametersPanel(QWidget):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
             self.banner.style().polish(self.banner)
+
+
+def _enable_alike(actions: Mapping[QPushButton, QAction]) -> None:
+    for button, action in actions.items():
+        action.setEnabled(button.isEnabled())
 
 
 def _close_file(station: Station) -> None:

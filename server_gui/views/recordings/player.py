@@ -30,7 +30,7 @@ from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
-from server_gui.views.widgets.scrolled import scrolled
+from server_gui.views.widgets.scrolled import Scrolled
 
 SLOW: Final = 5  # frames between two looks at what people read
 
@@ -49,7 +49,7 @@ class Player(QWidget):
         self._views = (self.overview, Signals(self._playback.desk, theme))
         self._stack = QStackedWidget()
         for view in self._views:
-            self._stack.addWidget(scrolled(view))
+            self._stack.addWidget(Scrolled(view))
         self.banner = QLabel()
         self.banner.setObjectName("banner")
         self.banner.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)

@@ -35,11 +35,16 @@ class GaitRing(QWidget):
         self._drawn = QPixmap()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(150, 150)
         self.setAccessibleName("Gait phase")
+        theme.changed.connect(self._restyle)
+        self._restyle()
 
     def sizeHint(self) -> QSize:
         return QSize(230, 230)
+
+    def _restyle(self) -> None:
+        side = max(150, self._theme.px(110))
+        self.setMinimumSize(side, side)
 
     def show_phases(self, phases: Phases, modelled: Phases, word: str, below: str, *, live: bool) -> None:
         """Draw these, by steps and by a model; what is not `live` is grey."""

@@ -1,0 +1,113 @@
+"""The panels around the tabs: beside them where there is room, else one behind the other at the right."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from PySide6.QtCore import QByteArray, Qt
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
+
+from server_gui.views.theme import Theme
+
+LAYOUT: Final = 1  # rises when a stored layout no longer fits
+ROOMY: Final = 1000  # wide, at text of 100 %: what is narrower has no room for everything at once
+STACK: Final = 340  # wide, likewise: panels that are one behind the other
+Area = Qt.DockWidgetArea
+
+
+class Docks:
+    """Of a window, whose `fit` is called whenever its size, or that of the text, has changed.
+
+    The last panel is seen only when it is asked for. What people have arranged in a roomy window is kept
+    while it is narrow, and over the end of the program.
+    """
+
+    def __init__(self, window: QMainWindow, theme: Theme, panels: Mapping[str, tuple[QWidget, Area]]) -> None:
+        self._window = window
+        self._theme = theme
+        self.is_narrow = False
+        window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
+        window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
+        window.setTabPosition(Area.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+        self.all = [self._dock(title, widget, area) for title, (widget, area) in panels.items()]
+        self.all[-1].hide()
+        self._put_away: list[QDockWidget] = []
+        self._size()
+        self._usual = self._roomy = window.saveState(LAYOUT)
+
+    @property
+    def state(self) -> QByteArray:
+        """What is to be kept."""
+        return self._roomy if self.is_narrow else self._window.saveState(LAYOUT)
+
+    def restore(self, state: QByteArray) -> None:
+        """Arrange them as it was kept."""
+        self._window.restoreState(state, LAYOUT)
+
+    def reset(self, shown: Sequence[QDockWidget]) -> None:
+        """Everything where it was at first, and these in sight."""
+        self._roomy = self._usual
+        self.restore(self._usual)
+        for dock in shown:
+            dock.show()
+        if self.is_narrow:
+            self._stack()
+
+    def put_away(self) -> None:
+        """Leave all the room to the tabs; or, where that is so, show what was there again."""
+        in_sight = [dock for dock in self.all if not dock.isHidden() and not dock.isFloating()]
+        again = [] if in_sight else self._put_away or self.all[:-1]
+        for dock in in_sight or again:
+            dock.setVisible(not in_sight)
+        self._put_away = in_sight
+
+    @property
+    def has_room(self) -> bool:
+        """Whether all of them have room beside the tabs."""
+        return self._window.width() >= self._theme.px(ROOMY)
+
+    def fit(self, *, scaled: bool = False) -> None:
+        """Arrange them for the room that there is; where text has another size, as wide as it needs."""
+        if self.has_room is self.is_narrow:
+            self.is_narrow = not self.has_room
+            if self.is_narrow:
+                self._roomy = self._window.saveState(LAYOUT)
+                self._stack()
+            else:
+                self._unstack()
+        if scaled:
+            self._size()
+
+    def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
+        dock = QDockWidget(title)
+        dock.setObjectName(title)
+        dock.setWidget(widget)
+        self._window.addDockWidget(area, dock)
+        return dock
+
+    def _size(self) -> None:
+        widths, px = (225, 400), self._theme.px
+        if self.is_narrow:
+            self._window.resizeDocks(self.all[:1], [px(STACK)], Qt.Orientation.Horizontal)
+            return
+        self._window.resizeDocks(self.all[:2], [px(width) for width in widths], Qt.Orientation.Horizontal)
+        self._window.resizeDocks(self.all[2:3], [px(120)], Qt.Orientation.Vertical)
+
+    def _stack(self) -> None:
+        """One behind the other; their tabs say what they are, so that they need no title."""
+        first = self.all[0]
+        for dock in self.all:
+            if not dock.isFloating():
+                dock.setTitleBarWidget(QWidget())
+                self._window.addDockWidget(Area.RightDockWidgetArea, dock)
+                if dock is not first:
+                    self._window.tabifyDockWidget(first, dock)
+        first.raise_()
+        self._size()
+
+    def _unstack(self) -> None:
+        for dock in self.all:
+            bar = dock.titleBarWidget()
+            dock.setTitleBarWidget(None)  # type: ignore[arg-type]
+            if bar is not None:
+                bar.deleteLater()
+        self.restore(self._roomy)
