@@ -199,7 +199,9 @@ def _say_replayed(session: Session, found: Sequence[Replayed]) -> None:
     for one in found:
         about = {"task": one.model.card.task, "model": one.model.card.id, "decisions": len(one.predictions)}
         trust = {"trust": one.trust.level.value, "drifted": one.trust.drifted}
-        say_json(whose | about | {"live": one.live, "quality": one.quality} | trust)
+        say_json(
+            whose | about | {"live": one.live, "quality": one.quality, "flattered": one.flattered} | trust
+        )
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -103,7 +103,7 @@ def replay_told(found: Replayed) -> str:
     if found.live.decisions:
         lines.append(f"said live: {found.live.decisions}, of which {found.live.same} are the same here\n")
     if found.quality is not None:
-        lines.append(_quality(found.quality))
+        lines.append(_quality(found.quality, flattered=found.flattered))
     lines += _spells(found) if found.model.learned.task.fold else []
     return "\n".join(lines) + "\n"
 
@@ -132,13 +132,14 @@ def _labels(predictions: Sequence[Prediction]) -> str:
     return table(("SAYS", "DECISIONS", "SHARE", "PROBABILITY"), rows, (1, 2, 3))
 
 
-def _quality(quality: Quality) -> str:
+def _quality(quality: Quality, *, flattered: bool) -> str:
     columns = sorted({label for row in quality.confusion.values() for label in row})
     rows = [
         (was, *(str(row.get(label, 0)) for label in columns))
         for was, row in sorted(quality.confusion.items())
     ]
-    return f"labels: {quality.text}\n" + table(
+    but = "; the model has learned from this session, which flatters it" if flattered else ""
+    return f"labels: {quality.text}{but}\n" + table(
         ("WAS", *(f"SAYS {label}" for label in columns)), rows, range(1, len(columns) + 1)
     )
 

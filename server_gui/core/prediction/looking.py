@@ -2,21 +2,20 @@
 
 import threading
 from collections.abc import Callable
-from typing import Final, Self
-
-BREAK_OFF_S: Final = 20.0  # longer than it takes to import what models need, in a window 7 s of a core
+from typing import Self
 
 
 class Looking:
     """Calls `look` at once, then every `every_s` and after each `wake`; use it as a context manager.
 
-    What hangs in a look holds leaving up for no longer than `BREAK_OFF_S`; then it ends with the process.
+    What hangs in a look holds leaving up for no longer than `break_off_s`; then it ends with the process.
     """
 
-    def __init__(self, name: str, look: Callable[[], None], every_s: float) -> None:
+    def __init__(self, name: str, look: Callable[[], None], every_s: float, break_off_s: float) -> None:
         self.ending = False
         self._look = look
         self._every_s = every_s
+        self._break_off_s = break_off_s
         self._wake = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
@@ -27,7 +26,7 @@ class Looking:
     def __exit__(self, *exc: object) -> None:
         self.ending = True
         self._wake.set()
-        self._thread.join(BREAK_OFF_S)
+        self._thread.join(self._break_off_s)
 
     def wake(self) -> None:
         """Look now; from any thread."""

@@ -42,6 +42,7 @@ class Replayed:
     utc_ns: Sequence[int]  # of each
     live: Live
     quality: Quality | None  # None where nobody has labelled anything
+    flattered: bool  # by that: the model has learned from this session
     trust: Trust  # over its last minute
     truth: Mapping[int, str] = field(default_factory=dict)  # stamp → class, where somebody has said it
 
@@ -95,6 +96,7 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
         rows.to_utc(stamps_ns).tolist() if found else [],
         _live(store, session, model, found),
         quality(counts) if counts else None,
+        session.session in model.card.learned,
         _trust(model, found, rows),
         {stamp: str(name) for stamp, name in zip(stamps_ns.tolist(), was, strict=True) if name != NOBODY},
     )

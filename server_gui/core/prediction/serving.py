@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+BREAK_OFF_S: Final = 20.0  # longer than it takes to import what models need, in a window 7 s of a core
 RETRY_S: Final = 600.0  # between attempts to load what was refused, while nothing of it has changed
 
 Key = tuple[str, str]  # robot and task
@@ -51,7 +52,7 @@ class Serving:
         self._chosen_for: Mapping[str, dict[str, str]] = {}  # the robots at the newest look
         self._seen: Any = None  # what should serve then, and the files of what was refused
         self._retry_s = math.inf  # when that is tried again, on our monotonic clock
-        self._looking = Looking("models", self._look, poll_s)
+        self._looking = Looking("models", self._look, poll_s, BREAK_OFF_S)
 
     def __enter__(self) -> Self:
         self._looking.__enter__()

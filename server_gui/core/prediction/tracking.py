@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 EVERY_S: Final = 60.0
+BREAK_OFF_S: Final = 5.0
 
 
 class Tracking:
@@ -27,7 +28,7 @@ class Tracking:
         self._url = store_url
         self._robots = robots
         self._record: TrackRecord | None = None
-        self._looking = Looking("track record", self._look, EVERY_S)
+        self._looking = Looking("track record", self._look, EVERY_S, BREAK_OFF_S)
         self.wake = self._looking.wake  # look now; from any thread
 
     def __enter__(self) -> Self:

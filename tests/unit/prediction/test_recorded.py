@@ -21,6 +21,7 @@ from server_gui.core.prediction.replay import Live, replay
 from server_gui.core.prediction.settings import Action, PredictionSettings, RuleSettings
 from server_gui.core.prediction.track_record import TrackRecord
 from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
+from server_gui.terminal.predictions import replay_told
 from tests.unit.prediction.robots import SteadyRobot, publish
 
 WAIT_S = 30.0
@@ -130,3 +131,12 @@ def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
     store.append(PREDICTIONS, "predictions", late.schema, late.to_reader, "late", 1)
     for one, said in ((replace(session, ended=None), len(rows)), (session, len(rows) + 1)):
         assert replay(store, one, PredictionSettings())[0].live == Live(said, len(rows))
+
+    # a model that has learned from this session is not proven right by it
+    pupil = publish(server.store.url, learned=(session.session,))
+    mine, other = replay(store, session, PredictionSettings(), [pupil, model])
+    assert (mine.flattered, other.flattered) == (True, False)
+    assert mine.quality == other.quality
+    assert f"labels: {mine.quality.text if mine.quality else None}; the model has learned" in replay_told(
+        mine
+    )
