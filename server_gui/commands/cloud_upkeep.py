@@ -18,6 +18,8 @@ journals and labels are small."""
 VACUUM_EPILOG = """Compaction and retention leave the files of older versions where they are. This deletes
 them, except those of versions that are younger than --grace days, or that a model names."""
 
+MOST_DAYS = 36_500
+
 
 def compact(argv: list[str]) -> int:
     """Run `gwrms cloud compact`."""
@@ -35,7 +37,7 @@ def compact(argv: list[str]) -> int:
 def retain(argv: list[str]) -> int:
     """Run `gwrms cloud retain`."""
     made = _parser("retain", "Remove rows that are older than so many days.", RETAIN_EPILOG)
-    made.add_argument("--days", type=float, required=True, metavar="N", help="how old rows may become")
+    made.add_argument("--days", type=_days, required=True, metavar="N", help="how old rows may become")
     made.add_argument("--table", action="append", choices=TABLES, help="of this table; again for more")
     made.add_argument("--yes", action="store_true", help="do not ask")
     arguments = made.parse_args(argv)
@@ -61,7 +63,7 @@ def vacuum(argv: list[str]) -> int:
     """Run `gwrms cloud vacuum`."""
     made = _parser("vacuum", "Delete files that no newer version needs.", VACUUM_EPILOG)
     made.add_argument(
-        "--grace", type=float, default=upkeep.GRACE.days, metavar="DAYS", help="(default: %(default)s)"
+        "--grace", type=_days, default=upkeep.GRACE.days, metavar="DAYS", help="(default: %(default)s)"
     )
     arguments = made.parse_args(argv)
     store = _writable(arguments)
@@ -85,6 +87,13 @@ def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
         "--alone", action="store_true", help="no server runs: for a store that keeps no two writers apart"
     )
     return made
+
+
+def _days(text: str) -> float:
+    days = float(text)
+    if not 0 <= days <= MOST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text} days: write a number from 0 to {MOST_DAYS}")
+    return days
 
 
 def _writable(arguments: argparse.Namespace) -> Store:

@@ -3,7 +3,7 @@
 import fnmatch
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any
 
 import pyarrow as pa
@@ -31,6 +31,19 @@ class Choice:
                 raise StoreError(f"the session has no channel {glob!r} (gwrms sessions show lists them)")
         return [each for each in known if any(fnmatch.fnmatchcase(each.name, glob) for glob in self.channels)]
 
+    def check(self, session: Session) -> None:
+        """Raises `StoreError` where the session has nothing of the time."""
+        first, last = session.first, session.last
+        begin, end = self.begin or first, self.end or last
+        if first is None or last is None or begin is None or end is None:
+            return
+        if begin >= end or begin >= last or end <= first:
+            times = [f"{time.astimezone(UTC):%Y-%m-%d %H:%M:%S}" for time in (begin, end, first, last)]
+            raise StoreError(
+                f"the session {session.session} has nothing from {times[0]} to {times[1]}: "
+                f"it goes from {times[2]} to {times[3]} UTC, {session.length.total_seconds():.0f} s"
+            )
+
     def holds(self, row: Row) -> bool:
         """Whether the row's time is wanted."""
         utc = row["utc"]
@@ -52,13 +65,14 @@ def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Record
     """What is wanted of a session that was opened among these; telemetry is read while `tables` is.
 
     Raises:
-        StoreError: there is nothing of it, or the store cannot be read.
+        StoreError: there is nothing of it or of that time, or the store cannot be read.
         SpoolUnusable: the spool cannot be read.
 
     """
     session = recorded.session
     if not recorded.channels:
         raise StoreError(f"the session {session.session} of {session.robot} has no telemetry")
+    choice.check(session)
     channels = choice.of(recorded.channels)
     names = [each.name for each in channels]
     return Recording(

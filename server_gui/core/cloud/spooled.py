@@ -24,7 +24,7 @@ _layout_decoder = msgspec.msgpack.Decoder(Layout)
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A batch that is marked as uploaded: whose telemetry is in it, and rows of which other tables."""
+    """A batch: whose telemetry is in it, and rows of which other tables."""
 
     spool: str
     number: int
@@ -78,12 +78,16 @@ def identity(spool: Path) -> str:
     return file.read_text().strip() if file.exists() else ""
 
 
-def uploaded(spool: Path) -> Iterator[Batch]:
-    """Every batch that is kept as a second copy, oldest first."""
-    for number in sorted(set(kept(spool)) - set(waiting(spool))):
-        robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))
-        tables = frozenset(record.table for record in _records(spool, number))
-        yield Batch(identity(spool), number, robots, tables)
+def uploaded(spool: Path) -> list[int]:
+    """The batches that are kept as a second copy, oldest first."""
+    return sorted(set(kept(spool)) - set(waiting(spool)))
+
+
+def batch(spool: Path, number: int) -> Batch:
+    """What is in a batch."""
+    robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))
+    tables = frozenset(record.table for record in _records(spool, number))
+    return Batch(identity(spool), number, robots, tables)
 
 
 def _records(spool: Path, batch: int) -> list[Record]:
@@ -98,7 +102,9 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
         SpoolUnusable: it cannot be read; or it went to the store, and was removed to make room.
 
     """
-    for file in (spool / f"{batch:08}.db", spool / f"{batch:08}.uploaded.db"):
+    advice = {".db": "gwrms cloud upload sets it aside", ".uploaded.db": "it is a second copy: remove it"}
+    for suffix, what_to_do in advice.items():
+        file = spool / f"{batch:08}{suffix}"
         try:
             with (
                 translated(file),
@@ -106,7 +112,7 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
             ):
                 return database.execute(sql, values).fetchall()
         except Damaged as error:
-            raise Damaged(f"{error}; gwrms cloud upload sets it aside") from error
+            raise Damaged(f"{error}; {what_to_do}") from error
         except SpoolUnusable as error:
             if "no such table" in str(error):
                 return []

@@ -14,6 +14,7 @@ from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from server_gui.core.cloud import spooled
+from server_gui.core.recording.errors import Damaged
 
 Advance = Callable[[int], object]
 AT_ONCE: Final = 4  # files
@@ -63,7 +64,12 @@ def _decoded(store: Store, file: DataFile) -> int:
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
     """The spool's batches that are marked as uploaded, and are not in every table that they belong to."""
     known: dict[str, int] = {}
-    for batch in spooled.uploaded(spool):
+    for number in spooled.uploaded(spool):
+        try:
+            batch = spooled.batch(spool, number)
+        except Damaged as error:
+            yield str(error)
+            continue
         for location in _locations(store, batch):
             if location not in known:
                 known[location] = _newest(store, location, batch.spool)

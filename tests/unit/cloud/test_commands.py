@@ -251,6 +251,9 @@ def test_upkeep_tells_what_it_would_do_and_leaves_what_a_model_names(desk: Desk)
     assert not any("events/" in name for name in plan["files"])
     assert any("labels/" in name for name in plan["files"])
     assert recorded.store.dataset("events", version).count_rows() == 4
+    for days in ("-1", "nan", "1e9", "week"):
+        with pytest.raises(SystemExit):
+            desk.run("cloud", "retain", "--days", days)
     assert "there is no terminal to ask on" in desk.run("cloud", "retain", "--days", "0", status=1)
     assert desk.ask("cloud", "retain", "--days", "0", "--dry-run") == {"telemetry/000": 2 * ROWS}
     assert desk.ask("cloud", "retain", "--days", "0", "--yes") == {"telemetry/000": 2 * ROWS}

@@ -201,8 +201,10 @@ def test_a_choice_takes_channels_by_glob_and_refuses_one_that_means_none(
     with pytest.raises(StoreError, match="no channel 'right_"):
         choose(known, whole, Choice(("right_*",)))
     assert session.last is not None
-    late = choose(known, whole, Choice(begin=session.last + timedelta(hours=1)))
-    assert (sum(table.num_rows for table in late.tables), late.events, late.labels) == (0, [], [])
+    late = session.last + timedelta(hours=1)
+    for nothing in (Choice(begin=late), Choice(end=session.first), Choice(begin=late, end=session.last)):
+        with pytest.raises(StoreError, match=r"has nothing from .*: it goes from .* UTC, \d+ s"):
+            choose(known, whole, nothing)
 
 
 def read(file: Path) -> dict[str, list[tuple[int, Any]]]:

@@ -29,6 +29,16 @@ def test_a_whole_store_is_whole(store_url: str, tmp_path: Path) -> None:
     assert list(verify.batches_missing(recorded.store, recorded.spool)) == []
 
 
+def test_a_second_copy_that_is_damaged_is_named_and_the_others_are_looked_into(
+    folder_url: str, tmp_path: Path
+) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    (recorded.spool / "00000001.uploaded.db").write_bytes(b"x" * 10_000)
+    (recorded.spool / "00000009.uploaded.db").write_bytes(b"")
+    [problem] = verify.batches_missing(recorded.store, recorded.spool)
+    assert problem.endswith("is damaged: file is not a database; it is a second copy: remove it")
+
+
 def test_a_file_that_has_gone_is_named(store_url: str, tmp_path: Path) -> None:
     recorded = record(store_url, tmp_path / "spool")
     path, _ = telemetry(recorded.store)
