@@ -2,36 +2,73 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from ml.robot.task import ABNORMAL, UNKNOWN, Task
+from ml.features.windows import Samples
+from ml.robot.task import ABNORMAL, SIDES, STRIDE, UNKNOWN, Task
 from ml.serving.grid import Stamps
 from ml.store.labels import Label, Source
+from ml.training.judging import WITHIN
 from ml.training.recorded import Recorded
-from ml.training.truth import NOBODY, Names, Said, activities
+from ml.training.truth import NOBODY, Names, Said, activities, phases
 from server_gui.core.prediction.state import Quality
 
+STILL: Final = "no stride"  # what it was, where a phase was said and no leg steps
+OFF: Final = "another phase"  # what was said, where the phase of a leg is not within a tenth of the cycle
 Counts = Counter[tuple[str, str]]  # what it was, what was said → decisions
 
 
-def truth(
-    labels: Iterable[Label], clock: Recorded, task: Task, classes: Sequence[str], stamps_ns: Stamps
-) -> Names:
-    """What was so when decisions (n,), in time's order, are about: of these classes, or NOBODY.
+@dataclass(frozen=True, slots=True, eq=False)
+class Decisions:
+    """What was said at stamps (n,), in time's order: labels, and of gait_phase the phases (n, 2)."""
+
+    stamps_ns: Stamps
+    labels: Sequence[str]
+    values: Sequence[Mapping[str, float]]
+
+    @property
+    def phases(self) -> Samples:
+        """Of the left and the right leg, NaN where none was said."""
+        return np.array([[one.get(side, np.nan) for side in SIDES] for one in self.values]).reshape(-1, 2)
+
+
+def compared(
+    labels: Iterable[Label], clock: Recorded, task: Task, classes: Sequence[str], said: Decisions
+) -> tuple[Names, Sequence[str]]:
+    """What was so when decisions are about, of these classes, or NOBODY; and what was said, in these words.
 
     `clock` relates the labels' times to the robot's. What a model itself has labelled proves nothing.
     """
     known = [one for one in labels if one.source is not Source.PSEUDO]
-    if not known or not len(stamps_ns):
-        return np.full(len(stamps_ns), NOBODY)
+    if not known or not said.labels:
+        return np.full(len(said.labels), NOBODY), said.labels
     times = np.array([(one.began_utc_ns, one.ended_utc_ns) for one in known], np.int64)
     begins, ends = clock.at_utc(times[:, 0]).tolist(), clock.at_utc(times[:, 1]).tolist()
     spans = zip(begins, ends, known, strict=True)
-    said = [Said(begin, end, one.label, one.source) for begin, end, one in spans]
-    names, which = np.unique(activities(said, stamps_ns - task.delay_ms * 1_000_000)[0], return_inverse=True)
-    folded = (task.fold.get(str(name), NOBODY) for name in names)
+    spoken = [Said(begin, end, one.label, one.source) for begin, end, one in spans]
+    about_ns = said.stamps_ns - task.delay_ms * 1_000_000
+    if task.fold:
+        return _classes(activities(spoken, about_ns)[0], task, classes), said.labels
+    return _phases(*phases(spoken, about_ns), said)
+
+
+def _classes(names: Names, task: Task, classes: Sequence[str]) -> Names:
+    known, which = np.unique(names, return_inverse=True)
+    folded = (task.fold.get(str(name), NOBODY) for name in known)
     return np.array([name if name in classes else NOBODY for name in folded])[which]
+
+
+def _phases(true: Samples, sources: Names, said: Decisions) -> tuple[Names, Sequence[str]]:
+    """Right is within a tenth of the cycle of both legs; where no leg steps, only what is said counts."""
+    known, steps = sources != NOBODY, np.isfinite(true.sum(axis=1))
+    stride = np.array(said.labels) == STRIDE
+    apart: Samples = np.abs((said.phases - np.where(steps[:, None], true, 0.0) + 0.5) % 1.0 - 0.5)
+    off = ~(apart <= WITHIN).all(axis=1)
+    was = np.where(known & steps, STRIDE, np.where(known & stride, STILL, NOBODY))
+    return was, np.where(stride & steps & off, OFF, said.labels).tolist()
 
 
 def counted(was: Names, said: Sequence[str]) -> Counts:

@@ -20,7 +20,7 @@ from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS
 from ml.training.recorded import Recorded, recorded
 from ml.training.truth import NOBODY
-from server_gui.core.prediction.comparing import counted, quality, truth
+from server_gui.core.prediction.comparing import Decisions, compared, counted, quality
 from server_gui.core.prediction.serving import Model
 from server_gui.core.prediction.settings import PredictionSettings
 from server_gui.core.prediction.state import Quality
@@ -88,8 +88,9 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
     found = replayed(model.card.id, model.learned, rows.stamps_ns, rows.values, every_ns)
     stamps_ns = np.array([one.stamp_ns for one in found], np.int64)
     labels = [Label.of(row) for row in sessions.labels(store, session)]
-    was = truth(labels, rows, model.learned.task, model.learned.classes, stamps_ns)
-    counts = counted(was, [one.label for one in found])
+    said = Decisions(stamps_ns, [one.label for one in found], [one.values for one in found])
+    was, said_of_it = compared(labels, rows, model.learned.task, model.learned.classes, said)
+    counts = counted(was, said_of_it)
     return Replayed(
         model,
         found,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from datetime import UTC, datetime, timedelta
 from typing import Final, NamedTuple
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -17,16 +18,15 @@ from ml.robot.task import TASKS
 from ml.store import NoSuchTable, Store
 from ml.store.errors import translated
 from ml.store.fragments import DataFile, data_files
-from ml.store.labels import ACTIVITIES, Label, holding
+from ml.store.labels import ACTIVITIES, INSTANTS, Label, holding
 from ml.store.tables import LABELS, PREDICTIONS, Table
 from ml.training.recorded import Recorded
-from server_gui.core.prediction.comparing import Counts, counted, quality, truth
+from server_gui.core.prediction.comparing import Counts, Decisions, compared, counted, quality
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures
 
 Key = tuple[str, str, str]  # robot, task, model
 DELAY: Final = timedelta(milliseconds=max(task.delay_ms for task in TASKS.values()))
-COMPARED: Final = tuple(task.name for task in TASKS.values() if task.fold)
-_COLUMNS: Final = ["utc", "stamp_ns", "task", "model", "label"]
+_COLUMNS: Final = ["utc", "stamp_ns", "task", "model", "label", "values"]
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _field = pyarrow.dataset.field
 
@@ -48,6 +48,7 @@ class TrackRecord:
         self._registry = Registry(store_url)
         self._seen: object = None  # what `_figures` are of
         self._figures: Figures = {}
+        self._labelled: tuple[object, list[Label]] = None, []  # of what, session by session
         self._counts: Mapping[Stretch, Mapping[Key, Counts]] = {}
 
     def figures(self, robots: Set[str], now: datetime, ending: Callable[[], bool] = lambda: False) -> Figures:
@@ -85,20 +86,26 @@ class TrackRecord:
         delta = self._store.table(PREDICTIONS.name, said)
         with translated(f"{self._store.url}/{PREDICTIONS.name} cannot be read"):
             files = list(data_files(delta, PREDICTIONS.name))
-        found = sorted(self._labels(robots, since, labels), key=_session)
-        for _, each in itertools.groupby(found, _session):
+        for _, each in itertools.groupby(self._labels(robots, since, labels), _session):
             own = tuple(each)
             begin = max(since, _utc(min(one.began_utc_ns for one in own)))
             end = _utc(max(one.ended_utc_ns for one in own)) + DELAY
             yield Stretch(own, begin, end, tuple(sorted(_between(files, begin, end))))
 
     def _labels(self, robots: Set[str], since: datetime, version: int) -> list[Label]:
+        if self._labelled[0] != (robots, since, version):
+            self._labelled = (robots, since, version), self._read_labels(robots, since, version)
+        return self._labelled[1]
+
+    def _read_labels(self, robots: Set[str], since: datetime, version: int) -> list[Label]:
         wanted = (
-            _field("robot").isin(list(robots)) & _field("label").isin(ACTIVITIES) & (_field("ended") >= since)
+            _field("robot").isin(list(robots))
+            & _field("label").isin([*ACTIVITIES, *INSTANTS])
+            & (_field("ended") >= since)
         )
         with translated(f"{self._store.url}/{LABELS.name} cannot be read"):
             rows = self._store.dataset(LABELS.name, version).to_table(filter=wanted).to_pylist()
-        return [Label.of(row) for row in holding(rows)]
+        return sorted((Label.of(row) for row in holding(rows)), key=_session)
 
     def _compared(self, stretch: Stretch, version: int) -> Mapping[Key, Counts]:
         """What was said in a stretch, against what was so, by robot, task and model."""
@@ -112,10 +119,10 @@ class TrackRecord:
         found = {}
         for one in rows.group_by(["task", "model"]).aggregate([]).to_pylist():
             task, model = one["task"], one["model"]
-            classes = self._classes(model, session)
-            mine = rows.filter((_field("task") == task) & (_field("model") == model))
-            was = truth(stretch.labels, clock, TASKS[task], classes, mine["stamp_ns"].to_numpy())
-            found[robot, task, model] = counted(was, mine["label"].to_pylist())
+            if classes := self._classes(model, session):
+                said = _decisions(rows.filter((_field("task") == task) & (_field("model") == model)))
+                both = compared(stretch.labels, clock, TASKS[task], classes, said)
+                found[robot, task, model] = counted(*both)
         return found
 
     def _said(self, stretch: Stretch, version: int) -> pa.Table:
@@ -125,7 +132,7 @@ class TrackRecord:
             & (_field("session") == session)
             & (_field("utc") >= stretch.begin)
             & (_field("utc") <= stretch.end)
-            & _field("task").isin(COMPARED)
+            & _field("task").isin(list(TASKS))
         )
         with translated(f"{self._store.url}/{PREDICTIONS.name} cannot be read"):
             rows = self._store.dataset(PREDICTIONS.name, version).to_table(columns=_COLUMNS, filter=wanted)
@@ -138,6 +145,11 @@ class TrackRecord:
         except UnusableModel:
             return ()  # it is gone
         return () if session in card.learned else card.classes
+
+
+def _decisions(rows: pa.Table) -> Decisions:
+    values = [msgspec.json.decode(text or "{}", type=dict[str, float]) for text in rows["values"].to_pylist()]
+    return Decisions(rows["stamp_ns"].to_numpy(), rows["label"].to_pylist(), values)
 
 
 def _session(label: Label) -> tuple[str, str]:

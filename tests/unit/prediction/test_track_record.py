@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 
+from ml.registry.registry import SHIPPED, Registry
+from ml.robot.learned import Learned
 from ml.store.labels import Source
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import Stretch, TrackRecord
@@ -13,6 +15,13 @@ from tests.unit.prediction.robots import ROBOT, publish
 
 NOW = datetime(2026, 11, 21, 15, 30, tzinfo=UTC)
 DELAY_MS = 200  # what activity says is about so long ago
+
+
+def phase_model() -> Learned:
+    """Of what comes with GWRMS."""
+    registry = Registry(SHIPPED.as_uri())
+    (card,) = registry.entries("gait_phase")
+    return Learned.restored(registry.load(card.id)[1])
 
 
 @pytest.fixture
@@ -104,3 +113,28 @@ def test_where_it_is_to_end_it_reads_nothing_more(lab: Lab) -> None:
     record = TrackRecord(lab.url)
     assert record.figures({ROBOT}, NOW, lambda: True) == {}
     assert record.figures({ROBOT}, NOW) != {}
+
+
+def test_a_phase_is_right_within_a_tenth_of_the_cycle_of_both_legs(lab: Lab) -> None:
+    model = publish(lab.url, phase_model())
+    for at_ms in range(0, 4_001, 1_000):  # strides of a second, the legs half of one apart
+        lab.label("left_heel_strike", at_ms, at_ms)
+        lab.label("right_heel_strike", at_ms + 500, at_ms + 500)
+    lab.label("stand", 10_000, 12_000)
+    of_phase: dict[str, Any] = {"task": "gait_phase", "model": model}
+
+    def say(label: str, begin_ms: int, count: int, ahead: float) -> None:
+        for at_ms in range(begin_ms, begin_ms + 100 * count, 100):
+            left = (at_ms / 1000 + ahead) % 1.0
+            values = f'{{"left": {left}, "right": {(left + 0.5) % 1.0}}}'
+            lab.say([label], at_ms, values=values, **of_phase)
+
+    say("stride", 600, 4, ahead=0.09)
+    say("stride", 1_600, 3, ahead=-0.11)
+    say("unknown", 2_600, 2, ahead=0.5)
+    say("stride", 10_100, 1, ahead=0.0)
+    say("unknown", 10_200, 3, ahead=0.0)  # as it should be
+    say("stride", 6_000, 3, ahead=0.0)  # nobody knows
+    found = TrackRecord(lab.url).figures({ROBOT}, NOW)[ROBOT]["gait_phase"]
+    confusion = {"no stride": {"stride": 1}, "stride": {"another phase": 3, "stride": 4, "unknown": 2}}
+    assert found == {model: Quality(10, 4, 4, 2, confusion)}
