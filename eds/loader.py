@@ -1,7 +1,12 @@
-"""Loads an EDS or DCF: read, repair, import with canopen, check for another node's values."""
+"""Loads an EDS or DCF: read, repair, import with canopen, check for another node's values.
+
+The drives of a robot have one file, and all that does not depend on the node is done once for it.
+"""
 
 import configparser
+import functools
 import io
+import pickle
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +20,9 @@ from eds.numbers import parse_integer
 from eds.repair import repair
 
 MAX_BYTES = 8 * 1024 * 1024
+KEPT = 4  # files of a robot; their objects are kept as bytes, because whoever gets a dictionary may change it
 
+NODE_ID = "$NODEID"  # what a repaired value is relative to
 # Base identifiers of the predefined connection set that carry a node id (CiA 301 §7.3.3).
 _CONNECTION_SET = frozenset(range(0x080, 0x600, 0x080)) | {0x600, 0x700}
 _COB_ID_VALID_BITS = 0x1FFF_FFFF
@@ -39,8 +46,7 @@ def load_file(path: Path, node_id: int) -> Description:
     """See `eds.load`."""
     if not 1 <= node_id <= 127:
         raise EdsError(f"{path}: node id {node_id} is outside 1–127")
-    ini = read_ini(read_text(path))
-    sections, file_node_id = repair(ini)
+    ini, sections, file_node_id = pickle.loads(_repaired(read_text(path)))
     if not any(len(name) == 4 for name in sections):
         raise EdsError(f"{path}: there is no object section like [1000]; this is no EDS or DCF file")
     owner = _Owner(file_node_id, node_id)
@@ -80,15 +86,42 @@ def read_text(path: Path) -> str:
         return data.decode("cp1252", errors="replace")
 
 
+@functools.lru_cache(KEPT)
+def _repaired(text: str) -> bytes:
+    """The text's findings, its repaired sections and the node id that it was made for, pickled."""
+    ini = read_ini(text)
+    sections, file_node_id = repair(ini)
+    return pickle.dumps((IniText(findings=ini.findings), sections, file_node_id))
+
+
 def _import(path: Path, sections: Sections, node_id: int) -> canopen.ObjectDictionary:
     lines = []
     for name, keys in sections.items():
         lines.append(f"[{name}]")
         lines.extend(f"{key}={value}" for key, value in keys.items())
     try:
-        return canopen.import_od(_EdsText("\n".join(lines)), node_id)
+        dictionary: canopen.ObjectDictionary = pickle.loads(_imported("\n".join(lines)))
     except (configparser.Error, ValueError, KeyError) as error:
         raise EdsError(f"{path}: {error}; the file is broken in a way that is not known here") from error
+    for entry in dictionary.values():
+        members = getattr(entry, "subindices", None)
+        for variable in (entry,) if members is None else members.values():
+            _add_node_id(variable, node_id)
+    return dictionary
+
+
+@functools.lru_cache(KEPT)
+def _imported(text: str) -> bytes:
+    """The object dictionary of a repaired text for node 0, pickled."""
+    return pickle.dumps(canopen.import_od(_EdsText(text), 0))
+
+
+def _add_node_id(variable: ODVariable, node_id: int) -> None:
+    """To what is relative to it."""
+    if isinstance(variable.default, int) and NODE_ID in getattr(variable, "default_raw", ""):
+        variable.default += node_id
+    if isinstance(variable.value, int) and NODE_ID in getattr(variable, "value_raw", ""):
+        variable.value += node_id
 
 
 def _readdress(ini: IniText, sections: Sections, owner: _Owner) -> None:
@@ -128,7 +161,7 @@ def _readdressed(ini: IniText, where: str, cob_id: int, owner: _Owner) -> str:
     ini.warn(
         where, f"0x{cob_id & 0x7FF:03X} belongs to node {belongs_to}; read as 0x{base:03X} + {owner.node_id}"
     )
-    return f"$NODEID+0x{cob_id - belongs_to:X}"
+    return f"{NODE_ID}+0x{cob_id - belongs_to:X}"
 
 
 def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDictionary) -> None:

@@ -70,8 +70,9 @@ def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) ->
 def _can_component(robot: Robot, path: Path, kind: Kind, name: str, settings: Any) -> Callable[[], Component]:
     def build() -> Component:
         description = eds.load(eds.locate(settings.eds, path), settings.node_id)
+        if all(description.path != known.path for known in robot.descriptions.values()):
+            gc.collect()  # what reading a file leaves is larger than what it gives, and would lie there long
         robot.descriptions[name] = description
-        gc.collect()  # what reading it leaves is larger than what it gives, and would lie there for long
         make = JointDrive if kind is Kind.JOINT else CanDevice
         return make(name, settings, robot.buses[settings.bus], description)
 

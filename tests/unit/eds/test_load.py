@@ -216,6 +216,16 @@ def test_a_cob_id_follows_the_configured_node(tmp_path: Path, text: str) -> None
     assert default(load(tmp_path, body, node_id=5), 0x1800, 1) == 0x185
 
 
+def test_the_nodes_of_one_file_have_a_dictionary_each(tmp_path: Path) -> None:
+    body = "[1800]\nParameterName=TPDO\nObjectType=9\n" + variable("1800sub1", DefaultValue="$NODEID+0x180")
+    first, second, again = (load(tmp_path, body, node_id=node_id) for node_id in (5, 6, 5))
+    changed = first.variable(0x1800, 1)
+    assert changed is not None
+    changed.default = 0
+    assert (default(second, 0x1800, 1), default(again, 0x1800, 1)) == (0x186, 0x185)
+    assert [one.object_dictionary.node_id for one in (first, second, again)] == [5, 6, 5]
+
+
 def dcf(**keys: str) -> str:
     pdo = "[1800]\nParameterName=TPDO\nObjectType=9\n" + variable("1800sub1", **keys)
     return "[DeviceComissioning]\nNodeID=1\nBaudrate=1000\n" + pdo
