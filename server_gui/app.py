@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
@@ -87,6 +88,7 @@ class App:
         kept: QSettings,
         following: Following,
         record: Record | None = None,
+        file: Path | None = None,
     ) -> None:
         self.desk = Desk()
         self._qt = qt
@@ -103,7 +105,7 @@ class App:
             qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100
         )
         operator = "" if record is None else record.operator
-        self._archive = Archive(settings, self.desk, self._poster.deliver, operator)
+        self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
         self._ended = True
         self.window = MainWindow(self.desk, self.theme, kept, self._archive)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
@@ -196,13 +198,17 @@ def run(
     scale: float | None = None,
     seconds: float | None = None,
     record: Record | None = None,
+    file: Path | None = None,
 ) -> int:
-    """Open the window until it is closed, or for so many seconds; the exit status."""
+    """Open the window until it is closed, or for so many seconds; the exit status.
+
+    `file` has the settings; without one they are not to be changed.
+    """
     sys.setswitchinterval(SWITCH_S)
     qt = QApplication(sys.argv[:1])
     qt.setApplicationName("gwrms")
     qt.setStyle("Fusion")
-    with App(qt, settings, QSettings("gwrms", "gui"), FOLLOWING, record) as app:
+    with App(qt, settings, QSettings("gwrms", "gui"), FOLLOWING, record, file) as app:
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())

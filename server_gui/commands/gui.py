@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from server_gui.core.settings import add_robots, load, name_of
+from server_gui.core.settings import add_robots, default_file, load, name_of
 from server_gui.qt_needs import check, prefer_x
 
 EPILOG = """keys
@@ -36,7 +36,7 @@ def main(argv: list[str]) -> int:
     look = None if arguments.look is None else Look(arguments.look)
     scale = None if arguments.scale is None else arguments.scale / 100
     record = None if arguments.no_record else Record(arguments.operator, arguments.notes)
-    return run(settings, look, scale, record=record)
+    return run(settings, look, scale, record=record, file=arguments.config or default_file())
 
 
 def _parser() -> argparse.ArgumentParser:

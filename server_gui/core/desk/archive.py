@@ -1,6 +1,7 @@
 """Everything recorded, as the window works with it: what there is, one session played, its labels, jobs."""
 
 import functools
+from pathlib import Path
 
 from ml.store.sessions import Session
 from server_gui.core.background import Background
@@ -20,10 +21,18 @@ WHO = "recordings"  # what the news name instead of a robot
 
 
 class Archive:
-    """For the window's thread; `close` ends its own."""
+    """For the window's thread; `close` ends its own. `file` has the settings, and may not be there yet."""
 
-    def __init__(self, settings: ServerSettings, desk: Desk, deliver: Deliver, author: str = "") -> None:
+    def __init__(
+        self,
+        settings: ServerSettings,
+        desk: Desk,
+        deliver: Deliver,
+        author: str = "",
+        file: Path | None = None,
+    ) -> None:
         self.settings = settings
+        self.file = file
         self.library = Library(settings, deliver)
         self.journals = KeptJournals(settings, self.library.reading.do, deliver)
         self._reading = Background("playback")

@@ -25,8 +25,10 @@ from server_gui.core.cloud.reached import endpoint_told, keys_told
 from server_gui.core.cloud.work import check, download, upload
 from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.recording import Recording
+from server_gui.core.settings import default_file
 from server_gui.views.cloud.browser import Browser
 from server_gui.views.cloud.jobs_table import JobsTable, under_way
+from server_gui.views.cloud.settings_form import SettingsForm
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
@@ -58,6 +60,8 @@ class Cloud(QWidget):
         self._facts = {name: _value() for name in ("URL", "Service", "Keys", "Holds")}
         self._icon, self.state = MarkIcon(theme), QLabel()
         self.state.setWordWrap(True)
+        self.settings = SettingsForm(archive.settings, archive.file or default_file())
+        self.settings.hide()
         self._cards["Store"].body.addLayout(self._store())
         self.waiting = QLabel()
         self.waiting.setWordWrap(True)
@@ -83,6 +87,7 @@ class Cloud(QWidget):
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addLayout(self._top)
+        everything.addWidget(self.settings)
         everything.addWidget(self._cards["In the store"], 3)
         everything.addWidget(self._cards["Jobs"], 2)
 
@@ -116,6 +121,12 @@ class Cloud(QWidget):
         again = QPushButton("Look again")
         again.clicked.connect(lambda: self._archive.library.look(now=True))
         row.addWidget(again)
+        self.edit = QPushButton("Settings")
+        self.edit.setCheckable(True)
+        self.edit.setVisible(self._archive.file is not None)
+        self.edit.setToolTip("Change them in the server's file")
+        self.edit.toggled.connect(self.settings.setVisible)
+        row.addWidget(self.edit)
         grid.addLayout(row, 0, 0, 1, 2)
         for place, (name, value) in enumerate(self._facts.items(), 1):
             title = QLabel(name)
