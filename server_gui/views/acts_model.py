@@ -24,10 +24,10 @@ TITLES: Final = (
     "New",
     "Read back",
     "Unit",
-    "Told by",
     "What came of it",
+    "Told by",
 )
-TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, TOLD_BY, OUTCOME = range(len(TITLES))
+TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, OUTCOME, TOLD_BY = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, READ_BACK)
 BAD: Final = ("NOT ", "FAILED", "refused", "write taken back")  # in an outcome that is looked at first
 
@@ -102,8 +102,8 @@ _TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
     lambda line: _number(line, line.act.new),
     lambda line: _number(line, line.act.read_back),
     lambda line: line.unit.symbol if line.act.new is not None else "",
-    lambda line: line.told_by,
     lambda line: line.act.outcome,
+    lambda line: line.told_by,
 )
 
 

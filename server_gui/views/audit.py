@@ -22,7 +22,7 @@ from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.histories import History, histories
 from server_gui.core.desk.kept_journals import Found, KeptJournals
 from server_gui.core.desk.news import NewsKind
-from server_gui.views.acts_model import OUTCOME, ROBOT, TIME, ActsModel, Line
+from server_gui.views.acts_model import ROBOT, TIME, ActsModel, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
@@ -177,7 +177,7 @@ class Audit(QWidget):
         table = RowsTable(self.chosen, "What was done to the robots", TIME)
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(OUTCOME, QHeaderView.ResizeMode.Stretch)
+        header.setStretchLastSection(True)
         return table
 
 

@@ -16,6 +16,7 @@ from server_gui.core.processing.gait_events import Leg
 from server_gui.views.theme import Theme
 
 GAP_DEG: Final = 2.4  # between two phases
+SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is not read
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
 
@@ -126,11 +127,15 @@ class GaitRing(QWidget):
         theme = self._theme
         line = box.height() / 5.2
         size = max(0.45, min(1.6, box.width() / theme.px(140)))
+        is_short = size < SMALL
+        if is_short:  # fewer words that can be read, rather than all of them
+            size = min(1.7 * size, 1.0)
         rows = [(self._word, "text" if self._live else "old", 1.25 * size, True)]
-        rows += [(self._below, "dim", 0.85 * size, False)]
+        rows += [(self._below.partition(" · ")[0] if is_short else self._below, "dim", 0.85 * size, False)]
         for leg in Leg:
             now = self._phases[leg] or self._modelled[leg]
-            said = f"{leg.value[0].upper()}  {now.phase} {now.percent:.0f} %" if now else ""
+            phase = "" if now is None or is_short else f"{now.phase} "
+            said = f"{leg.value[0].upper()}  {phase}{now.percent:.0f} %" if now else ""
             rows.append((said, leg.value if self._live else "old", 0.85 * size, False))
         top = box.center().y() - line * 2
         for text, colour, factor, bold in rows:
