@@ -48,7 +48,8 @@ class Serving:
         self._url = store_url
         self._registry: Registry | None = None
         self._robots: dict[str, dict[str, str]] = {}  # units by channel
-        self._loaded: dict[str, Model | UnusableModel] = {}
+        self._loaded: dict[str, Model] = {}
+        self._refused: dict[str, str] = {}  # models, and why; until something changes
         self._chosen_for: Mapping[str, dict[str, str]] = {}  # the robots at the newest look
         self._seen: Any = None  # what should serve then, and the files of what was refused
         self._retry_s = math.inf  # when that is tried again, on our monotonic clock
@@ -92,7 +93,7 @@ class Serving:
         served = [(task, robot, pointer.model) for task, robot, pointer in registry.served()]
         anew = (served, self._files(registry, served)) != self._seen or time.monotonic() >= self._retry_s
         if anew:
-            self._loaded = {name: one for name, one in self._loaded.items() if isinstance(one, Model)}
+            self._refused = {}
         elif robots == self._chosen_for:
             return
         models, problems, why = dict(self.models), {}, {}
@@ -131,17 +132,17 @@ class Serving:
         return True
 
     def _load(self, registry: "Registry", name: str) -> Model:
-        """A model, loaded once; one that was refused is not asked for again until something changes."""
+        """A model, loaded once; one that was refused is not asked for again."""
+        if name in self._refused:
+            raise UnusableModel(self._refused[name])
         if name not in self._loaded:
             try:
                 card, state = registry.load(name)
                 self._loaded[name] = Model(card, Learned.restored(state))
             except UnusableModel as error:
-                self._loaded[name] = error
-        found = self._loaded[name]
-        if isinstance(found, UnusableModel):
-            raise found
-        return found
+                self._refused[name] = str(error)
+                raise
+        return self._loaded[name]
 
 
 def _nobody(task: str, units: Mapping[str, str]) -> str:
