@@ -188,6 +188,8 @@ def new_store_url(
             monkeypatch.setenv(name, value)
         yield f"s3://{BUCKET}/{uuid.uuid4().hex}"
     gc.collect()  # tracebacks of expected errors hold stores, and these their sockets
+    if not gc.get_freeze_count():
+        gc.freeze()  # what stays, pytest and all that it has collected, is not looked through every time
 
 
 @pytest.fixture
