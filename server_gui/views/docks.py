@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 from server_gui.views.theme import Theme
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
-ROOMY: Final = 1000  # wide, at text of 100 %: what is narrower has no room for everything at once
+ROOMY: Final = 1100  # wide, at text of 100 %: what is narrower has no room for everything at once
 STACK: Final = 340  # wide, likewise: panels that are one behind the other
 Area = Qt.DockWidgetArea
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
@@ -119,6 +120,7 @@ class Header(QWidget):
         self._outcome.setVisible(shown)
         self.reset_button.setVisible(stopping is not None and stopping.held)
         self._chips["warnings"].setVisible(station is not None and not shown)
+        self._chips["link"].setVisible(station is not None and not (shown and self._is_short))
         if shown and stopping is not None:
             mark = STOP_MARKS.get(stopping.state, Mark("triangle", "warn", "held"))
             main = "STOP held" if stopping.state is StopState.IDLE else f"STOP {stopping.state.value}"
@@ -129,6 +131,9 @@ class Header(QWidget):
         self.stop.setFont(self._theme.text_font(1.45, bold=True))
         self._brand.setFont(self._theme.text_font(1.5, bold=True))
         self.stop.setMinimumWidth(self._theme.px(150))
+        bold = QFontMetrics(self._theme.text_font(bold=True))
+        longest = max(bold.horizontalAdvance(f"STOP {state.value}") for state in StopState)
+        self._outcome.setMinimumWidth(longest + self._theme.px(12) + 40)  # of this no word may be missing
 
 
 def set_text_of_button(button: QPushButton, text: str) -> None:

@@ -30,7 +30,7 @@ from server_gui.views.widgets.pressure_map import PressureMap
 
 SECONDS: Final = 10.0
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
-A_COLUMN: Final = 150  # wide at least, at text of 100 %
+A_COLUMN: Final = 160  # wide at least, at text of 100 %
 STATUS_LINES: Final = 5
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")

@@ -8,7 +8,7 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 
-from gateway.client import ConnectionState
+from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
 from server_gui.core.events import LinkChanged
 from server_gui.views.main_window import MainWindow
@@ -192,3 +192,21 @@ def test_in_a_window_without_room_seldom_things_are_behind_one_button(
     assert all(action.isEnabled() for action in actions.values())
     actions["Store to flash …"].trigger()
     assert panel.pages.currentWidget() is panel.storing
+
+
+@pytest.mark.parametrize(("width", "height", "scale"), [(1100, 700, 1.0), (1366, 768, 2.0)])
+def test_what_became_of_a_stop_is_read_in_full_in_a_small_window(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("no link"))
+    bench.station.stopping.held = True
+    bench.draw(window)
+    words = window.header._outcome._main
+    assert words.text() == "STOP NOT CONFIRMED"
+    assert words.fontMetrics().horizontalAdvance(words.text()) <= words.width()
+    assert window.header.reset_button.isVisible()
+    assert (window.width(), window.height()) == (width, height)
+    assert stop_is_whole(window)
