@@ -109,8 +109,10 @@ def test_a_span_is_exported_in_the_background(
         assert pq.read_table(file).num_rows == BATCHES * ROWS
         assert session.first is not None
         none = Choice(end=session.first - timedelta(seconds=1))
-        over(jobs.add("export", work.export(settings, session, none, kind, file)))
-        assert pq.read_table(file).num_rows == 0
+        job = over(jobs.add("export", work.export(settings, session, none, kind, file)))
+        assert job.state is JobState.FAILED
+        assert "has nothing from" in job.said
+        assert pq.read_table(file).num_rows == BATCHES * ROWS
 
 
 def test_what_waits_is_uploaded_downloaded_and_verified(
