@@ -67,6 +67,7 @@ _ADVICE_OF_DISKS: Final = {
     "Permission denied": "whoever runs this must be allowed to write there",
     "Read-only file system": "mount it for writing, or take another folder",
 }
+_OF_A_FOLDER: Final = "check the folder and its disk"
 LIBRARY_ERRORS: Final = (DeltaError, obstore.exceptions.BaseError, OSError, ValueError)
 
 
@@ -83,6 +84,8 @@ def translated(doing: str) -> Iterator[None]:
     except LIBRARY_ERRORS as error:
         kind, reason = _kind(error), _reason(error)
         advice = _ADVICE_OF_DISKS.get(reason) or _ADVICE.get(kind)
+        if advice in _ADVICE.values() and "file://" in doing:
+            advice = _OF_A_FOLDER
         raise kind("; ".join(filter(None, (f"{doing}: {reason}", advice)))) from None
 
 

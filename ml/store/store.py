@@ -297,6 +297,7 @@ def checked_url(url: str) -> str:
     parts = urlsplit(url)
     if parts.username or parts.password or parts.query:
         raise StoreError("a store's URL has no keys in it: give them by the AWS environment or profile")
-    if parts.scheme not in {"file", "s3"} or (parts.scheme == "file" and parts.netloc):
+    folder = parts.scheme == "file" and not parts.netloc and parts.path.startswith("/")
+    if not (folder or (parts.scheme == "s3" and parts.netloc)):
         raise StoreError(f"{url!r} is no store: use file:///folder or s3://bucket/prefix")
     return url.rstrip("/")

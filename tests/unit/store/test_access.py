@@ -161,6 +161,7 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     said = refused((tmp_path / "file" / "store").as_uri())
     assert str(tmp_path / "file" / "store") in str(said.value)
+    assert str(said.value).endswith("check the folder and its disk")
 
 
 def test_keys_are_in_no_object_of_ours(backend: SeaweedFS | None, store_url: str, tmp_path: Path) -> None:

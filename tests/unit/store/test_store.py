@@ -168,6 +168,9 @@ def test_objects_are_created_once_read_listed_and_removed(store_url: str) -> Non
         ("http://somewhere/x", "is no store"),
         ("/srv/store", "is no store"),
         ("file://host/x", "is no store"),
+        ("file:x", "is no store"),
+        ("s3:/bucket/x", "is no store"),
+        ("s3://", "is no store"),
     ],
 )
 def test_a_url_that_is_no_store_is_refused_in_words(url: str, said: str) -> None:
