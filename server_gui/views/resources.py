@@ -4,8 +4,9 @@ import html
 import time
 from typing import Final
 
-from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QLineEdit, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QHideEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QLineEdit, QWidget
 
 from gateway.messages import ResourceSnapshot
 from server_gui.core.desk.desk import Desk
@@ -38,6 +39,7 @@ DISK_AND_NETWORK: Final = {
     "received": Curve("network in", OTHERS[1]),
     "sent": Curve("out", OTHERS[2]),
 }
+NARROW, TRENDS = 520, 260  # wide, at text of 100 %: trends and processes; trends alone
 TEMPERATURE: Final = {"hottest": Curve("hottest °C", "warn")}
 
 
@@ -75,11 +77,22 @@ class Resources(QWidget):
             grid.addWidget(card, place // 2, place % 2)
         for column in (0, 1):
             grid.setColumnStretch(column, 1)
-        everything = QHBoxLayout(self)
-        everything.setContentsMargins(8, 8, 8, 8)
-        everything.addLayout(grid, 4)
-        everything.addWidget(self._processes, 3)
+        self._theme = theme
+        self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._layout.setContentsMargins(8, 8, 8, 8)
+        self._layout.addLayout(grid, 4)
+        self._layout.addWidget(self._processes, 3)
         desk.on_select.append(lambda _station: self._watch())
+
+    def minimumSizeHint(self) -> QSize:
+        """As narrow as the trends: then the processes are above them."""
+        return QSize(self._theme.px(TRENDS), super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        direction, is_narrow = QBoxLayout.Direction, self.width() < self._theme.px(NARROW)
+        self._layout.setDirection(direction.BottomToTop if is_narrow else direction.LeftToRight)
+        self._processes.setMinimumHeight(self._theme.px(220) if is_narrow else 0)
 
     def showEvent(self, event: QShowEvent) -> None:
         self._watch()

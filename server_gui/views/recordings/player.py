@@ -88,7 +88,9 @@ class Player(QWidget):
     # --- how it is put together
 
     def _head(self) -> QHBoxLayout:
-        back = QPushButton("← All recordings")
+        back = QPushButton("← All")
+        back.setAccessibleName("All recordings")
+        back.setToolTip("All recordings")
         back.clicked.connect(self._back)
         row = QHBoxLayout()
         row.addWidget(back)
