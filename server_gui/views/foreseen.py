@@ -11,6 +11,7 @@ from ml.serving.trust import Level, Trust
 from server_gui.core.desk.predictions import Recalled, Told
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.walk import LegPhase, phase_at
+from server_gui.core.prediction.state import WITHIN_DAYS
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
 
@@ -72,7 +73,7 @@ def lines(station: Station) -> Iterator[Line]:
         if task in told_by_task:
             shown = told_by_task[task]
             line = said(shown)
-            told = filter(None, (line.detail, model_text(shown)))
+            told = filter(None, (line.detail, model_text(shown), quality_text(shown)))
             yield Line(line.mark, f"{title}: {line.text}", " · ".join(told))
     if predictions.problem:
         yield Line(Mark("ring", "old", "no model"), "Not predicted", predictions.problem)
@@ -110,6 +111,13 @@ def model_text(shown: Told) -> str:
     days = (datetime.now(UTC) - card.made).days
     age = "new today" if days < 1 else "1 day old" if days == 1 else f"{days} days old"
     return f"{card.id}, {age}, {SOURCES[card.source]}"
+
+
+def quality_text(shown: Told) -> str:
+    """How right the model was on this robot of late, where somebody has labelled that."""
+    if isinstance(shown, Recalled) or shown.predicted.quality is None:
+        return ""
+    return f"last {WITHIN_DAYS} days: {shown.predicted.quality.text}"
 
 
 def _as_predicted(line: Line) -> Line:

@@ -14,8 +14,9 @@ from server_gui.core.desk.station import Station
 from server_gui.core.events import LinkChanged
 from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.settings import Action, RuleSettings
+from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
-from server_gui.views.foreseen import model_phases, status
+from server_gui.views.foreseen import lines, model_phases, status
 from server_gui.views.main_window import MainWindow
 from tests.gui.fakes import Bench, looked, walking
 from tests.gui.foreseen import predicted
@@ -52,6 +53,13 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     model = "activity-3fa2c1, 3 days old, simulated model"
     assert window.overview.status_lines.texts[0] == f"Does: Walk  0.94 · next turn 0.04 · {model}"
     assert "p 0.94" in window.overview._ring._below
+
+
+def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
+    quality = Quality(312, 292, 1, 19, {})
+    station.foresee(dataclasses.replace(predicted("walk", WALKS), quality=quality))
+    told = "93.6 % right, 0.3 % wrong, 6.1 % not said, of 312 labelled decisions"
+    assert next(lines(station)).detail.endswith(f"simulated model · last 7 days: {told}")
 
 
 @pytest.mark.parametrize(
