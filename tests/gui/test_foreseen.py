@@ -51,14 +51,15 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     station.foresee(predicted("walk", WALKS))
     shown(window, lambda: chip(window) == "Walk  0.94\npredicted · next turn 0.04")
     model = "activity-3fa2c1, 3 days old, simulated model"
-    assert window.overview.status_lines.texts[0] == f"Does: Walk  0.94 · next turn 0.04 · {model}"
+    said = f"Does: Walk  0.94 · next turn 0.04 · {model}"
+    shown(window, lambda: window.overview.status_lines.texts[0] == said)
     assert "p 0.94" in window.overview._ring._below
 
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
     quality = Quality(312, 292, 1, 19, {})
     station.foresee(dataclasses.replace(predicted("walk", WALKS), quality=quality))
-    told = "93.6 % right, 0.3 % wrong, 6.1 % not said, of 312 labelled decisions"
+    told = "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled"
     assert next(lines(station)).detail.endswith(f"simulated model · last 7 days: {told}")
 
 
@@ -169,4 +170,4 @@ def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
     station.predictions.recalled = {"activity": Recalled(walks, 0.1)}
     shown(window, lambda: window.overview._ring._word == "Walk")
     said = "Does: Walk  0.94 · next turn 0.04 · said then by activity-3fa2c1"
-    assert window.overview.status_lines.texts[0] == said
+    shown(window, lambda: window.overview.status_lines.texts[0] == said)
