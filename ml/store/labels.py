@@ -13,6 +13,8 @@ from typing import Any, Final, Self
 from msgspec import Struct
 from msgspec.structs import force_setattr
 
+from ml.store.errors import StoreError
+
 US_NS: Final = 1_000  # the store's times are microseconds
 
 # What a wearer does at a moment; two of them at once contradict each other.
@@ -53,7 +55,12 @@ class Label(Struct, frozen=True, order=True):
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Self:
-        """The label that a row of the table tells of."""
+        """The label that a row of the table tells of.
+
+        Raises:
+            StoreError: somebody has written it who is none of the sources.
+
+        """
         return cls(
             robot=row["robot"],
             session=row["session"],
@@ -61,7 +68,7 @@ class Label(Struct, frozen=True, order=True):
             ended_utc_ns=utc_ns(row["ended"]),
             label=row["label"],
             author=row["author"] or "",
-            source=Source(row["source"]),
+            source=_source(row),
         )
 
     def row(self, written_utc_ns: int, *, removed: bool = False) -> dict[str, Any]:
@@ -77,6 +84,17 @@ class Label(Struct, frozen=True, order=True):
             "written": written_utc_ns,
             "removed": removed,
         }
+
+
+def _source(row: Mapping[str, Any]) -> Source:
+    try:
+        return Source(row["source"])
+    except ValueError:
+        known = ", ".join(source.value for source in Source)
+        raise StoreError(
+            f"the label {row['label']!r} of session {row['session']} of {row['robot']} has the source "
+            f"{row['source']!r}; known are {known}: correct it with the program that wrote it"
+        ) from None
 
 
 def wearer(label: str) -> str | None:
