@@ -165,6 +165,15 @@ def test_a_robots_name_cannot_leave_its_quotes(folder_url: str) -> None:
     assert ask(store, "SELECT robot FROM events", "' OR '1'='1") == []
 
 
+@pytest.fixture
+def heeds_ctrl_c() -> Iterator[None]:
+    """A process that was started in the background ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeds_ctrl_c")
 def test_ctrl_c_ends_a_query_that_takes_long(folder_url: str) -> None:
     def runs() -> bool:
         return any(thread.name == "query" and thread.is_alive() for thread in threading.enumerate())
