@@ -35,9 +35,8 @@ ROBOT = "exo"
 CHANNELS = tuple(name for group in GROUPS.values() for name in group)
 PRACTICE_S = 15  # that three people sit down and get up, faster than in real time
 FIRST = ("stand", "sit")  # what is labelled at first
-ENOUGH = (
-    450  # live decisions of all tasks: more than seven seconds, in which the wearer sits, gets up and stands
-)
+# live decisions of all tasks: more than ten seconds, in which the wearer sits down, sits, gets up and stands
+ENOUGH = 600
 PATIENCE_S = 300.0
 
 
@@ -111,12 +110,12 @@ def right(rows: Sequence[dict[str, Any]], truth: Path) -> float:
 
 
 def session_of(url: str) -> Stored | None:
-    """The robot's session, once there is enough of it in the store."""
+    """The robot's session, once he has sat down and got up twice in what is stored of it."""
     try:
         found = sessions(Store.existing(url), ROBOT)
     except NoSuchTable:
         return None
-    return next((each for each in found if each.length.total_seconds() > 12), None)
+    return next((each for each in found if each.length.total_seconds() > 22), None)
 
 
 def stored_labels(url: str, session: Stored) -> set[str]:
@@ -185,7 +184,7 @@ def test_what_is_labelled_is_learned_and_serves_and_can_be_taken_back(store_url:
         asked("cloud", "upload", "--config", config)  # what a busy computer has not yet
 
     before, after = (right(predicted(store_url, model), robot.truth) for model in (first, second))
-    assert after > 0.7  # 0.89 on a busy computer
+    assert after > 0.7  # 0.92 to 0.95
     assert after > before + 0.2
     card = asked("models", "show", second, "--config", config)
     assert card["learned"] == [live.session, "practice-1", "practice-2"]
