@@ -18,7 +18,7 @@ Rows = npt.NDArray[np.intp]
 Split = tuple[Rows, Rows]  # rows to train on, rows to judge by
 T = TypeVar("T")
 R = TypeVar("R")
-TOGETHER: Final = 2  # folds computed at a time
+TOGETHER: Final = 3  # folds computed at a time: two cores stay busy where the folds are an odd number
 
 
 def one_left_out(groups: npt.NDArray[Any]) -> Iterator[Split]:
