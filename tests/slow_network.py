@@ -1,8 +1,9 @@
-"""A network between a client and a server that is slow, and can be cut: a TCP relay in a thread."""
+"""A network between a client and a server that is slow, and can be cut: a TCP relay, a thread each way."""
 
-import asyncio
 import contextlib
+import socket
 import threading
+from collections.abc import Callable
 from typing import Self
 
 
@@ -10,18 +11,18 @@ class SlowNetwork:
     """Relays every connection to a port of this computer, each piece later by `delay_s`."""
 
     def __init__(self, target: int, delay_s: float) -> None:
-        self.port = 0
         self.delay_s = delay_s
         self.carried = 0  # bytes, both ways
         self._target = target
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="slow network")
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._server: asyncio.Server | None = None
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listener.getsockname()[1]
+        self._lock = threading.Lock()
+        self._sockets: list[socket.socket] = []  # closed at the end, when no thread uses them any more
+        self._threads: list[threading.Thread] = []
+        self._gone = threading.Event()
 
     def __enter__(self) -> Self:
-        self._thread.start()
-        asyncio.run_coroutine_threadsafe(self._listen(), self._loop).result(10)
+        self._start(self._accept)
         return self
 
     def __exit__(self, *exc: object) -> None:
@@ -29,51 +30,56 @@ class SlowNetwork:
 
     def close(self) -> None:
         """Go away: every connection ends, and none is accepted any more. Idempotent."""
-        if self._loop.is_closed():
-            return
-        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result(10)
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
+        self._gone.set()
+        with contextlib.suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        while self._threads:
+            self.cut()
+            self._threads.pop(0).join()
+        for each in (self._listener, *self._sockets):
+            each.close()
 
     def cut(self) -> None:
         """End every connection that there is now."""
-        asyncio.run_coroutine_threadsafe(self._cut(), self._loop).result(10)
+        with self._lock:
+            _end(*self._sockets)
 
-    async def _listen(self) -> None:
-        self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        self.port = self._server.sockets[0].getsockname()[1]
+    def _start(self, work: Callable[..., None], *arguments: socket.socket) -> None:
+        thread = threading.Thread(target=work, args=arguments, name="slow network")
+        self._threads.append(thread)
+        thread.start()
 
-    async def _close(self) -> None:
-        if self._server is not None:
-            self._server.close()
-        await self._cut()
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):  # it has gone away
+            while not self._gone.is_set():
+                near, _ = self._listener.accept()
+                self._connect(near)
 
-    async def _cut(self) -> None:
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.create_task(self._carry_both(reader, writer))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    async def _carry_both(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self._target)
+    def _connect(self, near: socket.socket) -> None:
         try:
-            await asyncio.gather(self._carry(reader, far_writer), self._carry(far_reader, writer))
-        finally:
-            for each in (writer, far_writer):
-                each.transport.abort()
-            await asyncio.sleep(0)  # the transports close their sockets in the loop's next turn
+            far = socket.create_connection(("127.0.0.1", self._target))
+        except OSError:
+            near.close()
+            return
+        with self._lock:
+            self._sockets += near, far
+        self._start(self._carry, near, far)
+        self._start(self._carry, far, near)
 
-    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with contextlib.suppress(ConnectionError):
-            while piece := await reader.read(65_536):
-                await asyncio.sleep(self.delay_s)
-                writer.write(piece)
-                await writer.drain()
-                self.carried += len(piece)
-            writer.write_eof()
+    def _carry(self, here: socket.socket, there: socket.socket) -> None:
+        try:
+            while piece := here.recv(65_536):
+                self._gone.wait(self.delay_s)
+                there.sendall(piece)
+                with self._lock:
+                    self.carried += len(piece)
+            there.shutdown(socket.SHUT_WR)
+        except OSError:
+            _end(here, there)
+
+
+def _end(*sockets: socket.socket) -> None:
+    """No more either way; whoever waits for one of them is woken."""
+    for each in sockets:
+        with contextlib.suppress(OSError):
+            each.shutdown(socket.SHUT_RDWR)
