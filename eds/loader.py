@@ -20,7 +20,9 @@ from eds.numbers import parse_integer
 from eds.repair import repair
 
 MAX_BYTES = 8 * 1024 * 1024
-KEPT = 4  # files of a robot; their objects are kept as bytes, because whoever gets a dictionary may change it
+# Files of a robot whose objects are kept: as bytes of this process, because whoever gets a dictionary may change
+# it. No file is ever unpickled.
+KEPT = 4
 
 NODE_ID = "$NODEID"  # what a repaired value is relative to
 # Base identifiers of the predefined connection set that carry a node id (CiA 301 §7.3.3).
