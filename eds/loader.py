@@ -20,8 +20,8 @@ from eds.numbers import parse_integer
 from eds.repair import repair
 
 MAX_BYTES = 8 * 1024 * 1024
-# Files of a robot whose objects are kept: as bytes of this process, because whoever gets a dictionary may change
-# it. No file is ever unpickled.
+# Files of a robot whose objects are kept: as bytes of this process, because whoever gets a dictionary may
+# change it. No file is ever unpickled.
 KEPT = 4
 
 NODE_ID = "$NODEID"  # what a repaired value is relative to
