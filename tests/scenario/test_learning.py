@@ -33,7 +33,7 @@ from tests.unit.training.walkers import BEGAN_UTC, Made, put
 S, MS = 10**9, 10**6
 ROBOT = "exo"
 CHANNELS = tuple(name for group in GROUPS.values() for name in group)
-PRACTICE_S = 15  # that three people sit down and get up, faster than in real time
+PRACTICE_S = 40  # that three people sit down and get up, faster than in real time
 FIRST = ("stand", "sit")  # what is labelled at first
 # live decisions of all tasks: more than ten seconds, in which the wearer sits down, sits, gets up and stands
 ENOUGH = 600
@@ -85,8 +85,10 @@ def put_practice(file: Path, url: str) -> list[Label]:
 def asked(*arguments: str) -> Any:
     """What a command says, as JSON."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        assert main.main([*arguments, "--json"]) == 0
-    return json.loads(said.getvalue().splitlines()[-1])
+        status = main.main([*arguments, "--json"])
+    answer = said.getvalue().splitlines()
+    assert status == 0, answer[-1:]
+    return json.loads(answer[-1])
 
 
 def predicted(url: str, model: str) -> list[dict[str, Any]]:
