@@ -1,0 +1,74 @@
+"""Who knows whether anything may move: the machine behind a lock, fed and asked from any thread.
+
+A stop takes effect here first: from the instant in which `feed` returns, whatever a permit forbids is refused
+at the last moment before it would go out (`SdoChannel.download`), and only then are the drives asked to stop.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from gateway.modules.stop.machine import Event, Finding, Input, State, Step, step, unproved
+
+Address = tuple[str, int, int, int]  # bus, node id, index, sub-index
+Act = Callable[[Step], None]
+
+LOCKED = "it stops a controller, and a stop is held: reset it first"
+
+
+@dataclass(frozen=True, slots=True)
+class Permit:
+    """What one write may do: everything that it may when it is asked for, until the next stop."""
+
+    authority: "Authority"
+    stops: int
+
+    def objection(self, address: Address) -> str | None:
+        """Why the object must not be written now, in words; `None` where it may. From any thread."""
+        if self.authority.state.stops != self.stops:
+            return "the robot was stopped before this was written"
+        return self.authority.objection_to(address) or self.authority.frozen()
+
+
+class Authority:
+    """One robot's. `locked` are the objects that stop its controllers."""
+
+    def __init__(self, targets: Iterable[str], locked: Iterable[Address]) -> None:
+        self.state = State(frozenset(targets))
+        self.locked = frozenset(locked)
+        self.standing: Callable[[], Mapping[str, str]] = dict  # the guard's: tripped rules that stop, and why
+        self.frozen: Callable[[], str | None] = lambda: None  # the guard's: why no parameter may be changed
+        self._lock = threading.Lock()
+
+    @property
+    def held(self) -> bool:
+        """Whether a stop is held."""
+        return self.state.held
+
+    def feed(self, what: Input, act: Act, *, at_ns: int = 0, target: str = "", number: int = 0) -> Step:
+        """Tell what has happened; `act` is given what follows, in the order of events: it must not block."""
+        with self._lock:
+            standing = tuple(f"{name} ({why})" for name, why in self.standing().items())
+            event = Event(what, at_ns or time.monotonic_ns(), target, number, standing)
+            after = step(self.state, event)
+            self.state = after.state
+            if after.actions:
+                act(after)
+        return after
+
+    def is_newest(self, number: int) -> bool:
+        """Whether nothing has begun since the undertaking of this number."""
+        return self.state.number == number
+
+    def unproved(self, findings: Mapping[str, Finding]) -> list[str]:
+        """The targets that are not known to rest."""
+        return list(unproved(self.state, findings))
+
+    def permit(self) -> Permit:
+        """For a write that is asked for now."""
+        return Permit(self, self.state.stops)
+
+    def objection_to(self, address: Address) -> str | None:
+        """Why an object must not be written now, whoever wants it and since when."""
+        return LOCKED if address in self.locked and self.held else None
