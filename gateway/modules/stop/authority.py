@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from gateway.modules.stop.machine import Event, Finding, Input, State, Step, step, unproved
 
@@ -46,12 +47,21 @@ class Authority:
         """Whether a stop is held."""
         return self.state.held
 
-    def feed(self, what: Input, act: Act, *, at_ns: int = 0, target: str = "", number: int = 0) -> Step:
+    def feed(
+        self,
+        what: Input,
+        act: Act,
+        *,
+        at_ns: int | None = None,
+        target: str = "",
+        number: int = 0,
+        findings: Mapping[str, Finding] = MappingProxyType({}),
+    ) -> Step:
         """Tell what has happened; `act` is given what follows, in the order of events: it must not block."""
         with self._lock:
             standing = tuple(f"{name} ({why})" for name, why in self.standing().items())
-            event = Event(what, at_ns or time.monotonic_ns(), target, number, standing)
-            after = step(self.state, event)
+            now_ns = time.monotonic_ns() if at_ns is None else at_ns
+            after = step(self.state, Event(what, now_ns, target, number, standing, findings))
             self.state = after.state
             if after.actions:
                 act(after)

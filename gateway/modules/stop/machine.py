@@ -152,7 +152,8 @@ class State:
 class Event:
     """One input, with what belongs to it: `target` of `SEEN` and `LOST`, `number` of an end.
 
-    As long as a rule is `standing`, nothing is proved, reset or enabled.
+    As long as a rule is `standing`, nothing is proved, reset or enabled; and what `PROVED` says of rest counts
+    only where its findings show that, target for target.
     """
 
     input: Input
@@ -160,6 +161,7 @@ class Event:
     target: str = ""
     number: int = 0
     standing: tuple[str, ...] = ()  # the guard's rules that stop, and are tripped at this moment, in words
+    findings: Mapping[str, Finding] = field(default_factory=dict)  # of `PROVED`
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,8 +185,9 @@ def step(state: State, event: Event) -> Step:
         state = _disturbed(state, event)
     if event.standing and event.input in REFUSALS:
         return Step(state, (), f"the guard's rule is tripped: {', '.join(event.standing)}")
-    unsafe = event.standing and event.input is Input.PROVED
-    happened = Input.UNPROVED if unsafe else event.input
+    happened = event.input
+    if happened is Input.PROVED and (event.standing or any(unproved(state, event.findings))):
+        happened = Input.UNPROVED
     row = TRANSITIONS[state.phase].get(happened)
     if row is None:
         return Step(state, (), REFUSALS.get(happened, {}).get(state.phase))
