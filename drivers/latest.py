@@ -4,6 +4,7 @@ One driver thread writes; any thread reads. A value is handed out only while it 
 sees an old number as if it were live.
 """
 
+import threading
 from collections.abc import Callable, Sequence
 
 from drivers.samples import Channel, Sample
@@ -25,6 +26,7 @@ class Latest:
         self.updated_ns: int | None = None
         self._slots: list[tuple[int, float | None] | None] = [None] * len(self.channels)
         self._listeners: tuple[Listener, ...] = ()
+        self._listening = threading.Lock()
 
     def update(self, stamp_ns: int, indices: tuple[int, ...], values: tuple[float | None, ...]) -> None:
         """Store values received together at `stamp_ns`, and tell the listeners."""
@@ -57,11 +59,13 @@ class Latest:
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every sample, in the driver's thread; returns how to end it.
 
-        A listener must return at once and never raise.
+        A listener must return at once and never raise. For any thread.
         """
-        self._listeners = (*self._listeners, listener)
+        with self._listening:
+            self._listeners = (*self._listeners, listener)
 
         def unsubscribe() -> None:
-            self._listeners = tuple(known for known in self._listeners if known is not listener)
+            with self._listening:
+                self._listeners = tuple(known for known in self._listeners if known is not listener)
 
         return unsubscribe

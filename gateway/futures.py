@@ -78,19 +78,20 @@ def gather(futures: "Mapping[str, Future[T]]") -> "Future[dict[str, T | Exceptio
     return everything
 
 
+def pass_on(finished: "Future[R]", result: "Future[R]") -> None:
+    """Give a future what another one, that is finished, holds."""
+    found = outcome(finished)
+    if isinstance(found, Exception):
+        result.set_exception(found)
+    else:
+        result.set_result(found)
+
+
 def _settle(result: "Future[R]", following: "R | Future[R]") -> None:
-    if not isinstance(following, Future):
+    if isinstance(following, Future):
+        following.add_done_callback(lambda finished: pass_on(finished, result))
+    else:
         result.set_result(following)
-        return
-
-    def pass_on(finished: "Future[R]") -> None:
-        found = outcome(finished)
-        if isinstance(found, Exception):
-            result.set_exception(found)
-        else:
-            result.set_result(found)
-
-    following.add_done_callback(pass_on)
 
 
 def back(loop: Loop, future: "Future[T]") -> "Future[T]":

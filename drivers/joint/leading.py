@@ -29,6 +29,7 @@ class Led:
     state: DriveState | None
     problem: str | None = None
     mode: int | None = None  # of operation (6061h), where it was enabled
+    asked_ns: int = 0  # when the request for that statusword was sent
 
 
 @dataclass(frozen=True, slots=True)

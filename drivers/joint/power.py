@@ -3,6 +3,7 @@
 Whatever is on its way here ends when a stop is asked for: a way up is neither finished nor begun again.
 """
 
+import time
 from concurrent.futures import Future
 from functools import partial
 
@@ -70,6 +71,10 @@ class PowerDrive:
         """Lead it to SWITCH ON DISABLED, and never further."""
         errand = self._errand(RESET_S)
         return self.node.run(lambda sdo: lead_down(self._axis(sdo), errand))
+
+    def look(self) -> Future[Led]:
+        """Read the statusword."""
+        return self.node.run(lambda sdo: Led(self._axis(sdo).state(), asked_ns=time.monotonic_ns()))
 
     def step_up(self, origin: DriveState) -> Future[Led]:
         """Make the one transition up from `origin`."""

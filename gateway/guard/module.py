@@ -5,20 +5,16 @@ All else that a rule leads to, the held stop, the journal and what clients see, 
 
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 from drivers.bus.arming import Arming
-from drivers.joint.quick_stop import StopOutcome
 from gateway import messages
-from gateway.futures import done
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
 from gateway.guard.settings import Action, GuardSettings
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
-from gateway.modules.stop.drive import quick_stop_all
 
 if TYPE_CHECKING:
     from drivers.joint.drive import JointDrive
@@ -29,7 +25,6 @@ if TYPE_CHECKING:
 
 LOOK_NS = 250_000_000  # how often the loop looks, where no watcher wants to be looked at sooner
 LEAST_S = 0.005
-_NO_STOP: Future[StopOutcome] = done(StopOutcome.UNCONFIRMED)
 
 
 class GuardModule:
@@ -41,7 +36,6 @@ class GuardModule:
         self._control = cast("ControlModule", context.needs["control"])
         self._settings = context.config.guard or GuardSettings()
         self._wirings: dict[str, Wiring] = {}
-        self._stopping: dict[str, Future[StopOutcome]] = {}
         self._source = GuardSource(tuple(self._settings.rule))
         self._count = 0
         self._ended = False
@@ -61,7 +55,7 @@ class GuardModule:
             wiring.open()
         self._armings.start()
         self._component.sources.append(self._source)
-        self._control.refuses_reset = self._refuses_reset
+        self._control.authority.standing = self._standing
         self._control.armed = lambda name: name in self._armings.armed
         self._loop.post(self._look)
 
@@ -95,14 +89,8 @@ class GuardModule:
 
     def _changed(self, name: str, watcher: Watcher, change: Change) -> None:
         if change.acts and Action.QUICK_STOP in watcher.rule.actions:
-            self._stop_drives()
+            self._control.trip(WHO, _why(name, change))
         self._loop.post(lambda: self._follow(name, watcher, change))
-
-    def _stop_drives(self) -> None:
-        """At once, past the loop; one that is being stopped so already is not asked twice."""
-        drives = self._control.drives.items()
-        idle = {name: drive for name, drive in drives if self._stopping.get(name, _NO_STOP).done()}
-        self._stopping |= quick_stop_all(idle)
 
     def _arming_changed(self, joints: str, arming: Arming) -> None:
         what = "armed" if arming.armed else ALARM
@@ -120,12 +108,10 @@ class GuardModule:
         self._publish()
 
     def _act(self, name: str, watcher: Watcher, change: Change) -> None:
-        """What else a trip leads to; a stop that is held already stays as it is."""
-        actions, why = watcher.rule.actions, f"guard rule {name}: {change.reason}"
-        if Action.QUICK_STOP in actions and not self._control.stop_held:
-            self._control.stop_robot(WHO, why)
+        """What a trip leads to besides the stop."""
+        actions = watcher.rule.actions
         if Action.REVERT_TRIALS in actions:
-            self._control.revert_trials(why)
+            self._control.revert_trials(_why(name, change))
         if Action.ALARM in actions:
             self._tell(name, ALARM, change.reason)
 
@@ -134,14 +120,13 @@ class GuardModule:
             self._count += what == ALARM
             self._alarms.tell(about, what, reason)
 
-    def _refuses_reset(self) -> str | None:
-        """A stop whose reason is still there is not reset."""
-        found = [
-            f"{name} ({_worst(wiring).last.reason})"
+    def _standing(self) -> dict[str, str]:
+        """The rules that stop and are tripped now, and why: no stop is reset as long as there is one."""
+        return {
+            name: worst.last.reason
             for name, wiring in self._wirings.items()
-            if Action.QUICK_STOP in wiring.rule.actions and _worst(wiring).state is State.TRIPPED
-        ]
-        return f"the guard's rule is tripped: {', '.join(found)}" if found else None
+            if Action.QUICK_STOP in wiring.rule.actions and (worst := _worst(wiring)).state is State.TRIPPED
+        }
 
     def _look(self) -> None:
         """See what has not come; as long as this turns, the gateway counts as alive."""
@@ -161,6 +146,10 @@ class GuardModule:
     def _publish(self) -> None:
         states = {name: _worst(wiring).state for name, wiring in self._wirings.items()}
         self._source.publish(time.monotonic_ns(), self._count, states)
+
+
+def _why(name: str, change: Change) -> str:
+    return f"guard rule {name}: {change.reason}"
 
 
 def _worst(wiring: Wiring) -> Watcher:

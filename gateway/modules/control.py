@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, cast
 from gateway import messages
 from gateway.futures import then
 from gateway.modules.lease import RENEWED, TAKEN, Leases
+from gateway.modules.stop.authority import Authority
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.stop_control import StopControl
 from gateway.modules.storage import RESTORING, STORING, Command
 from gateway.modules.tuning import Tuning
 from gateway.records.journal import Journal
 from gateway.records.records import Records
-from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
     from gateway.modules.component import ComponentModule
@@ -43,7 +43,6 @@ class ControlModule:
         self._leases = Leases(context.loop, self._lease_changed)
         self._awake: set[str] = set()  # why the bus is kept, clients or not
         self.armed: Callable[[str], bool] = lambda _name: False  # the guard's, where there is one
-        self.refuses_reset: Callable[[], str | None] = lambda: None  # the guard's too: why not now
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
             "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
             "control.release": self._release,
@@ -65,10 +64,9 @@ class ControlModule:
         config, loop = self._context.config, self._context.loop
         self._tuning = Tuning(config, self._component, loop, self._records, self._trials_changed)
         left = self._tuning.load()
-        loop.post(lambda: self._tuning.resume(left))
         self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
-        held = self._stop.load()
-        loop.post(lambda: self._stop.resume(held))
+        self._stop.start()
+        loop.post(lambda: self._tuning.resume(left))
 
     def stop(self) -> None:
         self._stop.close()
@@ -154,25 +152,28 @@ class ControlModule:
         return self._records.journal
 
     @property
-    def stop_held(self) -> bool:
-        return self._stop.held
+    def authority(self) -> Authority:
+        """Who knows whether anything may move."""
+        return self._stop.authority
 
     def stop_robot(self, who: str, reason: str) -> "Future[messages.Stopped]":
-        """Quick stop on every drive, held until it is reset. In the loop's thread."""
+        """Quick stop on every drive, held until it is reset. From any thread."""
         stopped = self._stop.stop(who, reason)
         self._tuning.interrupt()
         return stopped
 
+    def trip(self, who: str, reason: str) -> None:
+        """The same for the guard, whose stop leaves one that is held already as it is. From any thread."""
+        self._stop.trip(who, reason)
+        self._tuning.interrupt()
+
     def _reset(self, session: "Session") -> "Future[messages.Reset]":
         self._leases.require(session)
-        why_not = self.refuses_reset()
-        if why_not is not None:
-            raise refuse(Kind.STOPPED, f"the stop is not reset: {why_not}")
         return self._stop.reset(session.who)
 
     def _enable(self, session: "Session", joints: list[str] | None) -> "Future[messages.Enabled]":
         self._leases.require(session)
-        return self._stop.enable(session.who, joints, lambda: self._lost_lease(session))
+        return self._stop.enable(session.who, joints, lambda _joints: self._lost_lease(session))
 
     def _lost_lease(self, session: "Session") -> str | None:
         return None if self._leases.held_by(session) else "the lease of who asked for it has ended"

@@ -14,8 +14,9 @@ from eds import Description
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Coding, CodingError
 from gateway.futures import failed
+from gateway.modules.stop.machine import Finding
 from gateway.modules.stop.settings import ControllerStop
-from gateway.modules.stop.target import Report
+from gateway.modules.stop.target import OneAtATime, Report
 
 INSIST_S = 1.0  # how long a controller may take to confirm
 
@@ -30,33 +31,39 @@ class Write:
 
 
 class Controller:
-    """One controller with all its objects, which is stopped once at a time."""
+    """One controller with all its objects."""
 
     def __init__(self, node: Any, writes: tuple[Write, ...]) -> None:
-        self._node = node
-        self._writes = writes
-        self._running: Future[Report] | None = None
+        self.node = node
+        self.writes = writes
+        self._stops = OneAtATime(self._begin)
+
+    @property
+    def running(self) -> bool:
+        return self._stops.running
 
     def stop(self, *, wake: bool = True) -> "Future[Report]":
         """Write ahead of everything else that is asked of its node; see `Node.run`. Never raises."""
-        if self._running is None or self._running.done():
-            self._running = self._begin(wake=wake)
-        return self._running
+        return self._stops.ask(wake=wake)
 
-    def _begin(self, *, wake: bool) -> "Future[Report]":
-        first = self._writes[0]
+    def _begin(self, wake: bool) -> "Future[Report]":
+        first = self.writes[0]
         ahead = expedited(first.index, first.subindex, first.data) if len(first.data) <= EXPEDITED else None
-        deadline = time.monotonic() + INSIST_S
         try:
-            found: Future[Report] = self._node.run(
-                lambda sdo: Report(insist(sdo, self._writes, deadline)), urgent=True, ahead=ahead, wake=wake
+            found: Future[Report] = self.node.run(
+                lambda sdo: Report(insist(sdo, self.writes)), urgent=True, ahead=ahead, wake=wake
             )
         except Exception as error:  # noqa: BLE001 - the drives are to be stopped all the same
             return failed(error)
         return found
 
     def wake(self) -> None:
-        self._node.wake()
+        self.node.wake()
+
+    def look(self) -> "Future[Finding]":
+        """Read whether it is stopped; fails with `DriverError` where it does not tell."""
+        found: Future[Finding] = self.node.run(lambda sdo: _read_all(sdo, self.writes))
+        return found
 
 
 class Controllers:
@@ -104,8 +111,9 @@ def _write(
         raise CodingError(f"{where}: {error}") from error
 
 
-def insist(sdo: SdoChannel, writes: tuple[Write, ...], deadline: float) -> StopOutcome:
-    """Write until the device holds all of it, or the time is over. A job of the node's worker."""
+def insist(sdo: SdoChannel, writes: tuple[Write, ...]) -> StopOutcome:
+    """Write until the device holds all of it, or `INSIST_S` is over. A job of the node's worker."""
+    deadline = time.monotonic() + INSIST_S
     answered = False
     patience_s = FIRST_PATIENCE_S
     while time.monotonic() < deadline:
@@ -126,7 +134,12 @@ def insist(sdo: SdoChannel, writes: tuple[Write, ...], deadline: float) -> StopO
 def _write_all(sdo: SdoChannel, writes: tuple[Write, ...], patience_s: float) -> bool:
     for one in writes:
         sdo.download(one.index, one.subindex, one.data, patience_s)
-    return all(
-        sdo.upload(one.index, one.subindex, attempts=1, timeout_s=patience_s)[: len(one.data)] == one.data
-        for one in writes
+    return _read_all(sdo, writes, patience_s).at_rest
+
+
+def _read_all(sdo: SdoChannel, writes: tuple[Write, ...], patience_s: float | None = None) -> Finding:
+    asked_ns = time.monotonic_ns()
+    held = [sdo.upload(one.index, one.subindex, attempts=1, timeout_s=patience_s) for one in writes]
+    return Finding(
+        all(data[: len(one.data)] == one.data for one, data in zip(writes, held, strict=True)), asked_ns
     )

@@ -1,6 +1,5 @@
-"""What a stop needs of a joint's driver, and the quick stop of many drives at once."""
+"""What a stop needs of a joint's driver."""
 
-from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any, Protocol
 
@@ -42,6 +41,8 @@ class Drive(Protocol):
 
     def reset(self) -> "Future[Led]": ...
 
+    def look(self) -> "Future[Led]": ...
+
     def step_up(self, origin: DriveState) -> "Future[Led]": ...
 
 
@@ -51,14 +52,6 @@ def quick_stop(drive: Drive, *, wake: bool = True) -> "Future[StopOutcome]":
         return drive.quick_stop(wake=wake)
     except Exception as error:  # noqa: BLE001 - it becomes the future's
         return failed(error)
-
-
-def quick_stop_all(drives: Mapping[str, Drive]) -> "dict[str, Future[StopOutcome]]":
-    """Every controlword first, then those who wait for the answers. From any thread; never raises."""
-    stops = {name: quick_stop(drive, wake=False) for name, drive in drives.items()}
-    for drive in drives.values():
-        drive.wake()
-    return stops
 
 
 def is_enabled(statusword: float) -> bool:

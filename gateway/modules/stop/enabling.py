@@ -10,10 +10,11 @@ from concurrent.futures import Future
 from drivers.joint.cia402 import MODES, DriveState, option_text
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import Led
+from drivers.joint.quick_stop import StopOutcome
 from gateway.futures import back, done, failed, gather, then
 from gateway.loop import Loop
 from gateway.messages import Enabled
-from gateway.modules.stop.drive import Drive, quick_stop_all
+from gateway.modules.stop.drive import Drive, quick_stop
 from gateway.modules.stop.reset import as_led, state_words
 from gateway.records.journal import Journal
 
@@ -62,7 +63,7 @@ class Enabling:
 
     def _give_up(self, problems: dict[str, str]) -> "Future[Enabled]":
         """Stop what was begun, and say what came of that."""
-        stops = back(self._loop, gather(quick_stop_all(self._begun)))
+        stops = back(self._loop, gather(_quick_stop_all(self._begun)))
         return then(stops, lambda found: self._given_up(problems, found))
 
     def _given_up(self, problems: dict[str, str], stops: Mapping[str, object]) -> Enabled:
@@ -78,6 +79,14 @@ class Enabling:
         more = {"problems": problems} if problems else {}
         self._journal.append(self._who, what, result=drives, modes=self._modes, **more)
         return Enabled(drives, problems, self._modes)
+
+
+def _quick_stop_all(drives: Mapping[str, Drive]) -> "dict[str, Future[StopOutcome]]":
+    """Every controlword first, then those who wait for the answers."""
+    stops = {name: quick_stop(drive, wake=False) for name, drive in drives.items()}
+    for drive in drives.values():
+        drive.wake()
+    return stops
 
 
 def _step(drive: Drive, origin: DriveState) -> "Future[Led]":

@@ -1,14 +1,20 @@
-"""The held stop on disk: written when a stop is held, removed by its reset, found by the next gateway."""
+"""The record of a held stop: written when a stop is held, removed by its reset, found by the next gateway."""
 
 import logging
+import threading
+import time
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
 
+from gateway.boot import boot_id
 from gateway.records import durable
 
 log = logging.getLogger(__name__)
+
+Wrote = Callable[["HeldStop", str | None], object]
 
 
 class HeldStop(msgspec.Struct, frozen=True):
@@ -22,36 +28,71 @@ class HeldStop(msgspec.Struct, frozen=True):
 
 
 class HoldFile:
-    """Its own thread writes, so that no disk delays a stop; where that fails, the future says why."""
+    """Its own thread writes, so that no disk delays a stop. At most one stop is held; for any thread.
 
-    def __init__(self, path: Path, unusable: str | None) -> None:
+    `wrote(held, problem)` is told when a record is on the disk, or why it is not.
+    """
+
+    def __init__(self, path: Path, unusable: str | None, wrote: Wrote) -> None:
+        self.held: HeldStop | None = None
+        self.problem: str | None = None  # why it will not outlive this gateway, as far as that is known
+        self.kept: Future[str | None] | None = None  # that, once it is known of the newest
         self._path = path
         self._unusable = unusable
+        self._wrote = wrote
+        self._lock = threading.Lock()
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hold")
 
     def load(self) -> HeldStop | None:
-        """What the last gateway left; a file that cannot be read is a held stop of unknown reason."""
+        """Take up what the last gateway left; a file that cannot be read is a held stop of unknown reason."""
         try:
-            return msgspec.json.decode(self._path.read_bytes(), type=HeldStop)
+            self.held = msgspec.json.decode(self._path.read_bytes(), type=HeldStop)
         except (FileNotFoundError, NotADirectoryError):
-            return None
+            self.held = None
         except (OSError, msgspec.DecodeError) as error:
             log.error("%s cannot be read (%s): the stop is held", self._path, error)
-            return HeldStop("unknown", f"{self._path.name} cannot be read: {error}", 0, 0, "")
+            self.held = HeldStop("unknown", f"{self._path.name} cannot be read: {error}", 0, 0, "")
+        return self.held
 
-    def write(self, held: HeldStop) -> "Future[None]":
-        """Keep it; fails with `OSError`."""
-        return self._writer.submit(self._write, msgspec.json.encode(held))
+    def write(self, who: str, reason: str) -> None:
+        """Keep it: a second stop is the same one, for another reason."""
+        now = HeldStop(who, reason, time.time_ns(), time.monotonic_ns(), boot_id())
+        kept: Future[str | None] = Future()
+        with self._lock:
+            before = self.held
+            held = now if before is None else msgspec.structs.replace(before, who=who, reason=reason)
+            self.held, self.kept = held, kept
+            written = self._writer.submit(self._write, msgspec.json.encode(held))
+        written.add_done_callback(lambda done: self._tell(held, kept, done.exception()))
 
     def remove(self) -> "Future[None]":
         """Keep it no longer; fails with `OSError`."""
-        return self._writer.submit(durable.remove, self._path)
+        return self._writer.submit(self._remove)
+
+    def forget(self) -> None:
+        """Nothing is held any more."""
+        with self._lock:
+            self.held = self.kept = self.problem = None
 
     def close(self) -> None:
         """Write what was asked for, and end."""
         self._writer.shutdown(wait=True)
 
+    def _tell(self, held: HeldStop, kept: "Future[str | None]", found: BaseException | None) -> None:
+        problem = None
+        if found is not None:
+            why = getattr(found, "strerror", None) or str(found)
+            problem = f"this stop is held, but not beyond this gateway: {why}"
+        self.problem = problem
+        self._wrote(held, problem)
+        kept.set_result(problem)
+
     def _write(self, data: bytes) -> None:
         if self._unusable is not None:
             raise OSError(None, self._unusable)
         durable.write(self._path, data)
+
+    def _remove(self) -> None:
+        """The record of a gateway that may not use the folder is not there; what is, is another one's."""
+        if self._unusable is None:
+            durable.remove(self._path)

@@ -49,6 +49,7 @@ class Action(StrEnum):
     STOP_ALL = "stop every drive and controller"
     STOP_AGAIN = "stop it again"
     RECORD = "write the record"
+    WATCH = "watch over what is stopped"
     LOWER = "lead the drives down"
     REMOVE = "remove the record"
     RELEASE = "end the watch"
@@ -65,7 +66,7 @@ TRANSITIONS: Mapping[Phase, Mapping[Input, tuple[Phase, tuple[Action, ...]]]] = 
     _P.FREE: {
         _I.STOP: _NEW_STOP,
         _I.TRIP: _NEW_STOP,
-        _I.FOUND: _ONCE_MORE,
+        _I.FOUND: (_P.HELD, (_A.WATCH,)),
         _I.RESET: (_P.LOWERING, (_A.LOWER,)),
         _I.ENABLE: (_P.ENABLING, (_A.RAISE,)),
     },
@@ -120,7 +121,8 @@ _HELD = dict.fromkeys(HOLDING, "a stop is held; reset it first")
 # Why what somebody asks for is not done in a phase; for all else there is nobody to be told.
 REFUSALS: Mapping[Input, Mapping[Phase, str]] = {_I.RESET: _UNDER_WAY, _I.ENABLE: _UNDER_WAY | _HELD}
 
-_BEGIN = frozenset({_A.STOP_ALL, _A.LOWER, _A.RAISE})  # what makes an undertaking
+_HOLD = frozenset({_A.STOP_ALL, _A.WATCH})  # from now on a stop is held
+_BEGIN = _HOLD | {_A.LOWER, _A.RAISE}  # what makes an undertaking
 _ENDS = frozenset({_I.ANSWERED, _I.PROVED, _I.UNPROVED, _I.REMOVED, _I.KEPT, _I.ENABLED})
 
 
@@ -152,7 +154,7 @@ class State:
 class Event:
     """One input, with what belongs to it: `target` of `SEEN` and `LOST`, `number` of an end.
 
-    As long as a rule is `standing`, nothing is proved, reset or enabled; and what `PROVED` says of rest counts
+    As long as a rule is `standing`, nothing is proved, reset or enabled; what `PROVED` says of rest counts
     only where its findings show that, target for target.
     """
 
@@ -193,7 +195,7 @@ def step(state: State, event: Event) -> Step:
         return Step(state, (), REFUSALS.get(happened, {}).get(state.phase))
     phase, actions = row
     state = replace(state, phase=phase, number=state.number + (not _BEGIN.isdisjoint(actions)))
-    if Action.STOP_ALL in actions:
+    if not _HOLD.isdisjoint(actions):
         state = replace(state, stops=state.stops + 1, stopped_ns=event.at_ns)
     return Step(state, actions)
 
@@ -204,8 +206,10 @@ def _disturbed(state: State, event: Event) -> State:
 
 
 def unproved(state: State, findings: Mapping[str, Finding]) -> Iterator[str]:
-    """Targets of which it is not known that they rest: a reading counts that was asked for after the last
-    stop, and after the target itself was last seen enabled, or lost.
+    """Targets that are not known to rest.
+
+    A reading counts that was asked for after the last stop, and after the target was last seen enabled, or
+    lost.
     """
     for target in sorted(state.targets):
         found = findings.get(target)

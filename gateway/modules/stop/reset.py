@@ -1,98 +1,98 @@
-"""Reset: leads every drive to SWITCH ON DISABLED, never further, and ends the hold where none can move."""
+"""Reset: leads every drive to SWITCH ON DISABLED, never further, and shows that nothing can move.
+
+Controllers are stopped, then the drives are led down, all at once; then every drive and every controller is
+read once more. Only what these last readings say is handed to the machine, which ends the hold or does not.
+"""
 
 from collections.abc import Mapping
 from concurrent.futures import Future
-
-import msgspec
+from dataclasses import dataclass, field
 
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import Led
-from gateway.futures import back, done, failed, gather, then
+from gateway.futures import back, failed, gather, then
 from gateway.loop import Loop
-from gateway.messages import Reset
+from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
-from gateway.modules.stop.hold import GATEWAY, Hold
-from gateway.modules.stop.target import Target, stop_all
-from gateway.records.journal import Journal
-from gateway.wire import Kind, refuse
+from gateway.modules.stop.machine import Finding
+from gateway.modules.stop.target import stop_all
 
 # States in which a drive has no current; only what is known to be in one of them lets a hold end.
 AT_REST = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})
+NOT_STOPPED = "it does not hold the value that stops it"
 
-Found = Mapping[str, Led | Exception]
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """What a way down has come to: where each drive is, what is wrong, and what was read last."""
+
+    drives: dict[str, str]
+    problems: dict[str, str]
+    findings: dict[str, Finding] = field(default_factory=dict)
 
 
-class Resetter:
-    """One robot's resets, one at a time. It belongs to the loop's thread."""
+class Lowering:
+    """One way down of a robot. It belongs to the loop's thread. `absent` could not be built, and why."""
 
     def __init__(
-        self,
-        loop: Loop,
-        drives: Mapping[str, Drive],
-        absent: Mapping[str, str],
-        controllers: Mapping[str, Target],
-        hold: Hold,
-        journal: Journal,
+        self, loop: Loop, drives: Mapping[str, Drive], absent: Mapping[str, str], controllers: Controllers
     ) -> None:
         self._loop = loop
         self._drives = drives
-        self._absent = absent  # joints that could not be built, and why
-        self._controllers = controllers
-        self._hold = hold
-        self._journal = journal
+        self._absent = {**absent, **controllers.absent}
+        self._joints = (*drives, *absent)
+        self._controllers = controllers.targets
 
-    def reset(self, who: str) -> "Future[Reset]":
-        """Lead all drives down at once; the hold stays unless each is known to have no current.
-
-        Raises:
-            RpcError: as the future's error (unavailable): the drives are down, the hold cannot be removed.
-
-        """
-        begun = self._hold.begun
-        self._hold.asks_unseen = False  # or it would overtake the reset of a drive that only SDO shows
+    def run(self) -> "Future[Descent]":
+        """Lead all down, and read them."""
         quiet = back(self._loop, gather(stop_all(self._controllers)))  # nobody shall command against it
-        descents = then(quiet, lambda _reports: back(self._loop, gather(self._descents())))
-        return then(descents, lambda found: self._end(who, begun, found))
+        led = then(quiet, lambda _reports: back(self._loop, gather(self._begin("reset"))))
+        return then(led, self._look)
 
-    def _descents(self) -> "dict[str, Future[Led]]":
-        return {name: _begin(drive) for name, drive in self._drives.items()}
+    def _look(self, led: Mapping[str, Led | Exception]) -> "Future[Descent]":
+        drives = back(self._loop, gather(self._begin("look")))
+        controllers = {name: one.look() for name, one in self._controllers.items()}
+        return then(
+            drives,
+            lambda seen: then(
+                back(self._loop, gather(controllers)), lambda found: self._descent(led, seen, found)
+            ),
+        )
 
-    def _end(self, who: str, begun: int, found: Found) -> "Future[Reset]":
-        self._hold.asks_unseen = True
-        led = {name: as_led(one) for name, one in found.items()}
-        led |= {name: Led(None, why) for name, why in self._absent.items()}
-        drives = {name: state_words(one.state) for name, one in led.items()}
-        problems = {name: one.problem for name, one in led.items() if one.problem is not None}
-        at_rest = all(one.state in AT_REST for one in led.values())
-        held = self._hold.held is not None
-        reset = Reset(drives, problems, held=held)
-        if not (held and at_rest and begun == self._hold.begun):
-            return done(self._told(who, reset))
-        # Off the disk first: a hold that would come back with the next gateway has not ended.
-        removed = gather({"hold": back(self._loop, self._hold.end())})
-        return then(removed, lambda got: self._told(who, self._end_hold(reset, begun, got["hold"])))
+    def _begin(self, what: str) -> "dict[str, Future[Led]]":
+        return {name: _call(drive, what) for name, drive in self._drives.items()}
 
-    def _end_hold(self, reset: Reset, begun: int, failure: Exception | None) -> Reset:
-        if failure is not None:
-            text = (
-                f"every drive is disabled, but the stop stays held: its record cannot be removed: {failure}"
-            )
-            self._journal.append(GATEWAY, "hold not ended", reason=text)
-            raise refuse(Kind.UNAVAILABLE, text)
-        if begun != self._hold.begun:
-            return reset  # a stop came in between
-        self._hold.forget()
-        return msgspec.structs.replace(reset, held=False)
-
-    def _told(self, who: str, reset: Reset) -> Reset:
-        problems = {"problems": reset.problems} if reset.problems else {}
-        self._journal.append(who, "reset", result=reset.drives, held=reset.held, **problems)
-        return reset
+    def _descent(
+        self,
+        led: Mapping[str, Led | Exception],
+        seen: Mapping[str, Led | Exception],
+        found: Mapping[str, Finding | Exception],
+    ) -> Descent:
+        last = {name: _last(as_led(led[name]), as_led(seen[name])) for name in self._drives}
+        last |= {name: Led(None, self._absent[name]) for name in self._joints if name not in last}
+        problems = {name: one.problem for name, one in last.items() if one.problem is not None}
+        for name, one in found.items():
+            if not isinstance(one, Finding):
+                problems[name] = str(one)
+            elif not one.at_rest:
+                problems[name] = NOT_STOPPED
+        problems |= {name: why for name, why in self._absent.items() if name not in last}
+        findings = {name: Finding(one.state in AT_REST, one.asked_ns) for name, one in last.items()}
+        findings |= {name: one for name, one in found.items() if isinstance(one, Finding)}
+        return Descent({name: state_words(one.state) for name, one in last.items()}, problems, findings)
 
 
-def _begin(drive: Drive) -> "Future[Led]":
+def _last(led: Led, seen: Led) -> Led:
+    """Where it is by the last reading; what its way down said stays the reason why it did not arrive."""
+    problem = seen.problem or led.problem
+    if problem is None and seen.state is not led.state:
+        problem = f"it was led to {state_words(led.state)}, and is in {state_words(seen.state)} now"
+    return Led(seen.state, problem, asked_ns=seen.asked_ns)
+
+
+def _call(drive: Drive, what: str) -> "Future[Led]":
     try:
-        return drive.reset()
+        return drive.look() if what == "look" else drive.reset()
     except Exception as error:  # noqa: BLE001 - it is this drive's alone
         return failed(error)
 

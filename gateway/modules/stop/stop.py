@@ -1,7 +1,6 @@
-"""The robot's stop: every drive and controller at once, answered in time, and held.
+"""What follows a stop that is on its way: a second try on a cold start, the last resort, the answer in time.
 
-The stop acts first; only then its hold is made durable and journaled. Where that cannot be, the stop acts all
-the same, and says so. Nothing here can enable a drive.
+The stop acts first, in a thread of its own; here, in the loop, is only told what came of it.
 """
 
 import logging
@@ -10,23 +9,26 @@ from concurrent.futures import Future
 from typing import Any
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway.futures import back, gather, outcome, then
+from gateway.futures import back, done, gather, outcome, then
 from gateway.loop import Loop
 from gateway.messages import StopOutcome as Said
 from gateway.messages import Stopped
 from gateway.modules.stop.controllers import Controllers
-from gateway.modules.stop.hold import Hold
 from gateway.modules.stop.settings import Fallback, StopSettings
 from gateway.modules.stop.stopper import Stopper, Tell, nmt_stop
-from gateway.modules.stop.target import Report, Target, stop_all
+from gateway.modules.stop.target import Report, Target
 
 log = logging.getLogger(__name__)
 
 WhenReady = Callable[[str], "Future[None]"]
+Kept = Future[str | None]  # why it is not held beyond this gateway
 
 
-class Stop:
-    """One robot's stop. It belongs to the loop's thread. `absent` are drives that could not be built."""
+class StopAnswers:
+    """One robot's. It belongs to the loop's thread. `absent` are drives that could not be built.
+
+    `when_ready` tells when a component that was started a moment ago can be reached.
+    """
 
     def __init__(
         self,
@@ -35,7 +37,7 @@ class Stop:
         stoppers: Mapping[str, Stopper],
         absent: Iterable[str],
         controllers: Controllers,
-        hold: Hold,
+        when_ready: WhenReady,
         tell: Tell,
     ) -> None:
         self._loop = loop
@@ -44,24 +46,19 @@ class Stop:
         self._controllers = controllers
         self._targets: Mapping[str, Target] = {**stoppers, **controllers.targets}
         self._unreachable = {name: Report(StopOutcome.UNREACHABLE) for name in (*absent, *controllers.absent)}
-        self._hold = hold
+        self._when_ready = when_ready
         self._tell = tell
 
-    def stop(self, who: str, reason: str, when_ready: WhenReady) -> "Future[Stopped]":
-        """Stop everything now, and what only just comes up as soon as it is there.
-
-        `when_ready` tells when a component that was started a moment ago can be reached.
-        """
-        first = stop_all(self._targets)
-        kept = self._hold.begin(who, reason)
-        log.warning("quick stop on every drive: %s", reason or "no reason given")
-        stops = {name: self._once_more(name, stop, when_ready(name)) for name, stop in first.items()}
+    def follow(self, first: "Mapping[str, Future[Report]]", kept: Kept | None) -> "Future[Stopped]":
+        """The answer to a stop that was asked of every target a moment ago."""
+        stops = {name: self._once_more(name, stop) for name, stop in first.items()}
         drives = {name: stop for name, stop in stops.items() if name in self._stoppers}
         last = then(back(self._loop, gather(drives)), self._last_resort)
-        return self._answer_in_time(stops, last, kept)
+        return self._answer_in_time(stops, last, kept or done(None))
 
-    def _once_more(self, name: str, first: "Future[Report]", ready: "Future[None]") -> "Future[Report]":
+    def _once_more(self, name: str, first: "Future[Report]") -> "Future[Report]":
         """On a cold start the first attempt may come before the bus is open."""
+        ready = self._when_ready(name)
         if ready.done():
             return first
         both = gather({"first": then(first, lambda _report: None), "ready": ready})
@@ -74,10 +71,7 @@ class Stop:
         return nmt_stop((stopper.drive for stopper in self._stoppers.values()), reports, self._tell)
 
     def _answer_in_time(
-        self,
-        stops: "Mapping[str, Future[Report]]",
-        last: "Future[dict[str, Report]]",
-        kept: "Future[str | None]",
+        self, stops: "Mapping[str, Future[Report]]", last: "Future[dict[str, Report]]", kept: Kept
     ) -> "Future[Stopped]":
         answer: Future[Stopped] = Future()
 
@@ -91,7 +85,7 @@ class Stop:
         gather(everything).add_done_callback(lambda _all: self._loop.call(tell))
         return answer
 
-    def _answer(self, found: Mapping[str, Report], kept: "Future[str | None]") -> Stopped:
+    def _answer(self, found: Mapping[str, Report], kept: Kept) -> Stopped:
         controllers, reports = self._controllers.names, {**found, **self._unreachable}
         said: dict[str, Said] = {name: report.outcome.value for name, report in reports.items()}
         return Stopped(

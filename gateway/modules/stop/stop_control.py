@@ -1,24 +1,34 @@
-"""Stop, hold, reset and enabling of one robot, put together for the control module."""
+"""Stop, hold, reset and enabling of one robot: what the machine decides is carried out here.
+
+Whatever happens is told to the `Authority`; what follows is done by `_act`: stops in the stop's own thread,
+the record in that of the disk, all else in the loop.
+"""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, TypeVar, cast
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, cast
 
 from drivers.bus.settings import Role
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
 from gateway import messages
 from gateway.boot import boot_id
 from gateway.config import RobotConfig
-from gateway.futures import back, gather, then
+from gateway.futures import back, done, gather, outcome, pass_on, then
 from gateway.loop import Loop
+from gateway.modules.stop.authority import Address, Authority
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.enabling import Enabling
-from gateway.modules.stop.hold import GATEWAY, Hold
-from gateway.modules.stop.hold_file import HeldStop
-from gateway.modules.stop.reset import Resetter
-from gateway.modules.stop.stop import Stop
+from gateway.modules.stop.hold_file import HeldStop, HoldFile
+from gateway.modules.stop.machine import Action, Input, Step
+from gateway.modules.stop.reset import Descent, Lowering
+from gateway.modules.stop.stop import StopAnswers
 from gateway.modules.stop.stopper import Stopper
+from gateway.modules.stop.target import Report, Target, stop_all
+from gateway.modules.stop.thread import StopThread
+from gateway.modules.stop.watch import LOOK_S, Watch
 from gateway.records.records import Records
 from gateway.sources import check_globs, matches
 from gateway.wire import Kind, refuse
@@ -26,11 +36,23 @@ from gateway.wire import Kind, refuse
 if TYPE_CHECKING:
     from gateway.modules.component import ComponentModule
 
-T = TypeVar("T")
+GATEWAY = "gateway"  # who the journal says it was, where nobody asked
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Who wants a stop, and why; where the answer goes."""
+
+    who: str
+    reason: str
+    answer: "Future[messages.Stopped]" = field(default_factory=Future)
 
 
 class StopControl:
-    """It belongs to the loop's thread, but for `load`. `changed` is called when `held` has become another."""
+    """For any thread, where not said otherwise. `changed` is called in the loop when a hold began or ended.
+
+    `claim` takes what a stop has set out of the hands of trials and roll-backs; it must not block.
+    """
 
     def __init__(
         self,
@@ -41,10 +63,12 @@ class StopControl:
         changed: Callable[[], None],
     ) -> None:
         self._config = config
-        self._component = component
         self._loop = loop
         self._journal = records.journal
-        self._moving: str | None = None  # what leads the drives somewhere just now
+        self._changed = changed
+        self.claim: Callable[[], Future[None]] = lambda: done(None)
+        self._claimed: Future[None] = done(None)
+        self._closed = False
         components = component.robot.components
         self.drives = {name: cast("Drive", components[name]) for name in config.joint if name in components}
         self._absent = {name: why for name, why in component.absent.items() if name in config.joint}
@@ -53,47 +77,197 @@ class StopControl:
             name: Stopper(drive, config.stop.fallback, self._tell_fallback)
             for name, drive in self.drives.items()
         }
-        self._hold = Hold(loop, stoppers, self._controllers.targets, records, changed)
-        self._stop = Stop(
-            loop, config.stop, stoppers, self._absent, self._controllers, self._hold, self._tell_fallback
+        self._targets: Mapping[str, Target] = {**stoppers, **self._controllers.targets}
+        self.authority = Authority(
+            (*self.drives, *self._absent, *self._controllers.names), locked_objects(config)
         )
-        self._resetter = Resetter(
-            loop, self.drives, self._absent, self._controllers.targets, self._hold, self._journal
+        self._record = HoldFile(records.folder.hold, records.unusable, self._wrote)
+        self._watch = Watch(
+            self.authority, stoppers, self._controllers.targets, self._happened, self._tell_again
         )
+        self._thread = StopThread(self._watch.look, lambda: self.authority.held, LOOK_S)
+        self._answers = StopAnswers(
+            loop,
+            config.stop,
+            stoppers,
+            self._absent,
+            self._controllers,
+            lambda name: component.when_ready([name]),
+            self._tell_fallback,
+        )
+        self._lowering = Lowering(loop, self.drives, self._absent, self._controllers)
 
     @property
     def held(self) -> bool:
-        return self._hold.held is not None
+        return self.authority.held
 
-    def load(self) -> HeldStop | None:
-        """What the last gateway held. In the thread that starts the module."""
-        return self._hold.load()
-
-    def resume(self, left: HeldStop | None) -> None:
-        """Hold what the last gateway held."""
-        self._hold.resume(left)
+    def start(self) -> None:
+        """Begin; a stop that the last gateway held is held on."""
+        self._thread.start()
+        left = self._record.load()
+        if left is None:
+            return
+        details = {"by": left.who, "reason": left.reason, "since_utc_ns": left.utc_ns}
+        self._journal.append(GATEWAY, "stop still held", **details)
+        self._ask(Input.FOUND, Asked(left.who, left.reason))
 
     def close(self) -> None:
         """End with the process; a held stop stays on disk."""
-        self._hold.close()
+        self._closed = True
+        self._watch.end()
+        self._thread.close()
+        self._record.close()
+
+    # Stop
 
     def stop(self, who: str, reason: str) -> "Future[messages.Stopped]":
         """Quick stop on every drive, controllers too, held until it is reset."""
-        stopped = self._stop.stop(who, reason, lambda name: self._component.when_ready([name]))
-        return then(stopped, lambda answer: self._answered(who, answer))
+        return self._ask(Input.STOP, Asked(who, reason))
+
+    def trip(self, who: str, reason: str) -> None:
+        """A rule of the guard that stops has tripped: the same, but a stop that is held stays whose it is."""
+        self._ask(Input.TRIP, Asked(who, reason))
+
+    def _happened(self, what: Input, target: str, stamp_ns: int) -> None:
+        """What the watch has seen."""
+        asked = Asked(GATEWAY, f"{target}: {what.value} while the hold was ending")
+        self.authority.feed(what, partial(self._act, asked, target), at_ns=stamp_ns, target=target)
+
+    def _ask(self, what: Input, asked: Asked) -> "Future[messages.Stopped]":
+        self.authority.feed(what, partial(self._act, asked, ""))
+        return asked.answer
+
+    def _act(self, asked: Asked, target: str, step: Step) -> None:
+        """Under the machine's lock: in the order of events, and without waiting for anything."""
+        for action in step.actions:
+            if action is Action.STOP_ALL:
+                recorded = Action.RECORD in step.actions
+                self._thread.put(partial(self._stop_all, asked, step.number, recorded=recorded))
+            elif action is Action.STOP_AGAIN and not self._targets[target].running:
+                self._thread.put(partial(self._watch.stop_again, target))
+            elif action is Action.WATCH:
+                self._thread.put(self._hold_on)
+
+    def _stop_all(self, asked: Asked, number: int, *, recorded: bool) -> None:
+        """In the stop's thread: it acts first, and is written down then."""
+        first = stop_all(self._targets)
+        if recorded:
+            self._record.write(asked.who, asked.reason)
+        self._watch.begin()
+        self._claimed = self.claim()
+        self._loop.post(partial(self._follow, asked, number, first, recorded=recorded))
+
+    def _hold_on(self) -> None:
+        """In the stop's thread: what is seen to be stopped since the last gateway's time is left alone."""
+        stop_all(self._controllers.targets)
+        self._watch.begin()
+        self._watch.look()
+        self._claimed = self.claim()
+        self._loop.post(self._changed)
+
+    def _follow(
+        self, asked: Asked, number: int, first: "Mapping[str, Future[Report]]", *, recorded: bool
+    ) -> None:
+        """In the loop."""
+        self._changed()
+        stopped = self._answers.follow(first, self._record.kept)
+        stopped.add_done_callback(lambda found: self._answered(asked, number, found, recorded=recorded))
+
+    def _answered(
+        self, asked: Asked, number: int, stopped: "Future[messages.Stopped]", *, recorded: bool
+    ) -> None:
+        self.authority.feed(Input.ANSWERED, partial(self._act, asked, ""), number=number)
+        found = outcome(stopped)
+        if isinstance(found, messages.Stopped) and recorded and not self._closed:
+            keys = ("controllers", "fallbacks", "problem")
+            more = {key: value for key in keys if (value := getattr(found, key))}
+            self._journal.append(asked.who, "stop answered", result=found.drives, **more)
+        pass_on(stopped, asked.answer)
+
+    # Reset; in the loop.
 
     def reset(self, who: str) -> "Future[messages.Reset]":
-        """Lead every drive to SWITCH ON DISABLED, and end the hold; see `Resetter`."""
-        return self._one_at_a_time("a reset", lambda: self._resetter.reset(who))
+        """Lead every drive to SWITCH ON DISABLED; a held stop ends where all is shown to rest.
+
+        Raises:
+            RpcError: stopped while a rule of the guard is tripped; wrong_state while another reset or an
+                enabling is under way; unavailable, as the future's error: the record cannot be removed.
+
+        """
+        number = self._begin(Input.RESET)
+        down = then(self._settled(), lambda _settled: self._lowering.run())
+        down.add_done_callback(lambda ended: self._give_up(number, ended))
+        return then(down, lambda descent: self._prove(who, number, descent))
+
+    def _settled(self) -> "Future[object]":
+        """Done when every stop that was asked for until now has acted, and claimed what it has set."""
+        acted: Future[object] = Future()
+        self._thread.put(lambda: gather({"claimed": self._claimed}).add_done_callback(acted.set_result))
+        return back(self._loop, acted)
+
+    def _give_up(self, number: int, ended: "Future[Descent]") -> None:
+        """A way down that failed inside has proved nothing."""
+        if ended.exception() is not None:
+            self.authority.feed(Input.UNPROVED, _nothing, number=number)
+
+    def _prove(self, who: str, number: int, descent: Descent) -> "Future[messages.Reset]":
+        removed: list[Future[None]] = []
+
+        def act(step: Step) -> None:
+            if Action.REMOVE in step.actions:
+                removed.append(self._record.remove())
+
+        self.authority.feed(Input.PROVED, act, number=number, findings=descent.findings)
+        if not removed:
+            return done(self._told(who, descent))
+        gone = gather({"hold": back(self._loop, removed[0])})
+        return then(gone, lambda found: self._removed(who, number, descent, found["hold"]))
+
+    def _removed(self, who: str, number: int, descent: Descent, failure: Exception | None) -> messages.Reset:
+        what = Input.REMOVED if failure is None else Input.KEPT
+        step = self.authority.feed(what, self._release, number=number)
+        if Action.RELEASE in step.actions:
+            self._changed()
+        if failure is not None:
+            text = (
+                f"every drive is disabled, but the stop stays held: its record cannot be removed: {failure}"
+            )
+            self._journal.append(GATEWAY, "hold not ended", reason=text)
+            raise refuse(Kind.UNAVAILABLE, text)
+        return self._told(who, descent)
+
+    def _release(self, step: Step) -> None:
+        if Action.RELEASE in step.actions:
+            self._watch.end()
+            self._record.forget()
+
+    def _told(self, who: str, descent: Descent) -> messages.Reset:
+        reset = messages.Reset(descent.drives, descent.problems, held=self.held)
+        problems = {"problems": reset.problems} if reset.problems else {}
+        self._journal.append(who, "reset", result=reset.drives, held=reset.held, **problems)
+        return reset
+
+    def _begin(self, what: Input) -> int:
+        step = self.authority.feed(what, _nothing)
+        if step.refusal is None:
+            return step.number
+        if what is Input.ENABLE and step.state.held:
+            raise refuse(Kind.STOPPED, self._hold_words())
+        kind = Kind.STOPPED if self.authority.standing() else Kind.WRONG_STATE
+        said = f"the stop is not reset: {step.refusal}" if kind is Kind.STOPPED else step.refusal
+        raise refuse(kind, said)
+
+    # Enabling; in the loop.
 
     def enable(
-        self, who: str, globs: list[str] | None, objection: Callable[[], str | None]
+        self, who: str, globs: list[str] | None, objection: Callable[[list[str]], str | None]
     ) -> "Future[messages.Enabled]":
         """Enable the joints that the globs mean, as long as there is no `objection`.
 
         Raises:
-            RpcError: not_allowed to an observer; stopped while a stop is held; unavailable where it cannot
-                be journaled, as the future's error.
+            RpcError: not_allowed to an observer; stopped while a stop is held; wrong_state while a reset or
+                another enabling is under way; unavailable where it cannot be journaled, as the future's
+                error.
 
         """
         if self._config.gateway.role is not Role.MASTER:
@@ -103,36 +277,16 @@ class StopControl:
             )
         check_globs("joint", self.drives, globs, self._absent)
         chosen = {name: drive for name, drive in self.drives.items() if matches(name, globs)}
-        objects = self._objection(objection)
-        if self.held:
-            raise refuse(Kind.STOPPED, str(objects()))
+        number = self._begin(Input.ENABLE)
+
+        def objects() -> str | None:
+            overtaken = None if self.authority.is_newest(number) else self._hold_words()
+            return overtaken or objection(list(chosen))
+
         enabling = Enabling(self._loop, chosen, who, objects, self._journal)
-        return self._one_at_a_time("an enabling", lambda: self._explained(who, list(chosen), enabling))
-
-    def info(self, armed: Callable[[str], bool]) -> messages.StopInfo:
-        """As `robot.describe` shows it."""
-        held = self._hold.held
-        return messages.StopInfo(
-            held=held is not None,
-            reason=None if held is None else held.reason,
-            since_ns=None if held is None or held.boot_id != boot_id() else held.monotonic_ns,
-            stopped_again=self._hold.again,
-            drives={name: _reaction(drive, armed(name)) for name, drive in self.drives.items()},
-            fallbacks=[fallback.words for fallback in self._config.stop.fallback],
-            controllers={
-                name: self._controllers.absent.get(name) for name in sorted(self._controllers.names)
-            },
-            problem=self._hold.problem,
-        )
-
-    def _objection(self, more: Callable[[], str | None]) -> Callable[[], str | None]:
-        def objection() -> str | None:
-            held = self._hold.held
-            if held is None:
-                return more()
-            return f"the stop of {held.who} is held ({held.reason or 'no reason given'}); reset it first"
-
-        return objection
+        answer = self._explained(who, list(chosen), enabling)
+        answer.add_done_callback(lambda _answer: self.authority.feed(Input.ENABLED, _nothing, number=number))
+        return answer
 
     def _explained(self, who: str, joints: list[str], enabling: Enabling) -> "Future[messages.Enabled]":
         """What cannot be journaled is not begun."""
@@ -146,26 +300,53 @@ class StopControl:
 
         return then(entry, begin)
 
-    def _one_at_a_time(self, what: str, begin: "Callable[[], Future[T]]") -> "Future[T]":
-        if self._moving is not None:
-            raise refuse(Kind.WRONG_STATE, f"{self._moving} is under way; wait for its answer")
-        answer = begin()
-        self._moving = what
-        answer.add_done_callback(lambda _answer: self._loop.call(self._moved))
-        return answer
+    # Words
 
-    def _moved(self) -> None:
-        self._moving = None
+    def info(self, armed: Callable[[str], bool]) -> messages.StopInfo:
+        """As `robot.describe` shows it."""
+        held = self._record.held if self.held else None
+        return messages.StopInfo(
+            held=self.held,
+            reason=None if held is None else held.reason,
+            since_ns=None if held is None or held.boot_id != boot_id() else held.monotonic_ns,
+            stopped_again=self._watch.again,
+            drives={name: _reaction(drive, armed(name)) for name, drive in self.drives.items()},
+            fallbacks=[fallback.words for fallback in self._config.stop.fallback],
+            controllers={
+                name: self._controllers.absent.get(name) for name in sorted(self._controllers.names)
+            },
+            problem=self._record.problem,
+        )
 
-    def _answered(self, who: str, stopped: messages.Stopped) -> messages.Stopped:
-        more = {
-            key: value for key in ("controllers", "fallbacks", "problem") if (value := getattr(stopped, key))
-        }
-        self._journal.append(who, "stop answered", result=stopped.drives, **more)
-        return stopped
+    def _hold_words(self) -> str:
+        held = self._record.held
+        if held is None:
+            return "a stop came in between; reset it first"
+        return f"the stop of {held.who} is held ({held.reason or 'no reason given'}); reset it first"
+
+    def _wrote(self, held: HeldStop, problem: str | None) -> None:
+        """In the disk's thread: the record is there, or it is known why not."""
+        details = {} if problem is None else {"problem": problem}
+        self._journal.append(held.who, "stop", reason=held.reason, **details)
+
+    def _tell_again(self, target: str, times: int) -> None:
+        self._journal.append(GATEWAY, "stopped again", drive=target, times=times)
 
     def _tell_fallback(self, drive: str, text: str) -> None:
         self._journal.append(GATEWAY, "stop fallback", drive=drive, result=text)
+
+
+def locked_objects(config: RobotConfig) -> frozenset[Address]:
+    """The objects that stop a controller."""
+    return frozenset(
+        (table.bus, table.node_id, *one.address)
+        for one in config.stop.controller
+        if (table := config.device.get(one.component)) is not None
+    )
+
+
+def _nothing(_step: Step) -> None:
+    """What follows is begun by who has asked."""
 
 
 def _reaction(drive: Drive, armed: bool) -> messages.DriveReaction:

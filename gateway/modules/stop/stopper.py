@@ -10,29 +10,27 @@ from drivers.joint.quick_stop import StopOutcome
 from gateway.futures import done, then
 from gateway.modules.stop.drive import Drive, quick_stop
 from gateway.modules.stop.settings import Fallback
-from gateway.modules.stop.target import Report
+from gateway.modules.stop.target import OneAtATime, Report
 
 Tell = Callable[[str, str], object]  # a drive's name, and what was done to it in words
 
 
 class Stopper:
-    """One drive, which is stopped once at a time."""
+    """One drive."""
 
     def __init__(self, drive: Drive, fallbacks: Iterable[Fallback], tell: Tell) -> None:
         self.drive = drive
         self._fallbacks = frozenset(fallbacks)
         self._tell = tell
-        self._running: Future[Report] | None = None
+        self._stops = OneAtATime(lambda wake: then(quick_stop(self.drive, wake=wake), self._or_limp))
 
     @property
     def running(self) -> bool:
-        return self._running is not None and not self._running.done()
+        return self._stops.running
 
     def stop(self, *, wake: bool = True) -> "Future[Report]":
         """Ask for it; the fallback that a drive can confirm follows by itself."""
-        if self._running is None or self._running.done():
-            self._running = then(quick_stop(self.drive, wake=wake), self._or_limp)
-        return self._running
+        return self._stops.ask(wake=wake)
 
     def wake(self) -> None:
         self.drive.wake()

@@ -1,11 +1,13 @@
 """What a stop goes to, drives and controllers alike: each can be asked, and reports what is known then."""
 
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.joint.quick_stop import StopOutcome
+from gateway.futures import pass_on
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +20,10 @@ class Report:
 
 class Target(Protocol):
     """One drive, or one controller."""
+
+    @property
+    def running(self) -> bool:
+        """Whether a stop of it is under way."""
 
     def stop(self, *, wake: bool = True) -> "Future[Report]":
         """Ask it to stop, ahead of everything else that is asked of its node. Never raises."""
@@ -32,3 +38,43 @@ def stop_all(targets: Mapping[str, Target]) -> "dict[str, Future[Report]]":
     for target in targets.values():
         target.wake()
     return stops
+
+
+class OneAtATime:
+    """Stops one target once at a time; for any thread.
+
+    A stop that comes meanwhile follows, once for all who ask for it: what the first one confirms was perhaps
+    read before the later one was asked for.
+    """
+
+    def __init__(self, begin: "Callable[[bool], Future[Report]]") -> None:
+        """`begin(wake)` asks, and never raises."""
+        self._begin = begin
+        self._lock = threading.Lock()
+        self._running: Future[Report] | None = None
+        self._next: Future[Report] | None = None
+
+    @property
+    def running(self) -> bool:
+        return self._running is not None
+
+    def ask(self, *, wake: bool) -> "Future[Report]":
+        """Begin, or follow what is under way."""
+        with self._lock:
+            if self._running is not None:
+                self._next = self._next or Future()
+                return self._next
+            report = self._running = Future()
+        self._run(report, wake=wake)
+        return report
+
+    def _run(self, report: "Future[Report]", *, wake: bool) -> None:
+        self._begin(wake).add_done_callback(lambda found: self._ended(report, found))
+
+    def _ended(self, report: "Future[Report]", found: "Future[Report]") -> None:
+        with self._lock:
+            following = self._running = self._next
+            self._next = None
+        pass_on(found, report)
+        if following is not None:
+            self._run(following, wake=True)

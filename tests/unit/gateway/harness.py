@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,9 +17,10 @@ from typing import Any, Self
 import pytest
 
 import eds
+from drivers.bus.life import NodeLife
 from drivers.component import Component, Kind
 from drivers.errors import DeviceAbort
-from drivers.joint.cia402 import DriveState
+from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
@@ -150,6 +152,7 @@ class FakeNode:
     def __init__(self, objects: Bytes) -> None:
         self.objects = dict(objects)
         self.log: list[tuple[str, int, bytes | None]] = []
+        self.life = NodeLife(None)
         self.before_download: Callable[[int, bytes], None] = lambda index, data: None
         self.before_upload: Callable[[int], None] = lambda index: None
         self.store: Callable[[int, bytes], bytes] = lambda index, data: data
@@ -310,6 +313,14 @@ class FakeDrive(FakeComponent):
         if self.led.problem is None:
             self.set_state(DISABLED)
         return done(self.led)
+
+    def look(self) -> "Future[Led]":
+        """Where it is; where a test has made up how far it is led, that."""
+        asked_ns = time.monotonic_ns()
+        if self.led.problem is not None:
+            return done(replace(self.led, asked_ns=asked_ns))
+        statusword = int.from_bytes(self.node.objects[0x6041, 0], "little")
+        return done(Led(drive_state(statusword), asked_ns=asked_ns))
 
     def step_up(self, origin: DriveState) -> "Future[Led]":
         self.steps.append(origin)

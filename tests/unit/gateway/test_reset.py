@@ -10,7 +10,7 @@ from drivers.component import Kind
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import Led
 from gateway.records.folder import RecordsFolder
-from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving, until
+from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, config, serving, until
 
 S = DriveState
 
@@ -103,6 +103,7 @@ def test_two_resets_do_not_run_at_once(client: Client, bench: Bench, monkeypatch
     first = client.request("robot.reset")
     until(lambda: bench.right.resets == 1, "it is under way")
     assert client.refused("robot.reset").kind == "wrong_state"
+    bench.left.set_state(DISABLED)
     led.set_result(Led(S.SWITCH_ON_DISABLED))
     assert client.answer(first)["held"] is False
     assert client.call("robot.reset")["held"] is False
@@ -145,6 +146,7 @@ def test_a_drive_that_only_sdo_shows_is_not_overtaken_by_the_watch(
     began_ns = client.call("clock.read")["monotonic_ns"]
     until(lambda: client.call("clock.read")["monotonic_ns"] > began_ns + 600_000_000, "it has looked twice")
     assert bench.left.stops == stops
+    bench.left.set_state(DISABLED)
     led.set_result(Led(S.SWITCH_ON_DISABLED))
     assert client.answer(resetting)["held"] is False
 
