@@ -171,7 +171,10 @@ class JointDrive(PowerDrive):
 
     def _poll(self, polled: tuple[Source, ...], sdo: SdoChannel) -> None:
         for one in polled:
-            data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
+            try:
+                data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
+            except DeviceAbort:
+                continue  # its EDS knows it, this device does not: the others are there all the same
             self._take(one, int.from_bytes(data, "little", signed=one.quantity.signed), time.monotonic_ns())
 
     def _take(self, one: Source, counts: int, stamp_ns: int) -> None:
