@@ -12,7 +12,7 @@ import pytest
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.bus_state import BusState, bus_state
-from drivers.bus.frames import ERROR, EXTENDED
+from drivers.bus.frames import ERROR, EXTENDED, wire_id
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from tests.unit.bus.narrow import NarrowTransport
@@ -67,6 +67,14 @@ def test_an_extended_identifier_is_not_taken_for_a_short_one(bus: CanBus, peer: 
     peer.send(can.Message(arbitration_id=0x181, data=b"", is_extended_id=False))
     until(lambda: len(got) == 2)
     assert got == ["long", "short"]
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "expected"),
+    [(0x601, 0x601), (0x7FF, 0x7FF), (0x800, 0x800 | EXTENDED), (0x1FFF_FFFF, 0x9FFF_FFFF)],
+)
+def test_a_configured_identifier_above_eleven_bits_is_an_extended_one(cob_id: int, expected: int) -> None:
+    assert wire_id(cob_id) == expected
 
 
 def test_several_handlers_share_an_identifier_and_leave_one_by_one(bus: CanBus, peer: can.BusABC) -> None:

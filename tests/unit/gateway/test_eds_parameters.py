@@ -198,6 +198,14 @@ def test_the_second_axis_offers_its_own_objects_and_none_that_the_first_has(tmp_
     assert known["ankle.object_6872"].lock is None
 
 
+def test_what_another_axis_of_the_node_names_is_not_offered_once_more(tmp_path: Path) -> None:
+    text = "[2000]\nParameterName=Gain\nDataType=0x0006\nAccessType=rw\n"
+    (tmp_path / "axes.eds").write_text(text)
+    ankle = KNEE.format(eds="axes.eds", release='["*"]').replace("joint.knee", "joint.ankle") + "axis = 1\n"
+    ankle += '[parameter."ankle.gain"]\nobject = "0x2000:0"\nmax = 5\n'
+    assert list(catalogue(tmp_path, '["*"]', "axes.eds", ankle)) == ["ankle.gain", "knee.*"]
+
+
 def test_a_release_that_means_nothing_is_seen_where_parameters_are(tmp_path: Path) -> None:
     known = catalogue(tmp_path, '["max_torq", "gian_*", "0x6072:1", "max_torque"]')
     problems = {one.name: one.problem for one in known.values() if one.problem}
