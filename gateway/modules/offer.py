@@ -21,7 +21,7 @@ from gateway.config import (
     ParameterSettings,
     RobotConfig,
 )
-from gateway.modules.parameters import WRITABLE, Lock, Parameter
+from gateway.modules.parameters import WRITABLE, Lock, Parameter, contradiction
 from gateway.sources import matches
 
 if TYPE_CHECKING:
@@ -142,6 +142,7 @@ class _Offer:
             variable.min,
             variable.max,
             self._store,
+            contradiction(variable.min, variable.max, self._description.path.name),
             lock=self._lock(variable, name, address),
             table=self._where,
             default=variable.default,
