@@ -5,6 +5,7 @@
     ├── Unavailable        the interface, port, file or node is not there (and may come back)
     ├── DeviceTimeout      the device did not answer in time (also a TimeoutError)
     ├── DeviceAbort        the device refused, with a CiA 301 abort code
+    ├── NotPermitted       a write is forbidden now, or nobody knows who would take it; nothing was sent
     └── Mismatch           the device holds another value than the one that was written
 
 Every message names the device, the object and the value, and says what to do.
@@ -33,6 +34,10 @@ class DeviceAbort(DriverError):
     def __init__(self, message: str, abort_code: int) -> None:
         super().__init__(message)
         self.abort_code = abort_code
+
+
+class NotPermitted(DriverError):
+    """What may not be written now was not sent."""
 
 
 class Mismatch(DriverError):

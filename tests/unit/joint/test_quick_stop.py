@@ -18,6 +18,7 @@ TIMEOUT_S = 0.3
 def quick_stop(channel: SdoChannel, axis_offset: int, timeout_s: float) -> StopOutcome:
     stopping = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, timeout_s, asked=False)
     axis = Axis(channel, axis_offset)
+    channel.resume(urgent=True)
     while (outcome := stopping.turn(axis)) is None:
         pass
     return outcome
@@ -37,7 +38,7 @@ AFTER_QUICK_STOP = {
 
 
 class Drive:
-    """Answers 6040h and 6041h of one axis, as its state machine does."""
+    """Answers 6040h and 6041h of one axis, as its state machine does; it has no other object."""
 
     def __init__(self, statusword: int, axis_offset: int = 0) -> None:
         self.statusword = statusword
@@ -69,7 +70,8 @@ class Drive:
             return b"\x80" + request[1:4] + (0x08000022).to_bytes(4, "little")
         if index == CONTROLWORD:
             return b"\x60" + request[1:4] + bytes(4)
-        assert index == STATUSWORD
+        if index != STATUSWORD:
+            return b"\x80" + request[1:4] + (0x06020000).to_bytes(4, "little")
         return b"\x4b" + request[1:4] + self.statusword.to_bytes(2, "little") + bytes(2)
 
 
