@@ -126,6 +126,8 @@ class JointDrive(PowerDrive):
 
     def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
         """Bring the position into a free TPDO; returns what came of it, in words."""
+        if self.node.distrust is not None:
+            return f"configure_pdos: {self.node.distrust}"
         free = free_tpdo(reading.tpdos, self.node.node_id, self.node.bus.unclaimed)
         if free is None:
             return "configure_pdos: no TPDO of the drive is free, nothing was changed"
