@@ -44,7 +44,7 @@ class StopRpdo:
 
     def _held(self, object_: Object) -> bytes | None:
         """What the device holds of an object now, as far as it has confirmed that; `None`: nobody knows."""
-        return self.node.channel.written.get(object_, self.values[object_])
+        return self.node.channel.known(*object_, self.values[object_])
 
 
 def find_stop_rpdo(node: Node, sdo: SdoChannel, axis_offset: int) -> StopRpdo | None:
