@@ -37,7 +37,6 @@ class LateServer:
         self.channel = SdoChannel("node 1", self.hear, timeout_s)
         self._answers: deque[tuple[int, bytes]] = deque()
         self._left = b""  # of a segmented upload
-        self._about = bytes(3)
 
     def hear(self, request: bytes) -> None:
         if request[0] == 0x80:
@@ -66,6 +65,8 @@ class LateServer:
         specifier, about = request[0] & 0xE0, request[1:4]
         if specifier == 0x60:
             return self._segment(request[0] & 0x10)
+        if specifier == 0x00:
+            return bytes([0x20 | request[0] & 0x10]) + bytes(7)  # what is written in segments is not kept
         self._left = b""
         if specifier == 0x20:
             self.value, self.taken_at = request[4:8], self.sent

@@ -436,3 +436,16 @@ def test_without_a_free_tpdo_nothing_is_changed(joint: Make, channel: str) -> No
         until(lambda: "no TPDO of the drive is free" in quality(knee)[1])
         assert fake.writes == []
         knee.stop()
+
+
+def test_where_two_drives_have_its_node_id_nothing_is_changed_and_it_is_read(
+    joint: Make, channel: str
+) -> None:
+    objects = drive_objects() | tpdo(2, 0x80000282)
+    with FakeNode(channel, 2, objects, repeat_replies=2) as fake:
+        knee = joint(objects, configure_pdos=True)
+        knee.start()
+        until(lambda: read(knee, "position") is not None)
+        assert "configure_pdos: two devices answer as node 2: nothing is written" in quality(knee)[1]
+        assert fake.writes == []
+        knee.stop()
