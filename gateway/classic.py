@@ -7,7 +7,6 @@ exchange, `null` where it is forgotten or was the first.
 """
 
 import logging
-import selectors
 import socket
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -17,7 +16,7 @@ import msgspec
 
 from gateway.acceptor import Acceptor
 from gateway.futures import then
-from gateway.loop import Loop, Timer
+from gateway.loop import READ, WRITE, Loop, Timer
 from gateway.messages import ResourceSnapshotParams
 from gateway.registry import Registry
 
@@ -139,7 +138,7 @@ class _Call:
         self._output = b""
         connection.setblocking(False)
         self._late = loop.call_later(CALL_S, self.close)
-        loop.watch(connection, selectors.EVENT_READ, self._on_ready)
+        loop.watch(connection, READ, self._on_ready)
 
     def close(self) -> None:
         if self._closed:
@@ -172,12 +171,12 @@ class _Call:
             self.close()
         elif not self._closed:
             self._output = piece.result()
-            self._on_ready(selectors.EVENT_WRITE)
+            self._on_ready(WRITE)
 
     def _send(self) -> None:
         """What the socket takes; after the last byte the client is told so, and its own end is awaited."""
         self._output = self._output[self._socket.send(self._output) :]
         if not self._output:
             self._socket.shutdown(socket.SHUT_WR)
-        waits_for = selectors.EVENT_WRITE if self._output else selectors.EVENT_READ
+        waits_for = WRITE if self._output else READ
         self._loop.watch(self._socket, waits_for, self._on_ready)
