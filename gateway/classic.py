@@ -15,9 +15,9 @@ from typing import Any
 import msgspec
 
 from gateway.acceptor import Acceptor
-from gateway.futures import then
+from gateway.futures import done, then
 from gateway.loop import READ, WRITE, Loop, Timer
-from gateway.messages import ResourceSnapshotParams
+from gateway.messages import ResourceSnapshot, ResourceSnapshotParams
 from gateway.registry import Registry
 
 log = logging.getLogger(__name__)
@@ -48,14 +48,17 @@ class _Exchange:
         self._meter: Any = None
         self._rest = b""
 
-    def next_piece(self, resource: Any) -> bytes:
+    def next_piece(self, resource: Any) -> "Future[bytes]":
         """The next bytes of the list; where none are left, a new list's length."""
         if self._rest:
             piece, self._rest = self._rest[:PIECE_BYTES], self._rest[PIECE_BYTES:]
-            return piece
+            return done(piece)
         if self._meter is None:
             self._meter = resource.meter()
-        rows = self._meter.snapshot(_EVERYTHING).processes
+        return then(resource.look(self._meter, _EVERYTHING), self._begin)
+
+    def _begin(self, snapshot: ResourceSnapshot) -> bytes:
+        rows = snapshot.processes or []
         self._rest = msgspec.json.encode(
             [Entry(row.name, row.pid, row.cpu_percent, row.memory_bytes) for row in rows]
         )

@@ -8,7 +8,7 @@ import itertools
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,7 @@ class Tuning:
         self._config = config
         self._devices: dict[str, JointSettings | DeviceSettings] = {**config.joint, **config.device}
         self._parameters = resolve(config, component.robot.descriptions, component.absent)
+        self._infos = [one.info for one in self._parameters.values()]
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._numbers = itertools.count(time.time_ns() // 1_000_000)  # unique also after a restart
         self._interrupted = threading.Event()
@@ -95,18 +96,19 @@ class Tuning:
         self._interrupted = threading.Event()
 
     def infos(self) -> list[ParameterInfo]:
-        return [one.info for one in self._parameters.values()]
+        return self._infos
 
     def listed(self, names: list[str] | None) -> ParameterValues:
         """What is known without asking: the last value read, as long as its device is there."""
-        return ParameterValues({one.name: self._last(one) for one in self._parameters.chosen(names)})
+        chosen = self._parameters.chosen(names)
+        absent = self._absent(chosen)
+        return ParameterValues({one.name: self._last(one, absent) for one in chosen})
 
     def read(self, names: list[str] | None) -> "Future[ParameterValues]":
         """What the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
-        uploads = then(ready, lambda _none: gather({one.name: self._upload(one) for one in chosen}))
-        return then(uploads, self._values)
+        return then(then(ready, lambda _none: self._uploads(chosen)), self._values)
 
     def write(
         self, values: Mapping[str, float], session: "Session", trial_s: float | None
@@ -126,22 +128,26 @@ class Tuning:
 
     # Reading
 
-    def _problem(self, parameter: Parameter) -> str | None:
-        """Why the device cannot be asked at all."""
-        if parameter.problem is not None:
-            return parameter.problem
-        quality = self._component.quality(parameter.component, time.monotonic_ns())
-        if quality["state"] != State.LOST:
-            return None
-        return f"{parameter.component} is not there: {quality['problem'] or 'it is silent'}"
+    def _absent(self, parameters: Iterable[Parameter]) -> dict[str, str]:
+        """Why a device cannot be asked at all; of each that has one of these parameters."""
+        now_ns, absent = time.monotonic_ns(), {}
+        for name in {one.component for one in parameters if one.problem is None}:
+            quality = self._component.quality(name, now_ns)
+            if quality["state"] == State.LOST:
+                absent[name] = f"{name} is not there: {quality['problem'] or 'it is silent'}"
+        return absent
 
-    def _last(self, parameter: Parameter) -> ParameterValue:
-        problem = self._problem(parameter)
+    def _last(self, parameter: Parameter, absent: Mapping[str, str]) -> ParameterValue:
+        problem = parameter.problem or absent.get(parameter.component)
         stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
         return _value(parameter, value, stamp_ns, problem)
 
-    def _upload(self, parameter: Parameter) -> "Future[bytes]":
-        problem = self._problem(parameter)
+    def _uploads(self, parameters: list[Parameter]) -> "Future[dict[str, bytes | Exception]]":
+        absent = self._absent(parameters)
+        return gather({one.name: self._upload(one, absent) for one in parameters})
+
+    def _upload(self, parameter: Parameter, absent: Mapping[str, str]) -> "Future[bytes]":
+        problem = parameter.problem or absent.get(parameter.component)
         if problem is not None:
             return failed(parameter.refusal(Kind.UNAVAILABLE, problem))
         try:

@@ -254,14 +254,14 @@ class TestProcess:
         assert process.stderr is not None
         assert process.stderr.read() == ""
 
-    def test_a_resource_only_client_starts_no_thread_but_the_one_that_reads_it(
+    def test_a_resource_only_client_is_read_and_looked_for_in_a_thread_each(
         self, process: "subprocess.Popen[str]"
     ) -> None:
         with Client(processes.address(process)) as client:
             client.call("hello", client="test")
             client.call("resource.snapshot")
             threads = list(Path(f"/proc/{process.pid}/task").iterdir())
-        assert len(threads) == 2
+        assert len(threads) == 3  # with the loop
 
 
 def test_what_a_resource_only_gateway_imports() -> None:
