@@ -67,8 +67,10 @@ class ControlModule:
         self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
         self._stop.start()
         loop.post(lambda: self._tuning.resume(left))
+        self._context.stops_by(self.stop_robot)
 
     def stop(self) -> None:
+        self._context.stops_by(None)
         self._stop.close()
         self._tuning.close()
         self._records.close()
