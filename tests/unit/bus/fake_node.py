@@ -86,7 +86,11 @@ class FakeNode:
         if self.silent or command == 0x80 or ((index, subindex) in self.deaf_to and command >> 5 in (1, 2)):
             return
         reply = self._reply(command, index, subindex, request)
-        self._due.extend([(time.monotonic() + self.delay_s, reply)] * self.repeat_replies)
+        for _ in range(self.repeat_replies):
+            if self.delay_s or self._due:
+                self._due.append((time.monotonic() + self.delay_s, reply))
+            else:
+                self.send(0x580 + self.node_id, reply)
 
     def _reply(self, command: int, index: int, subindex: int, request: bytes) -> bytes:
         specifier = command >> 5
