@@ -81,12 +81,11 @@ class Sender:
         """Send nothing more; who waits is told. Idempotent."""
         with self._changed:
             self._transport = None
-            waiting = (*self._urgent.values(), *self._normal)
+            for frame in (*self._urgent.values(), *self._normal):
+                frame.taken.set_exception(Unavailable(self._why_closed()))
             self._urgent.clear()
             self._normal.clear()
             self._changed.notify()
-        for frame in waiting:
-            frame.taken.set_exception(Unavailable(self._why_closed()))
 
     def join(self) -> None:
         """After `stop`, and after a transport that may block was closed."""

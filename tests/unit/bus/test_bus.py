@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import can
 import pytest
+from can.interfaces.virtual import VirtualBus
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.bus_state import BusState, bus_state
@@ -16,7 +17,7 @@ from drivers.bus.frames import ERROR, EXTENDED, wire_id
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from tests.unit.bus.narrow import NarrowTransport
-from tests.unit.bus.waiting import until
+from tests.unit.bus.waiting import WAIT_S, until
 
 
 class Recorder(BusUser):
@@ -228,6 +229,33 @@ def test_a_bus_nobody_holds_is_closed_and_threads_take_turns_as_before() -> None
     assert bus.opened == 3
     with pytest.raises(Unavailable, match="bus main is not open"):
         bus.send(0x601, bytes(8))
+
+
+def test_an_interface_of_python_can_that_may_block_sends_in_the_buss_own_thread(
+    peer: can.BusABC, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.setattr("drivers.bus.python_can._NEVER_BLOCKS", ())
+    senders: list[str] = []
+    send = VirtualBus.send
+
+    def note(self: VirtualBus, message: can.Message, timeout: float | None = None) -> None:
+        senders.append(threading.current_thread().name)
+        send(self, message, timeout)
+
+    monkeypatch.setattr(VirtualBus, "send", note)
+    bus = CanBus("main", CanSettings(interface="virtual", channel=request.node.name))
+    bus.start()
+    until(lambda: bus.opened)
+    bus.send(0x601, b"\x01")
+    assert not bus.send_urgent(0x12345 | EXTENDED, b"\x02")
+    got = [peer.recv(WAIT_S), peer.recv(WAIT_S)]
+    assert [(one.arbitration_id, one.is_extended_id, bytes(one.data)) for one in got if one is not None] == [
+        (0x601, False, b"\x01"),
+        (0x12345, True, b"\x02"),
+    ]
+    until(lambda: (bus.sent, bus.sent_bytes) == (2, 2))
+    bus.stop()
+    assert senders == ["main out"] * 2
 
 
 def test_an_interface_that_is_not_there_is_named_and_tried_again() -> None:
