@@ -73,6 +73,7 @@ channel = "{port}"
 [joint.beyond]
 bus = "blocked"
 node_id = 9
+stop_timeout_s = 0.05
 eds = "drive.eds"
 counts_per_revolution = 4096
 gear_ratio = 100
