@@ -43,11 +43,15 @@ class Frame(NamedTuple):
         return base << 2 | self.extended << 1 | self.remote
 
 
+# Classes of error frames (Linux can/error.h), as an interface sees them.
+BUS_ERROR = 0x088  # a protocol violation (0x008), an error on the bus (0x080)
+BUS_OFF, RESTARTED = 0x040, 0x100  # of the interface's own controller
+
 _MOST_WAITING = 16_384  # frames, about two seconds at 1 Mbit/s: controllers have no room for more
 _EXTENDED_ROUTE = -1  # of every 29-bit identifier: who filters takes standard frames alone
 
 Receiver = Callable[[Frame, object], None]
-ErrorListener = Callable[[], None]
+ErrorListener = Callable[[int], None]  # the class of the error
 
 
 class Disturbance:
@@ -190,10 +194,10 @@ class CanBus:
     def _reaches(self, frame: Frame, sender: object, receiver: object) -> bool:
         return all(disturbance.arrives(frame, sender, receiver) for disturbance in self.disturbances)
 
-    def tell_error(self) -> None:
-        """There was an error frame on the wire."""
+    def tell_error(self, error_class: int = BUS_ERROR) -> None:
+        """There was an error frame on the wire, or an interface's controller has changed its state."""
         for on_error in tuple(self._error_listeners.values()):
-            on_error()
+            on_error(error_class)
 
     def _destroy(self) -> None:
         self.tell_error()

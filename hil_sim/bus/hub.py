@@ -150,8 +150,8 @@ class Hub:
                 message = message or frame_message(frame, self._epoch_s + self._bus.clock.now_s)
                 client.waiting += message
 
-    def _receive_error(self) -> None:
-        message = error_message(self._epoch_s + self._bus.clock.now_s)
+    def _receive_error(self, error_class: int) -> None:
+        message = error_message(error_class, self._epoch_s + self._bus.clock.now_s)
         for client in self._clients.values():
             if client.raw:
                 client.waiting += message

@@ -6,7 +6,6 @@ import re
 from hil_sim.bus.can_bus import Frame
 
 MAX_PENDING = 4096  # bytes of an unfinished message
-ERROR_CLASS = 0x088  # Linux can/error.h: a protocol violation (0x008) seen as an error on the bus (0x080)
 
 _MESSAGE = re.compile(rb"<([^<>]*)>")
 _EXTENDED_DIGITS = 8
@@ -18,9 +17,9 @@ def frame_message(frame: Frame, stamp_s: float) -> bytes:
     return message % (frame.cob_id, stamp_s, binascii.hexlify(frame.data).upper())
 
 
-def error_message(stamp_s: float) -> bytes:
+def error_message(error_class: int, stamp_s: float) -> bytes:
     """An error frame, as the interface saw it on the bus."""
-    return f"< error {ERROR_CLASS:03X} {stamp_s:.6f} >".encode("ascii")
+    return f"< error {error_class:03X} {stamp_s:.6f} >".encode("ascii")
 
 
 def parse_send(words: list[bytes]) -> Frame | None:

@@ -3,7 +3,6 @@
 import can
 
 from hil_sim.bus.can_bus import CanBus, Frame
-from hil_sim.bus.socketcand import ERROR_CLASS
 from hil_sim.clock import MILLISECOND_NS
 
 _POLL_NS = MILLISECOND_NS  # a virtual channel cannot be waited for together with anything else
@@ -41,10 +40,10 @@ class VirtualBridge:
             )
         )
 
-    def _receive_error(self) -> None:
+    def _receive_error(self, error_class: int) -> None:
         self._outside.send(
             can.Message(
-                arbitration_id=ERROR_CLASS,
+                arbitration_id=error_class,
                 data=bytes(8),
                 is_error_frame=True,
                 timestamp=self._bus.clock.now_s,

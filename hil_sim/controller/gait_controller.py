@@ -65,6 +65,7 @@ class GaitController(Node):
             ]
             for number in range(1, len(joints) + 1)
         ]
+        self.strays = [0.0] * len(joints)  # rad, by which a fault makes each set-point wrong
         self._holder = 0
         self._since_ns = 0
         self._offsets = [0.0] * len(joints)
@@ -223,8 +224,10 @@ class GaitController(Node):
         self._taken_over_s = min(self._taken_over_s + dt, _TAKE_OVER_S)
         self.generator.step(dt, Activity(self.dictionary[objects.ACTIVITY].number()), self._shape())
         left = 1.0 - smooth(self._taken_over_s / _TAKE_OVER_S)
-        for number, (angle, offset) in enumerate(zip(self._angles(), self._offsets, strict=True), 1):
-            self._set(number, ENABLE_OPERATION, round((angle + left * offset) * self._counts_per_radian))
+        parts = zip(self._angles(), self._offsets, self.strays, strict=True)
+        for number, (angle, offset, stray) in enumerate(parts, 1):
+            target = round((angle + left * offset + stray) * self._counts_per_radian)
+            self._set(number, ENABLE_OPERATION, target)
 
     def _command_where_they_are(self) -> None:
         """A drive that moves when nobody leads it is slowed down; only ENABLING brings one up."""

@@ -35,6 +35,7 @@ _HOMED = 1 << 15  # the manufacturer's
 
 # Bits of 60FDh.
 _LOW_SWITCH, _HIGH_SWITCH = 1 << 0, 1 << 1
+_TORQUE_OFF = 1 << 16  # the manufacturer's
 
 _NO_MODE_CHANGE = 0  # of 6060h
 _FIRST_MODE = ModeNumber.CYCLIC_SYNCHRONOUS_POSITION  # where 6060h says none
@@ -45,7 +46,8 @@ class JointDrive(Node):
 
     Positions on the bus are counts at the motor; inside all is rad, s and N·m at the joint.
     What may be disturbed from outside, at any time: `fault(code)`, `encoder`, `joint` (its `slip`,
-    `friction_factor` and `load`), `temperature_c` (°C, of the motor) and `supply_v` (V, of the DC link).
+    `friction_factor`, `creep` and `load`), `temperature_c` (°C, of the motor), `supply_v` (V, of the DC
+    link), `inputs` (bits of 60FDh that are set from outside) and `power.take_torque` (STO).
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class JointDrive(Node):
         self.joint = joint
         self.objects = Objects(self.dictionary)
         self.supply_v = supervision.NOMINAL_SUPPLY_V
+        self.inputs = 0
         self._bind_commands()
         self._parameters = Parameters(self.objects)
         self.servo = Servo(joint, self._parameters)
@@ -131,12 +134,14 @@ class JointDrive(Node):
         return round(1000.0 * torque / self._parameters.now.rated_torque)
 
     def _digital_inputs(self) -> int:
-        return _LOW_SWITCH * self.joint.at_low_switch | _HIGH_SWITCH * self.joint.at_high_switch
+        switches = _LOW_SWITCH * self.joint.at_low_switch | _HIGH_SWITCH * self.joint.at_high_switch
+        return switches | _TORQUE_OFF * self.power.torque_off | self.inputs
 
     def statusword(self) -> int:
         servo, state = self.servo, self.power.state
         word: int = state.value | _REMOTE
-        word |= _VOLTAGE_ENABLED * (self.supply_v >= supervision.LOWEST_SUPPLY_V)
+        supplied = self.supply_v >= supervision.LOWEST_SUPPLY_V and not self.power.torque_off
+        word |= _VOLTAGE_ENABLED * supplied
         word |= _WARNING * supervision.warning(servo, self.supply_v) | _LIMIT_ACTIVE * servo.limited
         word |= _CURRENT_REDUCED * servo.thermal.reduced | _HOMED * servo.homed
         if state is PowerState.OPERATION_ENABLED:

@@ -25,7 +25,8 @@ class JointConstants:
 class Joint:
     """The true joint: position (rad), velocity (rad/s), and the wearer's load (N·m, against the motor).
 
-    `friction_factor` multiplies every friction, as worn or dry bearings do; it may be set at any time.
+    `friction_factor` multiplies every friction, as worn or dry bearings do; `creep` is how fast (rad/s) the
+    joint gives way without power. Both may be set at any time.
     `rotor_inertia` (kg·m², through the gear) is the motor's own.
     """
 
@@ -36,6 +37,7 @@ class Joint:
         self.load = 0.0
         self.rotor_inertia = 0.0
         self.friction_factor = 1.0
+        self.creep = 0.0
         self.slipped = 0.0
 
     @property
@@ -82,6 +84,7 @@ class Joint:
 
     def coast(self) -> None:
         """Move on by `STEP_S` without power: what stands still is held by the gear."""
+        self.position += self.creep * STEP_S
         holding = self.constants.holding_friction * self.friction_factor
         if self.velocity or abs(self.load) > holding:
             self.step(0.0)

@@ -6,7 +6,7 @@ from hil_sim.drive import objects as od
 from hil_sim.drive import options
 from hil_sim.drive.objects import Objects
 from hil_sim.drive.options import Ramp
-from hil_sim.drive.power_state import ENERGISED, Command, PowerState, after
+from hil_sim.drive.power_state import ENABLING, ENERGISED, Command, PowerState, after
 from hil_sim.drive.servo import Servo
 from hil_sim.drive.supervision import CURRENT_GONE
 
@@ -29,6 +29,7 @@ class Power:
     ) -> None:
         self.state = PowerState.NOT_READY_TO_SWITCH_ON
         self.error_code = 0
+        self.torque_off = False  # STO (IEC 61800-5-2): hardware keeps the motor without power
         self._servo = servo
         self._objects = objects
         self._changed = changed
@@ -61,8 +62,16 @@ class Power:
         self.error_code = code
         self.do(Command.FAULT_DETECTED)
 
+    def take_torque(self, *, off: bool) -> None:
+        """Hardware takes the motor's power, whatever it is doing, or allows it again."""
+        self.torque_off = off
+        if off:
+            self.do(Command.STANDSTILL if self.faulty else Command.DISABLE_VOLTAGE)
+
     def do(self, command: Command) -> None:
         """Carry out what the table allows, now or once the motor stands."""
+        if self.torque_off and command in ENABLING:
+            return
         if command is Command.ENABLE_OPERATION and self.follows:
             return  # as a master says again and again
         if command is Command.FAULT_RESET and not self._can_recover():

@@ -33,6 +33,8 @@ class Command(StrEnum):
     STANDSTILL = "standstill reached"
 
 
+ENABLING = (Command.SHUTDOWN, Command.SWITCH_ON, Command.ENABLE_OPERATION)
+
 _FAULT_RESET_BIT = 0x80
 
 # Mask and value of the controlword's bits 7, 3, 2, 1, 0 (table 4); the first row that fits counts.

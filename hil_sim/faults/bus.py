@@ -4,10 +4,11 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hil_sim.bus.can_bus import Disturbance, Frame
+from hil_sim.bus.can_bus import BUS_OFF, RESTARTED, Disturbance, Frame
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS
 from hil_sim.faults.fault import Fault, Form, Number, Site, Target
 from hil_sim.faults.frames import disturbed_by, disturbing
+from hil_sim.node import cob_id, sync
 from hil_sim.node.node import Node
 
 _LOAD_TICK_NS = MILLISECOND_NS
@@ -40,6 +41,26 @@ class _Cut(Disturbance):
 
     def arrives(self, _frame: Frame, sender: object, receiver: object, /) -> bool:
         return isinstance(sender, Node) and isinstance(receiver, Node)
+
+
+class _NoSync(Disturbance):
+    """Its producer's SYNC never leaves, or only some of it."""
+
+    def __init__(self, site: Site) -> None:
+        self._sync = site.robot.controller.dictionary.number(sync.COB_ID) & cob_id.IDENTIFIER
+        self._share = site.number("percent") / 100.0
+        self._random = site.random
+
+    def leaves(self, frame: Frame, _sender: object, /) -> bool:
+        return frame.cob_id != self._sync or self._random.random() >= self._share
+
+
+@contextmanager
+def _gateway_bus_off(site: Site) -> Iterator[None]:
+    with disturbing(site, _Cut(site)):
+        site.robot.bus.tell_error(BUS_OFF)
+        yield
+    site.robot.bus.tell_error(RESTARTED)
 
 
 class _Load(Disturbance):
@@ -106,5 +127,16 @@ FAULTS = {
         Target.BUS,
         disturbed_by(_Cut),
         "The gateway's cable is out: no frame comes, none is answered, and the robot walks on.",
+    ),
+    "gateway_bus_off": Fault(
+        Target.BUS,
+        _gateway_bus_off,
+        "The gateway's own CAN controller is bus off: it says so (error class 40h), and no frame passes it.",
+    ),
+    "sync_lost": Fault(
+        Target.BUS,
+        disturbed_by(_NoSync),
+        "No SYNC, so no synchronous PDO; heartbeats and SDO answers come, set-points take no effect.",
+        {"percent": Number(100.0, 1.0, 100.0, "%", "share of the SYNCs that are not sent")},
     ),
 }

@@ -6,9 +6,11 @@ from contextlib import contextmanager
 
 from hil_sim.clock import MILLISECOND_NS
 from hil_sim.drive.supervision import OVERCURRENT
-from hil_sim.faults.fault import Fault, Number, Site, Target
+from hil_sim.exoskeleton import JOINTS
+from hil_sim.faults.fault import Fault, Form, Number, Site, Target
 
 _HEATING_TICK_NS = 100 * MILLISECOND_NS
+_STRAYING_TICK_NS = 10 * MILLISECOND_NS
 
 
 @contextmanager
@@ -66,6 +68,49 @@ def _friction(site: Site) -> Iterator[None]:
     joint.friction_factor /= factor
 
 
+@contextmanager
+def _sto(site: Site) -> Iterator[None]:
+    site.drive.power.take_torque(off=True)
+    yield
+    site.drive.power.take_torque(off=False)
+
+
+@contextmanager
+def _limit_switch(site: Site) -> Iterator[None]:
+    bit = 1 << site.whole("bit")
+    site.drive.inputs |= bit
+    yield
+    site.drive.inputs &= ~bit
+
+
+@contextmanager
+def _drift(site: Site) -> Iterator[None]:
+    site.drive.joint.creep = math.radians(site.number("deg_per_s"))
+    yield
+    site.drive.joint.creep = 0.0
+
+
+@contextmanager
+def _runaway(site: Site) -> Iterator[None]:
+    """The set-points go away, and come back as fast when it is over."""
+    strays, number, clock = site.robot.controller.strays, list(JOINTS).index(site.device), site.robot.clock
+    step = math.radians(site.number("deg_per_s")) * _STRAYING_TICK_NS / 1e9
+
+    def go() -> None:
+        strays[number] += step
+
+    def come_back() -> None:
+        left = strays[number] - step
+        strays[number] = left if left * step > 0.0 else 0.0
+        if not strays[number]:
+            coming_back.cancel()
+
+    going = clock.every(_STRAYING_TICK_NS, go)
+    yield
+    going.cancel()
+    coming_back = clock.every(_STRAYING_TICK_NS, come_back)
+
+
 _DEGREES = Number(5.0, -60.0, 60.0, "°", "how far, seen at the joint")
 
 FAULTS = {
@@ -113,5 +158,28 @@ FAULTS = {
         _friction,
         "The joint is all but jammed: 60F4h and torque grow, then bit 13, after 6066h EMCY 8611h and fault.",
         {"factor": Number(60.0, 1.0, 1000.0, "", "how many times its friction")},
+    ),
+    "sto": Fault(
+        Target.DRIVE,
+        _sto,
+        "Hardware takes the motor's power: switch on disabled, 60FDh bit 16; nothing enables it meanwhile.",
+    ),
+    "limit_switch": Fault(
+        Target.DRIVE,
+        _limit_switch,
+        "A bit of 60FDh is set, wherever the joint is; the drive itself does nothing about it.",
+        {"bit": Number(1, 0, 31, "", "0 and 1 the limit switches, 2 home, 3 interlock", Form.WHOLE)},
+    ),
+    "drift": Fault(
+        Target.DRIVE,
+        _drift,
+        "6064h creeps while the motor has no power, as under a load that the gear does not hold.",
+        {"deg_per_s": Number(2.0, -60.0, 60.0, "°/s", "how fast")},
+    ),
+    "runaway": Fault(
+        Target.DRIVE,
+        _runaway,
+        "The controller's set-points for the joint go away and on; the drive follows up to its own limits.",
+        {"deg_per_s": Number(200.0, -300.0, 300.0, "°/s", "how fast")},
     ),
 }

@@ -31,6 +31,7 @@ class Target(Enum):
     INSOLE = FEET
     IMU = (TRUNK,)
     FEET = ("insoles",)  # both at once
+    WEARER = ("wearer",)
     BUS = ("bus",)
     HOST = ("host",)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from hil_sim.faults import bus, drives, host, nodes, sdo, sensors
+from hil_sim.faults import bus, drives, host, nodes, sdo, sensors, wearer
 from hil_sim.faults.fault import Fault
 
 FAULTS: Mapping[str, Fault] = {
@@ -11,5 +11,6 @@ FAULTS: Mapping[str, Fault] = {
     **bus.FAULTS,
     **drives.FAULTS,
     **sensors.FAULTS,
+    **wearer.FAULTS,
     **host.FAULTS,
 }

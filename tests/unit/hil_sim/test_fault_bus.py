@@ -108,3 +108,26 @@ def test_bus_cut_hears_nothing_and_reaches_nobody_while_the_robot_walks_on(outsi
     assert outside.messages[-1].timestamp < outside.now_s - 0.35
     messages = outside.run(0.5)
     assert {word & 0x6F for word in (int.from_bytes(d[:2], "little") for d in of(messages, 0x182))} == {0x27}
+
+
+def test_gateway_bus_off_is_told_and_then_nothing_passes_until_it_is_over(shared: Outside) -> None:
+    shared.faults.begin("gateway_bus_off", for_s=0.3)
+    told, *frames = shared.run(0.25)
+    assert (told.is_error_frame, told.arbitration_id) == (True, 0x040)  # Linux can/error.h: CAN_ERR_BUSOFF
+    assert frames == []
+    messages = shared.run(0.5)
+    assert (messages[0].is_error_frame, messages[0].arbitration_id) == (True, 0x100)  # CAN_ERR_RESTARTED
+    assert count(messages, 0x080) > 40
+
+
+def test_sync_lost_takes_the_synchronous_pdos_with_it_and_leaves_the_rest(shared: Outside) -> None:
+    shared.faults.begin("sync_lost")
+    shared.run(0.05)
+    messages = shared.run(1.0)
+    assert [count(messages, one) for one in (0x080, 0x180 + KNEE, 0x700 + KNEE)] == [0, 0, 10]
+    assert shared.read(KNEE, 0x6041)
+
+
+def test_sync_lost_in_part_is_the_share_that_is_said(shared: Outside) -> None:
+    shared.faults.begin("sync_lost", params={"percent": 50})
+    assert count(shared.run(2.0), 0x080) == pytest.approx(SYNCS_PER_S, abs=28)  # four standard deviations

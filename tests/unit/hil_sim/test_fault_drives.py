@@ -108,3 +108,66 @@ def test_following_error_sets_bit_13_before_the_emcy(outside: Outside) -> None:
     assert any(word & FOLLOWING_ERROR_BIT and word & STATE_MASK == ENABLED for word in words)
     assert states(words)[-1] == IN_FAULT
     assert [data[:2].hex() for data in of(messages, EMCY)] == ["1186"]
+
+
+DISABLED, TORQUE_OFF = 0x40, 1 << 16
+
+
+def inputs(outside: Outside) -> int:
+    return outside.read(KNEE, 0x60FD)
+
+
+def test_sto_takes_the_power_and_nothing_enables_the_drive_meanwhile(outside: Outside) -> None:
+    assert inputs(outside) == 0
+    outside.faults.begin("sto", "left_knee")
+    messages = outside.run(0.3)
+    assert of(messages, EMCY) == []
+    assert states(statuswords(messages, KNEE))[-1] == DISABLED
+    assert inputs(outside) == TORQUE_OFF
+    for controlword in (0x06, 0x07, 0x0F):
+        outside.write(KNEE, 0x6040, controlword, 2)
+    assert outside.read(KNEE, 0x6041) & (STATE_MASK | 1 << 4) == DISABLED  # bit 4: no voltage at the motor
+    outside.faults.clear("sto")
+    assert inputs(outside) == 0
+    assert outside.read(KNEE, 0x6041) & STATE_MASK == DISABLED, "it does not enable itself"
+
+
+def test_sto_of_a_drive_in_fault_leaves_it_there(outside: Outside) -> None:
+    outside.faults.begin("overcurrent", "left_knee")
+    outside.run(0.3)
+    outside.faults.begin("sto", "left_knee")
+    assert outside.read(KNEE, 0x6041) & STATE_MASK == IN_FAULT
+
+
+def test_limit_switch_is_its_bit_and_nothing_else(outside: Outside) -> None:
+    outside.faults.begin("limit_switch", "left_knee")
+    assert inputs(outside) == 0b10
+    assert statuswords(outside.run(0.2), KNEE)[-1] & STATE_MASK == ENABLED
+    outside.faults.clear()
+    assert inputs(outside) == 0
+
+
+def test_limit_switch_comes_at_once_by_the_pdo_that_carries_it(outside: Outside) -> None:
+    assert outside.write(KNEE, 0x1803, 0x4000_0480 + KNEE, 4, subindex=1)[0] == 0x60
+    outside.run(0.1)
+    outside.faults.begin("limit_switch", "left_knee", params={"bit": 3})
+    assert of(outside.run(0.05), 0x480 + KNEE)[0][4:] == (1 << 3).to_bytes(4, "little")
+
+
+def test_drift_moves_a_joint_that_has_no_power_and_only_then(standing: Outside) -> None:
+    standing.faults.begin("drift", "left_knee", params={"deg_per_s": 10})
+    before = positions(standing.run(0.5), KNEE)[-1]
+    assert positions(standing.run(0.5), KNEE)[-1] == pytest.approx(before, abs=0.01 * COUNTS)
+    standing.faults.begin("sto", "left_knee")
+    before = positions(standing.run(0.5), KNEE)[-1]
+    moved = positions(standing.run(1.0), KNEE)[-1] - before
+    assert moved == pytest.approx(math.radians(10) * COUNTS, rel=0.05)
+
+
+def test_runaway_moves_the_joint_as_fast_as_it_says_and_back_when_it_is_over(standing: Outside) -> None:
+    where = positions(standing.run(0.5), KNEE)[-1]
+    standing.faults.begin("runaway", "left_knee", params={"deg_per_s": 60}, for_s=0.5)
+    standing.run(0.1)
+    at = positions(standing.run(0.3), KNEE)
+    assert (at[-1] - at[0]) / 0.29 == pytest.approx(math.radians(60) * COUNTS, rel=0.1)
+    assert positions(standing.run(1.5), KNEE)[-1] == pytest.approx(where, abs=0.01 * COUNTS)
