@@ -11,7 +11,12 @@ from hil_sim.faults.fault import Fault, Number, Site, Target
 def _gait_asymmetry(site: Site) -> Iterator[None]:
     generator = site.robot.controller.generator
     before = generator.wearer
-    generator.wearer = replace(before, asymmetry=before.asymmetry + site.number("percent") / 100.0)
+    left, right = before.impairment
+    generator.wearer = replace(
+        before,
+        asymmetry=before.asymmetry + site.number("percent") / 100.0,
+        impairment=(max(left, site.number("impaired")), right),
+    )
     yield
     generator.wearer = before
 
@@ -21,6 +26,9 @@ FAULTS = {
         Target.WEARER,
         _gait_asymmetry,
         "The left step is longer than the right one: the ranges of the hips differ, stride by stride.",
-        {"percent": Number(40.0, -80.0, 80.0, "%", "by how much the left step is longer than the right")},
+        {
+            "percent": Number(40.0, -80.0, 80.0, "%", "by how much the left step is longer than the right"),
+            "impaired": Number(0.0, 0.0, 1.0, "", "how much the left leg stiffens, and bears less"),
+        },
     ),
 }

@@ -18,7 +18,7 @@ _WALK_RAMP_S = 1.5
 _SIT_RAMP_S = 2.5
 _CHANGE_S = 1.2  # from one gait to another
 _TURN_SWING = 0.4  # how much quicker one turns when both feet change
-_LAG_S = 0.2  # a changed parameter is taken over in about three of these
+_LAG_S = 0.2  # a changed parameter, or wearer, is taken over in about three of these
 
 _FALLEN = {FallState.FALLING: Label.FALL, FallState.LYING: Label.LYING, FallState.RISING: Label.GET_UP}
 
@@ -68,8 +68,9 @@ class Generator:
 
     def _show(self) -> None:
         """What follows from the present state and is asked for again and again."""
-        left, right, cycle_time, toe_height, trunk_angle = self._lag.values
+        left, right, cycle_time, toe_height, trunk_angle, self.asymmetry, *impairment = self._lag.values
         self.shape = Shape((left + right) / 2.0, cycle_time, toe_height, trunk_angle)
+        self.impairment = tuple(impairment)  # of left and right leg
         self.walking = self._walk.smooth  # 0 standing … 1 moving in a gait
         self.sitting = posture.bent(self._sit.share)  # 0 upright … 1 legs bent as one sits
         share = self._change.smooth
@@ -126,6 +127,8 @@ class Generator:
             wanted.cycle_time * deviations.cycle,
             wanted.toe_height * deviations.toe,
             wanted.trunk_angle,
+            self.wearer.asymmetry,
+            *self.wearer.impairment,
         )
 
     # -- what is being done ------------------------------------------------------------------------------
@@ -176,7 +179,7 @@ class Generator:
 
     def stance_share(self, side: int) -> float:
         """Of one leg's stride; an impaired leg hands some of it to the other."""
-        impaired = self.wearer.impairment
+        impaired = self.impairment
         return stance_share(self.shape.speed) + 0.03 * (impaired[1 - side] - impaired[side])
 
     @property
@@ -224,8 +227,8 @@ class Generator:
     def _stepping(self, side: int) -> Leg:
         """One leg in the present gait, with the wearer's habits and impairment."""
         wearer, phase = self.wearer, self.leg_phase(side)
-        impaired = wearer.impairment[side]
-        asymmetry = 1.0 + (0.5 - side) * wearer.asymmetry
+        impaired = self.impairment[side]
+        asymmetry = 1.0 + (0.5 - side) * self.asymmetry
         step = self._lag.values[side] * asymmetry * (1.0 - 0.2 * impaired)
         parts = [
             (gait.leg(phase, step * gait.steps[side], wearer.leg_length), share) for gait, share in self.gaits

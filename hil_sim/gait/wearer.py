@@ -127,7 +127,7 @@ class Wearer:
         generator = self._generator
         speed, share = generator.shape.speed, generator.stance_share(side)
         stance = min(generator.leg_phase(side) / share, 1.0)
-        impaired = generator.wearer.impairment
+        impaired = generator.impairment
         takes = 1.0 + _IMPAIRED_LOAD * (impaired[1 - side] - impaired[side])
         load = place = 0.0
         for gait, part in generator.gaits:
