@@ -3,17 +3,22 @@
 import fnmatch
 import math
 from collections.abc import Iterator
+from functools import singledispatch
 from typing import TYPE_CHECKING
 
-from gateway.guard.settings import (
-    WATCHES,
+from drivers.bus.settings import Role
+from gateway.guard.rules import (
+    SIDED,
     EmcyRule,
-    GuardSettings,
-    HeatRule,
-    LevelRule,
+    InputRule,
     RangeRule,
     Rule,
+    SymmetryRule,
+    SyncRule,
+    bit_words,
+    mask,
 )
+from gateway.guard.settings import TABLES, WATCHES, GuardSettings
 
 if TYPE_CHECKING:
     from gateway.config import RobotConfig
@@ -32,6 +37,7 @@ def complaints(config: "RobotConfig", guard: GuardSettings) -> Iterator[str]:
         if name == ALARMS:
             yield f"{where}: the name {name!r} is taken by the guard itself; choose another"
         yield from _about_numbers(where, rule)
+        yield from _about(rule, where, config)
         yield from _about_components(config, where, rule)
 
 
@@ -53,21 +59,23 @@ def _about_heartbeat(config: "RobotConfig") -> Iterator[str]:
 
 
 def _about_numbers(where: str, rule: Rule) -> Iterator[str]:
-    for key in rule.__struct_fields__:
-        number = getattr(rule, key)
+    numbers = {key: getattr(rule, key) for key in rule.__struct_fields__}
+    for key, number in numbers.items():
         if isinstance(number, float) and not math.isfinite(number):
             yield f"{where} {key}: {number} is no finite number"
-    if isinstance(rule, LevelRule | HeatRule) and rule.hysteresis >= rule.above:
-        yield f"{where} hysteresis: {rule.hysteresis:g} is not below above: it would never be over"
-    if isinstance(rule, RangeRule):
-        yield from _about_range(where, rule)
-    if isinstance(rule, EmcyRule):
-        for code in rule.codes or ():
-            if code.startswith("0x0"):
-                yield f"{where} codes: {code} says that an error is over; name errors, 0x1 to 0xFFFF"
+    hysteresis, above = (numbers.get(key) for key in ("hysteresis", "above"))
+    if hysteresis is not None and above is not None and hysteresis >= above:
+        yield f"{where} hysteresis: {hysteresis:g} is not below above: it would never be over"
 
 
-def _about_range(where: str, rule: RangeRule) -> Iterator[str]:
+@singledispatch
+def _about(_rule: Rule, _where: str, _config: "RobotConfig") -> Iterator[str]:
+    """What is wrong with the keys of this kind of rule."""
+    yield from ()
+
+
+@_about.register(RangeRule)
+def _range(rule: RangeRule, where: str, _config: "RobotConfig") -> Iterator[str]:
     if rule.min is None and rule.max is None:
         yield f"{where} lacks min, max or both: it could never trip"
     elif rule.min is not None and rule.max is not None and rule.max - rule.min <= 2 * rule.hysteresis:
@@ -77,9 +85,47 @@ def _about_range(where: str, rule: RangeRule) -> Iterator[str]:
         )
 
 
+@_about.register(EmcyRule)
+def _emcy(rule: EmcyRule, where: str, _config: "RobotConfig") -> Iterator[str]:
+    for code in rule.codes or ():
+        if code.startswith("0x0"):
+            yield f"{where} codes: {code} says that an error is over; name errors, 0x1 to 0xFFFF"
+
+
+@_about.register(InputRule)
+def _input(rule: InputRule, where: str, _config: "RobotConfig") -> Iterator[str]:
+    if not mask(rule.must_be_set) | mask(rule.must_be_clear):
+        yield f"{where} lacks must_be_set, must_be_clear or both, with a bit: it could never trip"
+    both = mask(rule.must_be_set) & mask(rule.must_be_clear)
+    if both:
+        yield f"{where} must_be_clear: {bit_words(both)} must be set too: it would never be over"
+
+
+@_about.register(SyncRule)
+def _sync(rule: SyncRule, where: str, config: "RobotConfig") -> Iterator[str]:
+    ours = config.gateway.role is Role.MASTER
+    for name, bus in config.can.items():
+        if ours and bus.sync_period_s and any(fnmatch.fnmatchcase(name, glob) for glob in rule.on or "*"):
+            yield f"{where} on: the SYNC of [can.{name}] is ours (sync_period_s), and not heard; leave it out"
+
+
+@_about.register(SymmetryRule)
+def _symmetry(rule: SymmetryRule, where: str, config: "RobotConfig") -> Iterator[str]:
+    if rule.on is not None:
+        yield f"{where} on: {rule.watch} watches its left and right; remove on"
+    if rule.left == rule.right:
+        yield f"{where} right: {rule.right!r} is its left too; name the other side"
+    kind, _unit = SIDED[rule.quantity]
+    known = getattr(config, TABLES[kind])
+    for key, name in (("left", rule.left), ("right", rule.right)):
+        if name not in known:
+            here = ", ".join(known) or "none"
+            yield f"{where} {key}: {name!r} is no {kind}, which has a {rule.quantity}; here are {here}"
+
+
 def _about_components(config: "RobotConfig", where: str, rule: Rule) -> Iterator[str]:
     kinds = WATCHES[rule.watch].kinds
-    known = [name for kind in kinds for name in getattr(config, kind.value)]
+    known = [name for kind in kinds for name in getattr(config, TABLES[kind])]
     what = " or ".join(kinds)
     if not known:
         yield f"{where} watch: {rule.watch} watches each {what}, and this robot has none"

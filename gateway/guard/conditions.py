@@ -1,6 +1,7 @@
-"""When a number is where it must not be: a band with hysteresis, and I²t as a leaky integrator."""
+"""What a rule compares: bands with hysteresis, and what is made of values: I²t, where they end, drift."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -41,3 +42,54 @@ class Heat:
         self._load = (value / self._rated) ** 2
         self._stamp_ns = stamp_ns
         return self.heat
+
+
+class StoppingPoint:
+    """Where a joint comes to rest (rad): it goes on for `reaction_s`, then brakes by `deceleration` (rad/s²).
+
+    Its parts are its position (0) and its velocity (1).
+    """
+
+    def __init__(self, deceleration: float, reaction_s: float) -> None:
+        self._deceleration = deceleration
+        self._reaction_s = reaction_s
+        self._known: list[float | None] = [None, None]
+
+    def after(self, part: int, _stamp_ns: int, value: float) -> float | None:
+        """With what is known now; `None` where that is not enough."""
+        self._known[part] = value
+        position, velocity = self._known
+        if position is None or velocity is None:
+            return None
+        braking = velocity * abs(velocity) / (2.0 * self._deceleration)
+        return position + velocity * self._reaction_s + braking
+
+
+class Drift:
+    """How far something has moved since `settle_s` after a stop that is held; 0 while none is.
+
+    What has moved by more than `most` counts anew from there: its reason is over when it rests again.
+    """
+
+    def __init__(self, held: Callable[[], bool], settle_s: float, most: float) -> None:
+        self._held = held
+        self._settle_ns = round(settle_s * 1e9)
+        self._most = most
+        self._since_ns: int | None = None
+        self._reference: float | None = None
+
+    def after(self, stamp_ns: int, value: float) -> float:
+        """At `stamp_ns` it is at `value`."""
+        if not self._held():
+            self._since_ns = self._reference = None
+            return 0.0
+        if self._since_ns is None:
+            self._since_ns = stamp_ns
+        if stamp_ns - self._since_ns < self._settle_ns:
+            return 0.0
+        if self._reference is None:
+            self._reference = value
+        moved = value - self._reference
+        if abs(moved) > self._most:
+            self._reference = value
+        return moved

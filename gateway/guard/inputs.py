@@ -1,13 +1,14 @@
 """What a rule can look at: a channel, a component's signs of life, its emergency messages, or nothing."""
 
 import math
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.bus.emcy import Emcy
-from gateway.guard.conditions import Band
-from gateway.guard.settings import EmcyRule, Rule
+from gateway.guard.judging import Joined, Judging
+from gateway.guard.rules import EmcyRule, Rule
 from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
 
 Changed = Callable[[Watcher, Change], None]
@@ -23,51 +24,75 @@ class Pulse:
 
 
 class LevelWatcher(Watcher):
-    """One channel; `measure` makes of its value what is compared with the band."""
+    """One channel; `judging` says what is made of its value, and where that may lie."""
 
     def __init__(
         self,
         rule: Rule,
-        channel: str,
-        unit: str,
+        component: str,
+        what: str,
         now_ns: int,
         changed: Changed,
         *,
-        band: Band,
+        judging: Judging,
         stale_ns: int,
-        for_s: float = 0.0,
-        measure: Callable[[int, float], float] = lambda _stamp_ns, value: value,
+        coming_ns: int = 0,
     ) -> None:
-        super().__init__(rule, channel.partition(".")[0], channel, now_ns, changed)
-        self._band = band
-        self._unit = unit
-        self._for_ns = round(for_s * 1e9)
+        """The first number may take `coming_ns` longer than devices take to come up."""
+        super().__init__(rule, component, what, now_ns, changed)
+        self._says = judging.says
+        self._band = judging.band
+        self._measure = judging.measure
+        self._for_ns = round(judging.for_s * 1e9)
         self._stale_ns = stale_ns
-        self._measure = measure
         self._seen_ns: int | None = None
-        self._began_ns = now_ns
+        self._first_ns = now_ns + GRACE_NS + coming_ns
 
     def see(self, stamp_ns: int, value: float | None) -> None:
         """The channel's value; what is no number is not seen."""
-        if value is None or not math.isfinite(value):
-            return
+        if value is not None and math.isfinite(value):
+            self.weigh(stamp_ns, self._measure(stamp_ns, value))
+
+    def weigh(self, stamp_ns: int, number: float) -> None:
+        """What was made of it; infinite is beyond every limit."""
         self._seen_ns = stamp_ns
-        number = self._measure(stamp_ns, value)
         over = self._band.left(number, tripped=self.state is State.TRIPPED)
         if not over and (self.is_settled or self._is_late(stamp_ns)):
             return  # nothing changes; what is not live ends nothing
-        self.judge(stamp_ns, over, lambda: f"{number:.4g}{self._unit}, {self.rule.words}", self._for_ns)
+        self.judge(stamp_ns, over, lambda: self._says(number), self._for_ns)
 
     def _is_late(self, stamp_ns: int) -> bool:
         return time.monotonic_ns() - stamp_ns > self._stale_ns
 
     def look(self, now_ns: int) -> int:
         seen_ns = self._seen_ns
-        due_ns = self._began_ns + GRACE_NS if seen_ns is None else seen_ns + self._stale_ns
+        due_ns = self._first_ns if seen_ns is None else seen_ns + self._stale_ns
         if now_ns <= due_ns:
             return due_ns + 1
         self.unseen(now_ns, lambda: _no_value(seen_ns, now_ns))
         return now_ns + AGAIN_NS
+
+
+class Joining:
+    """Several channels make the one number of a watcher, which is as old as the oldest of them."""
+
+    def __init__(self, watcher: LevelWatcher, joined: Joined, parts: int, stale_ns: int) -> None:
+        self._watcher = watcher
+        self._joined = joined
+        self._stamps: list[int | None] = [None] * parts
+        self._stale_ns = stale_ns
+        self._lock = threading.Lock()  # parts may come in several threads
+
+    def see(self, part: int, stamp_ns: int, value: float | None) -> None:
+        """The value of one of them; what is no number is not seen."""
+        if value is None or not math.isfinite(value):
+            return
+        with self._lock:
+            self._stamps[part] = stamp_ns
+            number = self._joined(part, stamp_ns, value)
+            known = [one for one in self._stamps if one is not None]
+        if number is not None and stamp_ns - min(known) <= self._stale_ns:
+            self._watcher.weigh(min(known), number)
 
 
 class SilenceWatcher(Watcher):

@@ -12,7 +12,8 @@ from drivers.bus.arming import Arming
 from gateway import messages
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
-from gateway.guard.settings import Action, GuardSettings
+from gateway.guard.rules import Action
+from gateway.guard.settings import GuardSettings, limit
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
 
@@ -48,14 +49,21 @@ class GuardModule:
         self._armings = Armings(drives, self._settings.heartbeat_ms, self._arming_changed)
         now_ns = time.monotonic_ns()
         self._wirings = {
-            name: Wiring(rule, self._component.robot, now_ns, partial(self._changed, name))
+            name: Wiring(
+                rule,
+                self._component.robot,
+                now_ns,
+                partial(self._changed, name),
+                held=lambda: self._control.authority.held,
+            )
             for name, rule in self._settings.rule.items()
         }
         for wiring in self._wirings.values():
             wiring.open()
         self._armings.start()
         self._component.sources.append(self._source)
-        self._control.authority.standing = self._standing
+        self._control.authority.standing = lambda: self.standing
+        self._control.authority.frozen = lambda: self.frozen
         self._control.armed = lambda name: name in self._armings.armed
         self._loop.post(self._look)
 
@@ -84,6 +92,28 @@ class GuardModule:
             arming=self._armings.texts,
             alarms=self._count,
         )
+
+    # For any thread.
+
+    @property
+    def standing(self) -> dict[str, str]:
+        """The rules that stop the robot and are tripped at this moment, and why."""
+        return self._tripped(Action.QUICK_STOP)
+
+    @property
+    def frozen(self) -> str | None:
+        """Why no parameter may be changed at this moment, in words; taking back goes on."""
+        found = [f"{name} ({why})" for name, why in self._tripped(Action.HOLD_PARAMETERS).items()]
+        return f"the guard's rule holds the parameters: {', '.join(found)}" if found else None
+
+    def _tripped(self, action: Action) -> dict[str, str]:
+        """The rules with this action that are tripped, and why."""
+        worst = {
+            name: _worst(wiring).last
+            for name, wiring in self._wirings.items()
+            if action in wiring.rule.actions
+        }
+        return {name: last.reason for name, last in worst.items() if last.state is State.TRIPPED}
 
     # In the thread that saw it.
 
@@ -120,14 +150,6 @@ class GuardModule:
             self._count += what == ALARM
             self._alarms.tell(about, what, reason)
 
-    def _standing(self) -> dict[str, str]:
-        """The rules that stop and are tripped now, and why: no stop is reset as long as there is one."""
-        return {
-            name: worst.last.reason
-            for name, wiring in self._wirings.items()
-            if Action.QUICK_STOP in wiring.rule.actions and (worst := _worst(wiring)).state is State.TRIPPED
-        }
-
     def _look(self) -> None:
         """See what has not come; as long as this turns, the gateway counts as alive."""
         if self._ended:
@@ -162,7 +184,7 @@ def _info(name: str, wiring: Wiring) -> messages.GuardRuleInfo:
     return messages.GuardRuleInfo(
         name=name,
         watch=rule.watch,
-        limit=rule.words,
+        limit=limit(rule),
         on=list(dict.fromkeys(watcher.component for watcher in wiring.watchers)),
         actions=[action.value for action in rule.actions],
         blind=rule.blind.value,

@@ -1,119 +1,126 @@
-"""What an integrator says about the guard: `[guard]` and its rules, `[guard.rule.NAME]`.
+"""`[guard]` of the robot's file, and what a guard can watch: one row a rule.
 
-Each rule names what it watches; `WATCHES` says which keys, components and channels belong to that.
+Whatever depends on a rule is taken from its row: the kind of rule says its keys and how it is judged.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta, Struct
 
 from drivers.component import Kind
+from gateway.guard.rules import (
+    BusRule,
+    DriftRule,
+    EmcyRule,
+    HeatRule,
+    InputRule,
+    LatencyRule,
+    LevelRule,
+    RangeRule,
+    Rule,
+    SilenceRule,
+    StoppingRule,
+    SymmetryRule,
+    SyncRule,
+)
 
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
-CodePrefix = Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{1,4}$")]
-
-
-class Action(StrEnum):
-    """What a rule that trips leads to; in this order."""
-
-    QUICK_STOP = "quick_stop"  # on every drive, held until it is reset
-    REVERT_TRIALS = "revert_trials"  # what was written on trial is taken back
-    ALARM = "alarm"  # an entry of the journal
-
-
-class Blind(StrEnum):
-    """What a rule does that cannot see what it watches."""
-
-    ALARM = "alarm"
-    ACT = "act"  # as if it had tripped
-
-
-class Rule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every rule has. `on` are globs of components; without them, all that have what is watched."""
-
-    watch: str
-    on: Annotated[tuple[str, ...], Meta(min_length=1)] | None = None
-    actions: Annotated[tuple[Action, ...], Meta(min_length=1)] = (Action.ALARM,)
-    blind: Blind = Blind.ALARM
-    clear_s: Positive = 1.0  # how long all must be well again before it is over
-
-    @property
-    def words(self) -> str:
-        """What makes it trip."""
-        return ""
+BUS = "bus"  # what a rule can watch beside components
+TABLES: Mapping[str, str] = {**{kind: kind.value for kind in Kind}, BUS: "can"}  # of the robot's file
 
 
-class LevelRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Trips where a magnitude, in either direction, is `above` this for `for_s`.
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What a rule of this name watches, and what it needs for that."""
 
-    It is over when the magnitude is `hysteresis` below that.
-    """
-
-    above: Positive
-    hysteresis: NotNegative = 0.0
-    for_s: NotNegative = 0.0
-
-    @property
-    def words(self) -> str:
-        return f"above {self.above:g}{_unit(self)}{_for(self.for_s)}"
+    trips: str  # when, in words; `code` stands for its keys
+    rule: type[Rule]
+    kinds: tuple[str, ...]  # of what it watches each
+    quantities: tuple[str, ...] = ()  # the channels that it looks at
+    unit: str = ""  # of what it compares
 
 
-class RangeRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Trips where a value is below `min` or above `max` for `for_s`."""
+_JOINT, _ON_CAN, _IMU = (Kind.JOINT,), (Kind.JOINT, Kind.DEVICE), (Kind.IMU,)
+_MAGNITUDE = "its magnitude is `above`"
 
-    min: float | None = None
-    max: float | None = None
-    hysteresis: NotNegative = 0.0
-    for_s: NotNegative = 0.0
-
-    @property
-    def words(self) -> str:
-        bounds = (("below", self.min), ("above", self.max))
-        told = [f"{word} {bound:g}{_unit(self)}" for word, bound in bounds if bound is not None]
-        return f"{' or '.join(told)}{_for(self.for_s)}"
-
-
-class HeatRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """I²t: trips where the mean of (current or torque / `rated`)² over the time constant is `above` this.
-
-    The mean is a leaky integrator; 1 is what `rated`, held for ever, comes to.
-    """
-
-    of: Literal["current", "torque"] = "current"
-    rated: Positive  # A, or N·m at the joint: what the motor stands for ever
-    time_constant_s: Positive
-    above: Positive = 1.0
-    hysteresis: NotNegative = 0.0
-
-    @property
-    def words(self) -> str:
-        unit = {"current": "A", "torque": "N·m"}[self.of]
-        mean = f"mean of ({self.of} / {self.rated:g} {unit})² over {self.time_constant_s:g} s"
-        return f"{mean} above {self.above:g}"
-
-
-class SilenceRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Trips after a silence of `silent_s`; without it, of the time that the component's own table allows."""
-
-    silent_s: Positive | None = None
-
-    @property
-    def words(self) -> str:
-        return "silent" if self.silent_s is None else f"silent for {self.silent_s:g} s"
-
-
-class EmcyRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Trips at an emergency message whose code begins so: `0x2` current, `0x23`, `0x2310`; without, any."""
-
-    codes: Annotated[tuple[CodePrefix, ...], Meta(min_length=1)] | None = None
-
-    @property
-    def words(self) -> str:
-        return "any EMCY" if self.codes is None else f"EMCY {', '.join(self.codes)}"
+WATCHES: Mapping[str, Watch] = {
+    "node_lost": Watch(
+        "its heartbeat is missing for `silent_s` (else `heartbeat_timeout_s` of its table, else 2.5 × 1017h) "
+        "or it has booted anew: a drive, or the controller",
+        SilenceRule,
+        _ON_CAN,
+    ),
+    "emcy": Watch("it sends an emergency message", EmcyRule, _ON_CAN),
+    "sdo_latency": Watch(
+        "its answer to an SDO request (for 1000h, once a second) takes longer than `above`, or does not come",
+        LatencyRule,
+        _ON_CAN,
+        unit="s",
+    ),
+    "digital_input": Watch(
+        "a bit of 60FDh is not as it must be: emergency stop, STO, limit switch",
+        InputRule,
+        _JOINT,
+        ("digital_inputs",),
+    ),
+    "voltage": Watch("its supply (6079h) is outside of `min` … `max`", RangeRule, _JOINT, ("voltage",), "V"),
+    "following_error": Watch(_MAGNITUDE, LevelRule, _JOINT, ("following_error",), "rad"),
+    "velocity": Watch(_MAGNITUDE, LevelRule, _JOINT, ("velocity",), "rad/s"),
+    "current": Watch(_MAGNITUDE, LevelRule, _JOINT, ("current",), "A"),
+    "torque": Watch(_MAGNITUDE, LevelRule, _JOINT, ("torque",), "N·m"),
+    "i2t": Watch(
+        "the mean of (current or torque / `rated`)² over `time_constant_s` is `above`; it begins at 0, "
+        "whatever heat is there",
+        HeatRule,
+        _JOINT,
+        ("current", "torque"),  # one of them
+    ),
+    "temperature": Watch("its drive or motor is `above`", LevelRule, _JOINT, ("temperature",), "°C"),
+    "joint_limit": Watch("its position is outside of `min` … `max`", RangeRule, _JOINT, ("position",), "rad"),
+    "stopping_distance": Watch(
+        "it would come to rest outside of `min` … `max`, at its velocity v after v · `reaction_s` + "
+        "v² / (2 · `deceleration`)",
+        StoppingRule,
+        _JOINT,
+        ("position", "velocity"),
+        "rad",
+    ),
+    "drift_while_held": Watch(
+        "it has moved by more than `above` since `settle_s` after a stop that is held, and each time that it "
+        "has moved so far again",
+        DriftRule,
+        _JOINT,
+        ("position",),
+        "rad",
+    ),
+    "asymmetry": Watch(
+        "`left` and `right` differ by more than `above` in range (highest − lowest) or mean over `window_s`: "
+        "some strides, for at no instant do two legs do the same",
+        SymmetryRule,
+        (Kind.JOINT, Kind.INSOLE),
+    ),
+    "tilt": Watch(
+        "the trunk leans, forward or to a side", LevelRule, _IMU, ("tilt_forward", "tilt_side"), "rad"
+    ),
+    "tilt_rate": Watch(
+        "the trunk tilts so fast, forward or to a side",
+        LevelRule,
+        _IMU,
+        ("angular_velocity_x", "angular_velocity_y"),
+        "rad/s",
+    ),
+    "insole_stale": Watch(
+        "it is silent for `silent_s` (else its `stale_after_s`)", SilenceRule, (Kind.INSOLE,)
+    ),
+    "bus": Watch(
+        "our CAN controller is error passive or bus off, its interface is gone, or no frame comes for "
+        "`silent_s`",
+        BusRule,
+        (BUS,),
+    ),
+    "sync_lost": Watch("SYNC comes `tolerance_s` too late, or not at all", SyncRule, (BUS,)),
+}
 
 
 class GuardSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -123,40 +130,13 @@ class GuardSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     rule: dict[str, Rule] = {}
 
 
-@dataclass(frozen=True, slots=True)
-class Watch:
-    """What a rule of this name needs."""
-
-    rule: type[Rule]
-    kinds: tuple[Kind, ...]
-    quantities: tuple[str, ...] = ()  # the channels that it looks at, each by itself
-    unit: str = ""
-
-
-_JOINT, _ON_CAN = (Kind.JOINT,), (Kind.JOINT, Kind.DEVICE)
-WATCHES: Mapping[str, Watch] = {
-    "node_lost": Watch(SilenceRule, _ON_CAN),
-    "emcy": Watch(EmcyRule, _ON_CAN),
-    "following_error": Watch(LevelRule, _JOINT, ("following_error",), "rad"),
-    "current": Watch(LevelRule, _JOINT, ("current",), "A"),
-    "torque": Watch(LevelRule, _JOINT, ("torque",), "N·m"),
-    "i2t": Watch(HeatRule, _JOINT, ("current", "torque")),  # one of them
-    "temperature": Watch(LevelRule, _JOINT, ("temperature",), "°C"),
-    "joint_limit": Watch(RangeRule, _JOINT, ("position",), "rad"),
-    "tilt": Watch(LevelRule, (Kind.IMU,), ("tilt_forward", "tilt_side"), "rad"),
-    "tilt_rate": Watch(LevelRule, (Kind.IMU,), ("angular_velocity_x", "angular_velocity_y"), "rad/s"),
-    "insole_stale": Watch(SilenceRule, (Kind.INSOLE,)),
-}
+def limit(rule: Rule) -> str:
+    """What makes it trip, in words."""
+    return rule.words(WATCHES[rule.watch].unit)
 
 
 def quantities(rule: Rule) -> tuple[str, ...]:
     """The channels that a rule looks at."""
-    return (rule.of,) if isinstance(rule, HeatRule) else WATCHES[rule.watch].quantities
-
-
-def _unit(rule: Rule) -> str:
-    return f" {WATCHES[rule.watch].unit}"
-
-
-def _for(seconds: float) -> str:
-    return f" for {seconds:g} s" if seconds else ""
+    if isinstance(rule, HeatRule):
+        return (rule.of,)
+    return (rule.quantity,) if isinstance(rule, SymmetryRule) else WATCHES[rule.watch].quantities

@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 
 from gateway.config import ConfigError, RobotConfig
-from gateway.guard.settings import Action, Blind, HeatRule, LevelRule
+from gateway.guard.rules import Action, Blind, HeatRule, LevelRule
+from gateway.guard.settings import limit
 from tests.unit.gateway.harness import ROBOT, config
 
 IMU = '[imu.trunk]\nport = "/dev/null-imu"\nbaudrate = 115200\nformat = "witmotion"\naxes = ["x", "y", "z"]\n'
+SIDES = 'watch = "asymmetry", left = "left_knee", quantity = "position", above = 0.1'
 OWN_NODE = ('channel = "unused"', 'channel = "unused"\nnode_id = 100')
 
 
@@ -91,6 +93,38 @@ above = 0.6
         (rule('watch = "emcy", on = ["left_nee"]'), ("on: 'left_nee' is no joint or device", "left_knee")),
         (rule('watch = "tilt", above = 1, on = ["left_knee"]'), ("'left_knee' is no imu", "trunk")),
         (rule('watch = "node_lost", silent_s = 0'), ("[guard.rule.one] silent_s", "> 0")),
+        (rule('watch = "digital_input", name = "STO"'), ("lacks must_be_set, must_be_clear or both",)),
+        (rule('watch = "digital_input", must_be_set = []'), ("lacks must_be_set, must_be_clear or both",)),
+        (rule('watch = "digital_input", must_be_set = ["0x0"]'), ("with a bit: it could never trip",)),
+        (rule('watch = "digital_input", must_be_set = [32]'), ("[guard.rule.one] must_be_set", "<= 31")),
+        (rule('watch = "digital_input", must_be_set = [-1]'), ("[guard.rule.one] must_be_set", ">= 0")),
+        (rule('watch = "digital_input", must_be_set = ["lock"]'), ("must_be_set", "interlock")),
+        (
+            rule('watch = "digital_input", must_be_set = ["interlock"], must_be_clear = ["0xC"]'),
+            ("[guard.rule.one] must_be_clear: interlock must be set too: it would never be over",),
+        ),
+        (rule('watch = "voltage"'), ("lacks min, max or both",)),
+        (rule('watch = "voltage", above = 60'), ("unknown key 'above'", "max")),
+        (rule('watch = "stopping_distance", max = 1'), ("lacks the key 'deceleration'",)),
+        (rule('watch = "stopping_distance", deceleration = 5'), ("lacks min, max or both",)),
+        (rule('watch = "stopping_distance", deceleration = 0, max = 1'), ("deceleration", "> 0")),
+        (rule('watch = "stopping_distance", deceleration = inf, max = 1'), ("no finite number",)),
+        (rule('watch = "bus", on = ["left_knee"]'), ("on: 'left_knee' is no bus", "here are main")),
+        (rule('watch = "sync_lost"'), ("lacks the key 'period_s'",)),
+        (rule('watch = "sync_lost", period_s = 0.01, can_id = 0'), ("can_id", ">= 1")),
+        (rule('watch = "asymmetry", left = "a", right = "b", above = 1'), ("lacks the key 'quantity'",)),
+        (rule(f'{SIDES}, right = "left_knee"'), ("right: 'left_knee' is its left too",)),
+        (
+            rule(f'{SIDES}, right = "right_nee"'),
+            ("right: 'right_nee' is no joint, which has a position", "right_knee"),
+        ),
+        (rule(f'{SIDES}, right = "left_insole"'), ("right: 'left_insole' is no joint",)),
+        (rule(f'{SIDES}, right = "right_knee", on = ["*"]'), ("on: asymmetry watches its left and right",)),
+        (rule(f'{SIDES}, right = "right_knee", hysteresis = 1'), ("hysteresis", "never be over")),
+        (rule(f'{SIDES.replace("position", "place")}, right = "right_knee"'), ("quantity", "load_share")),
+        (rule('watch = "drift_while_held", above = 0.1, for_s = 1'), ("unknown key 'for_s'",)),
+        (rule('watch = "sdo_latency", above = 0.1, hysteresis = 0.1'), ("never be over",)),
+        (rule('watch = "emcy", actions = ["hold"]'), ("[guard.rule.one] actions", "hold")),
         (IMU.replace("trunk", "guard").replace("-imu", "-2"), ("'guard' is taken by the gateway itself",)),
     ],
 )
@@ -99,6 +133,21 @@ def test_what_cannot_work_is_refused(tmp_path: Path, text: str, words: tuple[str
         guarded(tmp_path, text)
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(("on", "refused"), [("", True), ('on = ["m*"]', True), ('on = ["other"]', False)])
+def test_our_own_sync_is_nothing_that_can_be_lost(tmp_path: Path, on: str, refused: bool) -> None:
+    ours = ROBOT.replace("port = 0", 'port = 0\nrole = "master"').replace(
+        'channel = "unused"', 'channel = "unused"\nsync_period_s = 0.01'
+    )
+    text = rule('watch = "sync_lost", period_s = 0.01') + on + "\n"
+    robot = ours + '[can.other]\ninterface = "virtual"\nchannel = "other"\n'
+    if refused:
+        with pytest.raises(ConfigError, match=r"the SYNC of \[can.main\] is ours \(sync_period_s\)"):
+            guarded(tmp_path, text, robot)
+    else:
+        assert guarded(tmp_path, text, robot).guard is not None
+    assert guarded(tmp_path, text, robot.replace("master", "observer")).guard is not None
 
 
 def test_a_rule_for_what_the_robot_does_not_have_is_refused(tmp_path: Path) -> None:
@@ -134,10 +183,33 @@ def test_nobody_to_arm_is_refused(tmp_path: Path) -> None:
         ('watch = "node_lost"', "silent"),
         ('watch = "insole_stale", silent_s = 0.2', "silent for 0.2 s"),
         ('watch = "emcy"', "any EMCY"),
+        ('watch = "velocity", above = 3', "above 3 rad/s"),
+        ('watch = "voltage", min = 40, max = 56', "below 40 V or above 56 V"),
+        ('watch = "sdo_latency", above = 0.1', "above 0.1 s"),
+        ('watch = "digital_input", must_be_clear = [16]', "bit 16 set"),
+        (
+            'watch = "digital_input", name = "stop", must_be_set = ["interlock"; 17], for_s = 0.1',
+            "stop, interlock, bit 17 clear for 0.1 s",
+        ),
+        (
+            'watch = "digital_input", must_be_set = ["home_switch"], must_be_clear = ["0x3"]',
+            "home switch clear; negative limit switch, positive limit switch set",
+        ),
+        (
+            'watch = "stopping_distance", max = 1, deceleration = 5, reaction_s = 0.1',
+            "at rest only above 1 rad, braking by 5 rad/s² after 0.1 s",
+        ),
+        ('watch = "drift_while_held", above = 0.1', "moved more than 0.1 rad, from 1 s after a stop on"),
+        ('watch = "bus"', "error passive, bus off, gone, or silent for 0.5 s"),
+        ('watch = "sync_lost", period_s = 0.01', "no SYNC for 0.06 s"),
+        (
+            f'{SIDES.replace("0.1", "80")}, right = "right_knee", of = "mean"',
+            "mean of position over 5 s differs by more than 80 rad",
+        ),
         ('watch = "emcy", codes = ["0x2"; "0x43"]', "EMCY 0x2, 0x43"),
     ],
 )
 def test_a_rule_says_what_makes_it_trip(tmp_path: Path, text: str, words: str) -> None:
     guard = guarded(tmp_path, rule(text).replace(";", ",")).guard
     assert guard is not None
-    assert guard.rule["one"].words == words
+    assert limit(guard.rule["one"]) == words

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from drivers.bus.emcy import Emcy
-from gateway.guard.conditions import Band
 from gateway.guard.inputs import (
     AGAIN_NS,
     EmcyWatcher,
@@ -17,7 +16,8 @@ from gateway.guard.inputs import (
     SilenceWatcher,
     UnseenWatcher,
 )
-from gateway.guard.settings import Blind, EmcyRule, LevelRule, SilenceRule
+from gateway.guard.judging import Beside, judging
+from gateway.guard.rules import Blind, EmcyRule, LevelRule, SilenceRule
 from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
 
 WATCHING, CLEARED, BLIND, TRIPPED = State.WATCHING, State.CLEARED, State.BLIND, State.TRIPPED
@@ -39,10 +39,8 @@ def changed(changes: list[Change]) -> Callable[[Watcher, Change], None]:
 def level(changed: Callable[[Watcher, Change], None], began_ns: int = 0, **more: Any) -> LevelWatcher:
     """Above 10 A, over below 9 A."""
     rule = LevelRule(watch="current", above=10.0, hysteresis=1.0, clear_s=0.2, **more)
-    band = Band(-rule.above, rule.above, rule.hysteresis)
-    return LevelWatcher(
-        rule, "knee.current", " A", began_ns, changed, band=band, stale_ns=STALE_NS, for_s=rule.for_s
-    )
+    how = judging(rule, Beside(STALE_NS / 1e9))
+    return LevelWatcher(rule, "knee", "knee.current", began_ns, changed, judging=how, stale_ns=STALE_NS)
 
 
 class TestLevel:

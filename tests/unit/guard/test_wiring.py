@@ -1,78 +1,18 @@
 """What each rule looks at on a robot, and that a sample of it comes to the rule."""
 
 import time
-from dataclasses import dataclass, field
-from types import SimpleNamespace
 from typing import Any
 
-import msgspec
 import pytest
 
-from drivers.bus.life import NodeLife
-from drivers.component import Component, Kind
-from drivers.latest import Latest
-from drivers.samples import Channel, Quality, State
-from gateway.guard.settings import WATCHES, Rule
-from gateway.guard.watcher import Change, Watcher
+from drivers.component import Kind
+from gateway.guard.settings import WATCHES
 from gateway.guard.watcher import State as Found
-from gateway.guard.wiring import Wiring
-from gateway.modules.assembly import Robot
-
-JOINT = ("position", "torque", "current", "following_error", "temperature")
-IMU = ("tilt_forward", "tilt_side", "angular_velocity_x", "angular_velocity_y", "angular_velocity_z")
-
-
-@dataclass
-class Part:
-    """A component with channels, and the life of a node where it is one."""
-
-    name: str
-    kind: Kind
-    quantities: tuple[str, ...] = ()
-    settings: Any = field(default_factory=lambda: SimpleNamespace(lost_after_s=2.0, stale_after_s=0.5))
-
-    def __post_init__(self) -> None:
-        self.channels = tuple(Channel(f"{self.name}.{q}", self.name, q, "u") for q in self.quantities)
-        self.latest = Latest(self.name, self.channels, 0.5)
-        self.node = SimpleNamespace(life=NodeLife(None), description=SimpleNamespace(vendor_id=None))
-
-    def start(self) -> None: ...
-
-    def stop(self) -> None: ...
-
-    def quality(self, now_ns: int) -> Quality:
-        return Quality(State.OK, 0.0)
-
-    def give(self, quantity: str, value: float) -> None:
-        self.latest.update(time.monotonic_ns(), (self.quantities.index(quantity),), (value,))
-
-
-class Bench:
-    """A robot of such parts, and what became of the watchers."""
-
-    def __init__(self) -> None:
-        self.knee, self.hip = (Part(name, Kind.JOINT, JOINT) for name in ("left_knee", "left_hip"))
-        self.gait, self.foot = Part("gait", Kind.DEVICE), Part("left_insole", Kind.INSOLE, ("force",))
-        self.trunk = Part("trunk", Kind.IMU, IMU)
-        self.changes: list[Change] = []
-        self.absent: dict[str, tuple[Kind, str]] = {}
-
-    def wire(self, watch: str, **keys: Any) -> Wiring:
-        parts: list[Component] = [self.knee, self.hip, self.gait, self.foot, self.trunk]
-        present = {part.name: part for part in parts if part.name not in self.absent}
-        rule: Rule = msgspec.convert({"watch": watch, **keys}, WATCHES[watch].rule)
-        return Wiring(rule, Robot({}, present, {}, self.absent), 0, self.changed)
-
-    def changed(self, _watcher: Watcher, change: Change) -> None:
-        self.changes.append(change)
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
-
+from tests.unit.guard.bench import JOINT, Bench, Part
 
 HEAT = {"rated": 1.0, "time_constant_s": 1.0}
+SIDES = {"left": "left_knee", "right": "left_hip", "quantity": "position", "above": 0.1}
+BRAKE = {"max": 2.0, "deceleration": 5.0}
 
 
 @pytest.mark.parametrize(
@@ -89,7 +29,21 @@ HEAT = {"rated": 1.0, "time_constant_s": 1.0}
         ("joint_limit", {"max": 1.0}, ["left_knee.position", "left_hip.position"]),
         ("tilt", {"above": 1.0}, ["trunk.tilt_forward", "trunk.tilt_side"]),
         ("tilt_rate", {"above": 1.0}, ["trunk.angular_velocity_x", "trunk.angular_velocity_y"]),
-        ("insole_stale", {}, ["left_insole"]),
+        ("insole_stale", {}, ["left_insole", "right_insole"]),
+        ("sdo_latency", {"above": 0.1}, ["left_knee", "left_hip", "gait"]),
+        (
+            "digital_input",
+            {"must_be_clear": [16]},
+            ["left_knee.digital_inputs", "left_hip.digital_inputs"],
+        ),
+        ("voltage", {"min": 40.0}, ["left_knee.voltage", "left_hip.voltage"]),
+        ("velocity", {"above": 1.0}, ["left_knee.velocity", "left_hip.velocity"]),
+        ("stopping_distance", BRAKE, ["left_knee", "left_hip"]),
+        ("drift_while_held", {"above": 0.1}, ["left_knee.position", "left_hip.position"]),
+        ("asymmetry", SIDES, ["left_knee and left_hip"]),
+        ("bus", {}, ["main", "other"]),
+        ("bus", {"on": ["o*"]}, ["other"]),
+        ("sync_lost", {"period_s": 0.01}, ["main", "other"]),
     ],
 )
 def test_a_rule_looks_at_what_it_is_called_by(
@@ -110,6 +64,12 @@ def test_every_watch_is_tried_here() -> None:
         ("torque", {"above": 2.0}, "torque", (0.0,), -2.01),
         ("joint_limit", {"max": 2.0}, "position", (2.0, -99.0), 2.01),
         ("joint_limit", {"min": -1.0}, "position", (-1.0, 99.0), -1.01),
+        ("velocity", {"above": 2.0}, "velocity", (2.0, -2.0), -2.01),
+        ("voltage", {"min": 40.0, "max": 56.0}, "voltage", (40.0, 56.0), 39.9),
+        ("voltage", {"min": 40.0, "max": 56.0}, "voltage", (48.0,), 56.1),
+        ("digital_input", {"must_be_clear": [16, 17]}, "digital_inputs", (0, 0xFFFC_FFFF), 0x0002_0000),
+        ("digital_input", {"must_be_set": ["interlock"]}, "digital_inputs", (0x8, 0xFF), 0xFFFF_FFF7),
+        ("digital_input", {"must_be_set": ["0x30"]}, "digital_inputs", (0x30,), 0x10),
     ],
 )
 def test_a_sample_of_it_trips_the_rule_between_open_and_close(
@@ -206,7 +166,8 @@ def test_a_node_with_a_heartbeat_is_lost_without_it_whatever_else_it_sends(bench
 def test_an_insole_is_silent_after_the_time_that_its_rule_or_table_says(
     bench: Bench, silent_s: float | None, lost_s: float
 ) -> None:
-    (watcher,) = bench.wire("insole_stale", **({} if silent_s is None else {"silent_s": silent_s})).watchers
+    keys = {} if silent_s is None else {"silent_s": silent_s}
+    (watcher,) = bench.wire("insole_stale", on=["left_*"], **keys).watchers
     now_ns = 10_000_000_000
     bench.foot.latest.updated_ns = now_ns
     for after_ns, state in ((0, Found.WATCHING), (1, Found.TRIPPED)):
@@ -225,7 +186,7 @@ def test_an_insole_is_silent_after_the_time_that_its_rule_or_table_says(
 def test_a_drive_without_the_channel_is_said_where_somebody_has_named_it(
     bench: Bench, on: list[str] | None, problems: list[str]
 ) -> None:
-    bench.hip = Part("left_hip", Kind.JOINT, JOINT[:-1])
+    bench.hip = Part("left_hip", Kind.JOINT, JOINT[:-1])  # no temperature
     wiring = bench.wire("temperature", above=80.0, **({} if on is None else {"on": on}))
     for watcher in wiring.watchers:
         watcher.look(1)
