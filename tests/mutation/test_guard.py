@@ -4,18 +4,24 @@ import pytest
 
 from tests.mutation.mutants import survivors
 
-UNIT = "tests/unit/guard"
+UNIT = "tests/unit"
 
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
-    ("module", "test"),
+    ("module", "tests"),
     [
-        ("gateway.guard.conditions", "test_conditions.py"),
-        ("gateway.guard.watcher", "test_watchers.py"),
-        ("gateway.guard.inputs", "test_watchers.py"),
-        ("gateway.guard.wiring", "test_wiring.py"),
+        ("conditions", ["guard/test_conditions.py", "guard/test_motion.py"]),
+        ("symmetry", ["guard/test_symmetry.py"]),
+        ("judging", ["guard/test_motion.py", "guard/test_wiring.py", "guard/test_buses.py"]),
+        ("watcher", ["guard/test_watchers.py"]),
+        ("inputs", ["guard/test_watchers.py", "guard/test_motion.py"]),
+        ("buses", ["guard/test_buses.py"]),
+        ("making", ["guard/test_wiring.py", "guard/test_motion.py", "guard/test_buses.py"]),
+        ("wiring", ["guard/test_wiring.py"]),
+        ("rules", ["guard/test_wiring.py", "guard/test_buses.py", "gateway/test_guard_settings.py"]),
+        ("checks", ["gateway/test_guard_settings.py"]),
     ],
 )
-def test_whatever_is_changed_in_it_is_noticed(module: str, test: str) -> None:
-    assert survivors(module, [f"{UNIT}/{test}"]) == []
+def test_whatever_is_changed_in_it_is_noticed(module: str, tests: list[str]) -> None:
+    assert survivors(f"gateway.guard.{module}", [f"{UNIT}/{test}" for test in tests]) == []

@@ -75,7 +75,7 @@ class Part:
     def quality(self, now_ns: int) -> Quality:
         return Quality(State.OK, 0.0)
 
-    def give(self, quantity: str, value: float, stamp_ns: int | None = None) -> None:
+    def give(self, quantity: str, value: float | None, stamp_ns: int | None = None) -> None:
         stamp_ns = time.monotonic_ns() if stamp_ns is None else stamp_ns
         self.latest.update(stamp_ns, (self.quantities.index(quantity),), (value,))
 

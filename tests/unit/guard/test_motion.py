@@ -1,5 +1,6 @@
 """Where a joint would come to rest, whether it moves while it is held, left against right over strides."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -54,6 +55,16 @@ def test_where_it_would_come_to_rest_is_unknown_without_one_of_both(bench: Bench
     assert not bench.changes
     watcher.look(10 * S + 500_000_001)
     assert bench.states() == [Found.BLIND]
+
+
+@pytest.mark.parametrize("value", [None, math.nan, math.inf])
+def test_what_is_no_number_makes_no_stopping_point(bench: Bench, value: float | None) -> None:
+    bench.wire("stopping_distance", on=["left_knee"], **BRAKE).open()
+    bench.knee.give("velocity", 1.0)
+    bench.knee.give("position", value)
+    assert not bench.changes
+    bench.knee.give("position", 2.0)
+    assert bench.states() == [Found.TRIPPED]
 
 
 def test_an_old_velocity_counts_as_long_as_it_is_not_stale(bench: Bench) -> None:
