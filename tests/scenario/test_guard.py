@@ -28,6 +28,7 @@ from tests.unit.gateway.harness import Client, serving
 pytestmark = pytest.mark.timeout(300)
 
 ENABLED = PowerState.OPERATION_ENABLED
+DOWNLOAD, UPLOAD = 1, 2  # client command specifiers (CiA 301 §7.2.4.3)
 OUR_NODE, PERIOD_MS = 100, 1000  # slow, so that no busy computer makes the drives stop by itself
 CONSUMER_S = 2.5 * PERIOD_MS / 1000
 ENTRY = OUR_NODE << 16 | round(CONSUMER_S * 1000)
@@ -59,6 +60,31 @@ watch = "tilt"
 above = 1.2
 """
 
+CONTROLLER = """
+[guard.rule.controller]
+watch = "node_lost"
+on = ["gait"]
+silent_s = 2.0
+actions = ["quick_stop"]
+"""
+SLOW = """
+[guard.rule.slow]
+watch = "sdo_latency"
+above = 1.5
+"""
+EMERGENCY_STOP = """
+[guard.rule.hardware]
+watch = "digital_input"
+name = "emergency stop"
+must_be_clear = [16]
+actions = ["quick_stop", "alarm"]
+"""
+BUS = """
+[guard.rule.bus]
+watch = "bus"
+silent_s = 2.0
+"""
+
 
 def until(condition: Callable[[], object], what: str) -> None:
     """Wait until something is so; the simulator may be far slower than real time on a busy computer."""
@@ -74,7 +100,8 @@ def configure(robot: SimulatedRobot, text: str) -> Path:
 
 
 def journal(config: Path, what: str) -> list[dict[str, Any]]:
-    entries = read_verified(RecordsFolder(load(config).records).journal)
+    file = RecordsFolder(load(config).records).journal
+    entries = read_verified(file) if file.exists() else []  # there is none before the first entry
     return [one for one in entries if one["what"] == what]
 
 
@@ -188,8 +215,76 @@ class TestRules:
         assert "left_insole: silent" in journal(robot.config, "alarm")[0]["reason"]
         assert power_states(robot) == {ENABLED}
 
+    def test_a_controller_that_is_lost_stops_the_drives_that_it_commanded(
+        self, robot: SimulatedRobot, guarded: Callable[[str], Client]
+    ) -> None:
+        client = guarded(CONTROLLER)
+        ask(robot.folder.path, {"fault": "node_lost", "on": "gait"})
+        until(lambda: states(client)["controller"] == "tripped", "lost")
+        until(lambda: ENABLED not in power_states(robot), "stopped")
+        assert "guard rule controller: gait: silent for" in client.call("robot.describe")["stop"]["reason"]
+
+    def test_a_node_that_answers_no_sdo_in_time_is_told(
+        self, robot: SimulatedRobot, guarded: Callable[[str], Client]
+    ) -> None:
+        client = guarded(SLOW)
+        ask(robot.folder.path, {"fault": "sdo_late", "on": "gait", "params": {"delay_ms": 2000}})
+        until(lambda: journal(robot.config, "alarm"), "told")
+        assert journal(robot.config, "alarm")[0]["reason"] == "gait: no answer"
+        ask(robot.folder.path, {"clear": "all"})
+        until(lambda: states(client)["slow"] == "cleared", "it answers again")
+
+
+class TestEmergencyStop:
+    """What hardware has taken is seen, named, and not fought."""
+
+    def test_it_is_called_by_its_name_and_holds_the_robot_until_it_is_over(
+        self, robot: SimulatedRobot, guarded: Callable[[str], Client], tmp_path: Path
+    ) -> None:
+        client = guarded(EMERGENCY_STOP)
+        ask(robot.folder.path, {"fault": "sto", "on": "left_knee"})
+        until(lambda: client.call("robot.describe")["stop"]["held"], "held")
+        until(lambda: ENABLED not in power_states(robot), "stopped")
+        reason = "left_knee.digital_inputs: emergency stop, bit 16 set"
+        assert client.call("robot.describe")["stop"]["reason"] == f"guard rule hardware: {reason}"
+        client.call("control.acquire", ttl_s=60)
+        refused = client.refused("robot.reset")
+        assert refused.kind == "stopped"
+        assert f"hardware ({reason})" in str(refused)
+        until(lambda: journal(robot.config, "stop answered"), "answered")
+        with can.Bus(interface="virtual", channel=f"guard {tmp_path.name}") as third:
+            requests = requests_to(third, JOINTS["left_knee"], seconds=2.0)
+        assert (UPLOAD, 0x60FD) in requests, "it is looked at"
+        assert not [index for what, index in requests if what == DOWNLOAD], "and not commanded"
+        ask(robot.folder.path, {"clear": "all"})
+        until(lambda: states(client)["hardware"] == "cleared", "it is over")
+        assert client.call("robot.describe")["stop"]["held"] is True
+        assert client.call("robot.reset")["held"] is False
+        assert power_states(robot) == {PowerState.SWITCH_ON_DISABLED}, "nothing enables anything"
+
+
+def requests_to(bus: can.BusABC, node: int, seconds: float) -> list[tuple[int, int]]:
+    """What SDO requests to a node are about in this time: what they ask for (CiA 301), and the index."""
+    end, found = time.monotonic() + seconds, []
+    while (left_s := end - time.monotonic()) > 0:
+        message = bus.recv(left_s)
+        if message is not None and message.arbitration_id == 0x600 + node:
+            found.append((message.data[0] >> 5, int.from_bytes(message.data[1:3], "little")))
+    return found
+
 
 class TestBus:
+    def test_our_own_controller_that_is_bus_off_is_told(
+        self, robot: SimulatedRobot, guarded: Callable[[str], Client]
+    ) -> None:
+        client = guarded(BUS)
+        ask(robot.folder.path, {"fault": "gateway_bus_off"})
+        until(lambda: states(client)["bus"] == "tripped", "seen")
+        until(lambda: journal(robot.config, "alarm"), "told")
+        assert journal(robot.config, "alarm")[0]["reason"] == "main: our CAN controller is bus off"
+        ask(robot.folder.path, {"clear": "all"})
+        until(lambda: states(client)["bus"] == "cleared", "it is back")
+
     def test_a_guard_that_begins_before_its_bus_tells_it_and_sees_when_it_comes(self, tmp_path: Path) -> None:
         with ExitStack() as stack:
             power = stack.enter_context(ExitStack())
