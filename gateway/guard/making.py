@@ -36,6 +36,7 @@ from gateway.guard.watcher import Watcher
 
 if TYPE_CHECKING:
     from drivers.bus.device import CanDevice
+    from drivers.bus.node import Node
     from drivers.bus.sdo_channel import SdoChannel
     from drivers.insole.device import Insole
     from drivers.joint.drive import JointDrive
@@ -118,8 +119,8 @@ def _emcy(rule: EmcyRule, wire: Wire, name: str) -> Iterator[Watcher]:
 def _latency(rule: LatencyRule, wire: Wire, name: str) -> Iterator[Watcher]:
     how = judging(rule, Beside(UNASKED_NS / 1e9))
     watcher = LevelWatcher(rule, name, name, wire.now_ns, wire.changed, judging=how, stale_ns=UNASKED_NS)
-    repeat = _on_node(wire.robot.components[name]).node.worker.repeat
-    wire.begins.append(partial(repeat, ASK_S, partial(_ask, watcher)))
+    node = _on_node(wire.robot.components[name]).node
+    wire.begins.append(partial(node.worker.repeat, ASK_S, partial(_ask, node, watcher)))
     yield watcher
 
 
@@ -129,7 +130,7 @@ def _stopping(rule: StoppingRule, wire: Wire, name: str) -> Iterator[Watcher]:
     parts = [(component, quantity) for quantity in quantities(rule)]
     missing = [quantity for _, quantity in parts if _index(component, quantity) is None]
     if not missing:
-        yield _joined(rule, wire, name, parts)
+        yield _joined(rule, wire, parts)
     elif rule.on is not None:
         yield wire.unseen(rule, name, f"has no {' and no '.join(missing)}")
 
@@ -144,7 +145,7 @@ def _symmetry(rule: SymmetryRule, wire: Wire, name: str) -> Iterator[Watcher]:
     if missing:
         yield wire.unseen(rule, missing[0], f"has no {rule.quantity}")
     else:
-        yield _joined(rule, wire, f"{name} and {rule.right}", parts, round(rule.window_s * 1e9))
+        yield _joined(rule, wire, parts, round(rule.window_s * 1e9))
 
 
 @make.register
@@ -173,14 +174,22 @@ def _sync(rule: SyncRule, wire: Wire, name: str) -> Iterator[Watcher]:
     yield watcher
 
 
-def _joined(rule: Rule, wire: Wire, name: str, parts: Sequence[Part], coming_ns: int = 0) -> Watcher:
+def _joined(rule: Rule, wire: Wire, parts: Sequence[Part], coming_ns: int = 0) -> Watcher:
     """One watcher of several channels, in this order."""
+    names = dict.fromkeys(component.name for component, _ in parts)
     stale_ns = min(component.latest.stale_after_ns for component, _ in parts)
     how = judging(rule, Beside(stale_ns / 1e9, wire.held))
     if how.joined is None:
         raise TypeError(f"{rule.watch} judges each channel by itself")
     watcher = LevelWatcher(
-        rule, name, name, wire.now_ns, wire.changed, judging=how, stale_ns=stale_ns, coming_ns=coming_ns
+        rule,
+        ", ".join(names),
+        " and ".join(names),
+        wire.now_ns,
+        wire.changed,
+        judging=how,
+        stale_ns=stale_ns,
+        coming_ns=coming_ns,
     )
     joining = Joining(watcher, how.joined, len(parts), stale_ns)
     for part, (component, quantity) in enumerate(parts):
@@ -190,8 +199,10 @@ def _joined(rule: Rule, wire: Wire, name: str, parts: Sequence[Part], coming_ns:
     return watcher
 
 
-def _ask(watcher: LevelWatcher, sdo: "SdoChannel") -> None:
-    """How long an answer takes; a refusal is one too. In the node's worker."""
+def _ask(node: "Node", watcher: LevelWatcher, sdo: "SdoChannel") -> None:
+    """How long an answer takes; a refusal is one too. In the worker of a node, whose coming up goes first."""
+    if not node.ready:
+        return
     asked_ns = time.monotonic_ns()
     try:
         sdo.upload(DEVICE_TYPE, 0, attempts=1)

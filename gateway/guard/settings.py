@@ -87,8 +87,8 @@ WATCHES: Mapping[str, Watch] = {
         "rad",
     ),
     "drift_while_held": Watch(
-        "it has moved by more than `above` since `settle_s` after a stop that is held, and each time that it "
-        "has moved so far again",
+        "it has moved by more than `above`, by hand too, since `settle_s` after a stop that is held; and "
+        "each time that it has moved so far again",
         DriftRule,
         _JOINT,
         ("position",),

@@ -65,7 +65,10 @@ class Part:
         self.latest = Latest(self.name, self.channels, 0.5)
         self.worker = Worker()
         self.node = SimpleNamespace(
-            life=NodeLife(None), description=SimpleNamespace(vendor_id=None), worker=self.worker
+            life=NodeLife(None),
+            description=SimpleNamespace(vendor_id=None),
+            worker=self.worker,
+            ready=True,
         )
 
     def start(self) -> None: ...

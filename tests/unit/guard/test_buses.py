@@ -70,6 +70,17 @@ def test_nobody_knows_how_long_an_answer_takes_that_cannot_be_asked_for(
     assert not bench.changes
 
 
+def test_a_node_that_comes_up_is_not_asked(
+    bench: Bench, asked: Callable[[float, Exception | None], None]
+) -> None:
+    bench.gait.node.ready = False
+    asked(9.0, DeviceTimeout("silence"))
+    assert not bench.changes
+    bench.gait.node.ready = True
+    asked(9.0, None)
+    assert bench.states() == [Found.TRIPPED]
+
+
 def test_a_latency_is_unknown_when_it_was_not_seen_for_long(bench: Bench) -> None:
     wiring = bench.wire("sdo_latency", on=["gait"], above=0.1)
     (watcher,) = wiring.watchers
