@@ -1,6 +1,7 @@
 """Every rule of the guard: a fault of the simulated robot trips it, and ten minutes of walking do not."""
 
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 from gateway.guard.settings import WATCHES
 from gateway.guard.watcher import State
 from hil_sim.drive.power_state import Command, PowerState
+from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.timetable import Entry
 from tests.scenario.watched import Watched
@@ -186,6 +188,25 @@ def test_a_fault_trips_its_rule_which_says_what_it_saw(watched: Watched, case: C
     watched.faults.begin(case.fault, case.on, params=case.params)
     assert watched.until(lambda: watched.reasons(case.rule), case.within_s), watched.changes
     assert watched.reasons(case.rule)[0].startswith(case.says)
+
+
+def send_inputs_by_pdo(robot: Exoskeleton) -> None:
+    """TPDO4 of the drive carries 60FDh when it changes; its COB-ID makes it valid (CiA 301 §7.5.2.35)."""
+    knee = robot.drives["left_knee"]
+    knee.dictionary.write(0x1803, 1, (0x4000_0480 + knee.node_id).to_bytes(4, "little"))
+
+
+@pytest.mark.parametrize(("prepare", "within_s"), [(send_inputs_by_pdo, 0.02), (lambda _robot: None, 0.3)])
+def test_an_emergency_stop_is_seen_with_the_frame_that_brings_it_else_when_it_is_asked_for(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    prepare: Callable[[Exoskeleton], object],
+    within_s: float,
+) -> None:
+    watched = Watched(tmp_path, monkeypatch, RULES, prepare)
+    watched.run(2.03)
+    watched.faults.begin("sto", "left_knee")
+    assert watched.until(lambda: watched.reasons("emergency_stop"), within_s)
 
 
 def test_what_would_come_to_rest_beyond_its_limit_is_seen_before_it_is_there(watched: Watched) -> None:

@@ -180,8 +180,14 @@ class DirectPort:
 class Watched:
     """A robot that walks, and rules by their names; `changes` is what became of each, with the time (s)."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, rules: str) -> None:
-        """`rules` are tables of the robot's file."""
+    def __init__(
+        self,
+        folder: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        rules: str,
+        prepare: Callable[[Exoskeleton], object] = lambda _robot: None,
+    ) -> None:
+        """`rules` are tables of the robot's file; `prepare` sets up the robot before its gateway comes."""
         self.simulated = Exoskeleton(Scenario.WALK)
         self.clock = self.simulated.clock
         self.faults = Faults(self.simulated, folder)
@@ -193,6 +199,7 @@ class Watched:
         self.robot = self._assemble(config)
         self.simulated.power_on()
         self.run(1.0)
+        prepare(self.simulated)
         for component in self.robot.components.values():
             component.start()
         self._watch({} if config.guard is None else config.guard.rule)
