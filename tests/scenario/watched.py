@@ -33,6 +33,7 @@ from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.sensors.tables import companions
+from tests.unit.bus.direct import Direct
 
 EPOCH_NS = 1000 * SECOND_NS  # of the monotonic clock when the robot is switched on
 LOOK_NS = 50 * MILLISECOND_NS  # how often the guard's loop looks, and the bus's thread ticks
@@ -55,7 +56,7 @@ class DirectBus(CanBus):
         self._now_ns = now_ns
         self._simulated = robot.bus
         robot.bus.attach(self, self._carried, self._error)
-        robot.clock.every(LOOK_NS, self._tick)
+        robot.clock.every(LOOK_NS, self._look)
 
     def hold(self, user: BusUser) -> None:
         if user not in self._users:
@@ -77,16 +78,15 @@ class DirectBus(CanBus):
     def _error(self, error_class: int) -> None:
         self.state = bus_state(ERROR | error_class, b"") or self.state
 
-    def _tick(self) -> None:
-        for user in self._users:
-            user.tick(self._now_ns())
+    def _look(self) -> None:
+        self._tick(self._now_ns())
 
 
 class DirectSdo(SdoChannel):
     """Asks a simulated node over the simulated bus, and lets simulated time pass until it answers."""
 
     def __init__(self, node_id: int, robot: Exoskeleton) -> None:
-        super().__init__(f"node {node_id}", lambda _data: None, 0.5)
+        super().__init__(f"node {node_id}", Direct(lambda _data: None), 0.5)
         self._asks, answers = 0x600 + node_id, 0x580 + node_id
         self._bus, self._clock = robot.bus, robot.clock
         self._answer: bytes | None = None
