@@ -43,7 +43,7 @@ def limit(*actions: str, **more: Any) -> Rule:
 def guarding(robot: Robot, rules: Mapping[str, Rule], held: bool = False) -> Iterator[GuardModule]:
     journal = SimpleNamespace(append=lambda *_args, **_more: None)
     control = SimpleNamespace(
-        drives={}, journal=journal, stop_held=held, stop_robot=lambda _who, _why: None, revert_trials=None
+        drives={}, journal=journal, authority=SimpleNamespace(held=held), trip=lambda _who, _why: None
     )
     needs = {"component": SimpleNamespace(robot=robot, sources=[]), "control": control}
     config = SimpleNamespace(guard=GuardSettings(rule=dict(rules)))
