@@ -11,7 +11,7 @@ CLEAN = 20  # requests answered once, after which all is well again
 
 @dataclass(slots=True)
 class _Answered:
-    key: bytes  # specifier and object
+    answer: bytes
     twice: bool = False
 
 
@@ -27,7 +27,7 @@ class Doubles:
         """A request was answered by this."""
         if not sdo.names_object(answer):
             return
-        self._recent.append(_Answered(_key(answer)))
+        self._recent.append(_Answered(answer))
         if len(self._recent) > RECENT:
             self._judge(self._recent.popleft())
 
@@ -35,7 +35,7 @@ class Doubles:
         """Take one that answers no request; whether it is the second to one of the last."""
         key = _key(answer)
         for at in reversed(range(len(self._recent))):
-            if self._recent[at].key == key and not self._recent[at].twice:
+            if _key(self._recent[at].answer) == key and not self._recent[at].twice:
                 self._recent[at].twice = True
                 if any(
                     self._recent[near].twice for near in (at - 1, at + 1) if 0 <= near < len(self._recent)
@@ -50,5 +50,6 @@ class Doubles:
             self.found = False
 
 
-def _key(answer: bytes) -> bytes:
-    return bytes([answer[0] & sdo.SPECIFIER]) + answer[1:4]
+def _key(answer: bytes) -> tuple[int, bytes]:
+    """Specifier and object: two devices may hold different values."""
+    return answer[0] & sdo.SPECIFIER, answer[1:4]

@@ -62,6 +62,8 @@ class Outstanding:
 
     def holds(self, about: bytes) -> bool:
         """Whether an answer about this object may still come."""
+        if not self._requests and self._late is None and not self._crowd:
+            return False  # as a rule
         with self._lock:
             asked = any(request.about == about for request in self._requests)
             return asked or about in self._crowd or (self._late is not None and self._late[1:4] == about)
@@ -83,7 +85,8 @@ class Outstanding:
             self._crowd.clear()
             self._late = answer if settled.given_up else None
             settled.answer = answer
-            self._answer_repeated(settled, answer)
+            if self._requests:
+                self._answer_repeated(settled, answer)
             return settled
 
     def forget(self) -> None:
@@ -113,10 +116,12 @@ class Outstanding:
     def _answered_by(self, answer: bytes) -> int | None:
         if answer[0] == sdo.ABORT and answer[1:4] == bytes(3):  # of anything: only where there is but one
             return 0 if len(self._requests) == 1 and not self._crowd else None
-        if sdo.names_object(answer) and answer[1:4] in self._crowd:
+        if self._crowd and sdo.names_object(answer) and answer[1:4] in self._crowd:
             return None  # nobody knows to which
-        fitting = (at for at, one in enumerate(self._requests) if sdo.answers(answer, one.frame, one.about))
-        return next(fitting, None)
+        for at, one in enumerate(self._requests):
+            if sdo.answers(answer, one.frame, one.about):
+                return at
+        return None
 
     def _answer_repeated(self, settled: Request, answer: bytes) -> None:
         """Where the same was written again, and nothing else in between, each is known by this."""

@@ -9,15 +9,14 @@ import contextlib
 import queue
 import threading
 import time
-from collections.abc import Callable, Generator
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, Generic, Protocol, TypeVar
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
 
 from drivers.bus import sdo
 from drivers.bus.aborts import abort_text
-from drivers.bus.doubles import Doubles
+from drivers.bus.answers import Answers, SdoCounters
 from drivers.bus.outstanding import Outstanding, Request
+from drivers.bus.sdo_transfer import Transfer, nothing, read, write
 from drivers.bus.sender import StillLeaving
 from drivers.bus.written import Written
 from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
@@ -25,7 +24,6 @@ from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
 T = TypeVar("T")
 
 READ_ATTEMPTS = 3
-INBOX = 64  # responses that wait for the worker; what comes beyond is lost, which is as if it never came
 OUT_OF_SYNC = 3  # attempts in a row to bring a node in sync that does send something
 _UNKNOWN = "whether the device took it is not known, read it back"
 
@@ -46,57 +44,12 @@ class SdoProtocolBroken(DeviceTimeout):
     """The device answered, but not as the SDO protocol says: nothing is known about the transfer."""
 
 
-@dataclass(slots=True)
-class SdoCounters:
-    """What happened on one channel."""
-
-    transfers: int = 0
-    timeouts: int = 0
-    aborts: int = 0
-    stale: int = 0  # responses that belonged to no request
-    doubled: int = 0  # of these, second answers to one of the last requests
-    resyncs: int = 0  # times that something else was read first, because answers might have been late
-    dropped: int = 0  # responses that nobody fetched in time
-
-
-def _nothing() -> str | None:
-    return None
-
-
 def _always() -> bool:
     return True
 
 
-def _interrupted() -> None:
+def _end() -> None:
     raise Interrupted
-
-
-@dataclass(slots=True)
-class _Transfer(Generic[T]):
-    begin: Callable[[], Generator[bytes, bytes, T]]
-    index: int
-    subindex: int
-    what: str
-    timeout_s: float
-    data: bytes | None = None  # what it writes
-    permitted: Callable[[], str | None] = _nothing
-    request: Request | None = None  # the last one that was sent
-
-    @property
-    def about(self) -> bytes:
-        return sdo.multiplexer(self.index, self.subindex)
-
-    @property
-    def late_answer(self) -> bytes | None:
-        """To a read that was given up, and all of it."""
-        asked = self.request
-        if asked is None or asked.answer is None or not sdo.concludes(asked.answer, asked.frame):
-            return None
-        return asked.answer
-
-    @property
-    def write_begun(self) -> bool:
-        return self.data is not None and self.request is not None
 
 
 class SdoChannel:
@@ -107,7 +60,7 @@ class SdoChannel:
         label: str,
         outlet: Outlet,
         timeout_s: float,
-        distrust: Callable[[], str | None] = _nothing,
+        distrust: Callable[[], str | None] = nothing,
     ) -> None:
         """`distrust` says why not to write."""
         self.label = label
@@ -115,23 +68,22 @@ class SdoChannel:
         self.counters = SdoCounters()
         self._outlet = outlet
         self._distrust = distrust
-        self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._interrupted = threading.Event()
         self._sending = threading.Lock()  # so that nothing goes out behind what interrupted it
         self._in_flight: tuple[int, int] | None = None  # the object that a transfer is about
         self._ahead: Request | None = None  # went out before the job that waits for its answer
         self._outstanding = Outstanding()
-        self._doubles = Doubles()
+        self._answers = Answers(self._outstanding, self.counters)
         self._unassigned = 0  # failed attempts to bring it in sync, in a row
         self._written = Written()
         self._urgent = False
         self._current: Callable[[], bool] = _always
-        self._pause: Callable[[], None] = _interrupted
+        self._pause: Callable[[], None] = _end
 
     @property
     def doubled(self) -> bool:
         """Whether its requests are answered twice, each of them."""
-        return self._doubles.found
+        return self._answers.doubled
 
     @property
     def out_of_sync(self) -> bool:
@@ -158,12 +110,8 @@ class SdoChannel:
 
     def on_response(self, _stamp_ns: int, data: bytes) -> None:
         """A frame with the identifier of this channel's responses; called in the bus's thread."""
-        if len(data) != 8:
-            return
-        if self._inbox.qsize() >= INBOX:
-            self.counters.dropped += 1
-        else:
-            self._inbox.put(data)
+        if len(data) == 8:
+            self._answers.put(data)
 
     def interrupt(self, ahead: bytes | None = None) -> None:
         """End the transfer in flight, refuse further ones until `resume`, and send a request `ahead`.
@@ -185,14 +133,14 @@ class SdoChannel:
 
     def wake(self) -> None:
         """Let a job that waits for an answer look whether it was interrupted."""
-        self._inbox.put(None)
+        self._answers.wake()
 
     def resume(
         self,
         *,
         urgent: bool = False,
         current: Callable[[], bool] = _always,
-        pause: Callable[[], None] = _interrupted,
+        pause: Callable[[], None] = _end,
     ) -> None:
         """Allow transfers again, to one job.
 
@@ -210,7 +158,7 @@ class SdoChannel:
         """The node has booted: it has forgotten what it was asked and given."""
         self._outstanding.forget()
         self._written.forget()
-        self._doubles = Doubles()
+        self._answers.forget_doubles()
         self._unassigned = 0
 
     # Transfers.
@@ -222,13 +170,11 @@ class SdoChannel:
 
         What it returns, the device held after this was called.
         """
-        what = f"{self.label}: reading 0x{index:04X}:{subindex:02X}"
-        steps = partial(sdo.upload, index, subindex)
-        read = _Transfer(steps, index, subindex, what, timeout_s or self.timeout_s)
+        transfer = read(self.label, index, subindex, timeout_s or self.timeout_s)
         for _ in range(attempts - 1):
             with contextlib.suppress(DeviceTimeout):
-                return self._perform(read)
-        return self._perform(read)
+                return self._perform(transfer)
+        return self._perform(transfer)
 
     def download(
         self,
@@ -244,29 +190,24 @@ class SdoChannel:
         anything that interrupts this. It must return at once, and wait for nothing that such a caller has.
         Where it objects, nothing is sent and `NotPermitted` is raised.
         """
-        what = f"{self.label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
-        steps = partial(sdo.download, index, subindex, data)
-        may = permitted or _nothing
-        write = _Transfer(steps, index, subindex, what, timeout_s or self.timeout_s, data, may)
+        patience_s = timeout_s or self.timeout_s
+        transfer = write(self.label, index, subindex, data, patience_s, permitted or nothing)
         try:
-            self._perform(write)
+            self._perform(transfer)
         except DeviceAbort:
             self._written.withdraw()
             raise
-        except Interrupted as error:
-            if not write.write_begun:
+        except (Interrupted, DeviceTimeout, StillLeaving) as error:
+            if not transfer.write_begun:
                 raise
-            raise DeviceTimeout(f"{what}: interrupted by an urgent request; {_UNKNOWN}") from error
-        except (DeviceTimeout, StillLeaving) as error:
-            if not write.write_begun:
-                raise
-            raise DeviceTimeout(f"{error}; {_UNKNOWN}") from error
+            why = str(error) or f"{transfer.what}: interrupted by an urgent request"
+            raise DeviceTimeout(f"{why}; {_UNKNOWN}") from error
         else:
             self._written.confirm((index, subindex), data)
         finally:
             self._written.leave()
 
-    def _perform(self, transfer: _Transfer[T]) -> T:
+    def _perform(self, transfer: Transfer[T]) -> T:
         while True:
             try:
                 return self._attempt(transfer)
@@ -275,7 +216,7 @@ class SdoChannel:
                     raise
                 self._pause()
 
-    def _attempt(self, transfer: _Transfer[T]) -> T:
+    def _attempt(self, transfer: Transfer[T]) -> T:
         self._check_interrupted()
         if not self._current():
             raise Unavailable(f"{transfer.what}: given up, the node began anew")
@@ -300,8 +241,8 @@ class SdoChannel:
             if transfer.request is not None:
                 transfer.request.given_up = True
 
-    def _run(self, transfer: _Transfer[T]) -> T:
-        self._fetch_waiting()
+    def _run(self, transfer: Transfer[T]) -> T:
+        self._answers.fetch_waiting()
         steps = transfer.begin()
         request = next(steps)
         answer = self._synchronise(transfer)
@@ -314,38 +255,42 @@ class SdoChannel:
             result: T = done.value
             return result
 
-    def _ask(self, transfer: _Transfer[Any], frame: bytes) -> bytes:
+    def _ask(self, transfer: Transfer[Any], frame: bytes) -> bytes:
         request = self._hand_over(transfer, frame)
         deadline = time.monotonic() + transfer.timeout_s
         while request.answer is None:
-            self._fetch(deadline)
+            self._answers.fetch(deadline)
             if request.answer is None:
                 self._check_interrupted()
         return request.answer
 
     # In sync.
 
-    def _synchronise(self, transfer: _Transfer[Any]) -> bytes | None:
+    def _synchronise(self, transfer: Transfer[Any]) -> bytes | None:
         """Return when an answer about the object can only be to what is asked now.
 
         Or with the answer, where it comes meanwhile, late, to what this very read has asked before.
         """
-        at_once = self._urgent and transfer.data is not None and len(transfer.data) <= sdo.EXPEDITED
-        deadline = time.monotonic() + transfer.timeout_s
-        self.counters.resyncs += not at_once and self._outstanding.holds(transfer.about)
-        while transfer.late_answer is None and not at_once and self._outstanding.holds(transfer.about):
-            self._read_another(transfer, deadline)
+        at_once = self._urgent and transfer.is_expedited_write
+        if self._is_ambiguous(transfer) and not at_once:
+            self.counters.resyncs += 1
+            deadline = time.monotonic() + transfer.timeout_s
+            while self._is_ambiguous(transfer):
+                self._read_another(transfer, deadline)
         return transfer.late_answer
 
-    def _read_another(self, transfer: _Transfer[Any], deadline: float) -> None:
-        """Until it is answered, or nothing more can be said about the transfer's own object."""
+    def _is_ambiguous(self, transfer: Transfer[Any]) -> bool:
+        """Whether its answer could be one to an earlier request."""
+        return self._outstanding.holds(transfer.about) and transfer.late_answer is None
+
+    def _read_another(self, transfer: Transfer[Any], deadline: float) -> None:
+        """Until it is answered, or it is known all the same what becomes of the transfer's own object."""
         index, subindex = self._outstanding.probe(transfer.about)
-        steps = sdo.upload(index, subindex)
-        probe = _Transfer(lambda: steps, index, subindex, transfer.what, transfer.timeout_s)
-        request = self._hand_over(probe, next(steps))
+        probe = read(self.label, index, subindex, transfer.timeout_s)
+        request = self._hand_over(probe, next(probe.begin()))
         try:
-            while request.answer is None and transfer.late_answer is None:
-                self._fetch(deadline)
+            while request.answer is None and self._is_ambiguous(transfer):
+                self._answers.fetch(deadline)
                 self._check_interrupted()
         except queue.Empty as error:
             self.counters.timeouts += 1
@@ -360,28 +305,9 @@ class SdoChannel:
         if request.answer is not None and not sdo.concludes(request.answer, request.frame):
             self._abort(probe, sdo.GENERAL_ERROR)  # its data is of no interest
 
-    def _fetch_waiting(self) -> None:
-        with contextlib.suppress(queue.Empty):
-            while True:
-                self._take(self._inbox.get_nowait())
-
-    def _fetch(self, deadline: float) -> None:
-        """Take the next response; raises `queue.Empty` at the deadline."""
-        self._take(self._inbox.get(timeout=max(0.0, deadline - time.monotonic())))
-
-    def _take(self, response: bytes | None) -> None:
-        if response is None:
-            return
-        if self._outstanding.settle(response) is not None:
-            self._doubles.answered(response)
-            return
-        self.counters.stale += 1
-        if not self._outstanding.is_lost(response):
-            self.counters.doubled += self._doubles.again(response)
-
     # What goes out.
 
-    def _hand_over(self, transfer: _Transfer[Any], frame: bytes) -> Request:
+    def _hand_over(self, transfer: Transfer[Any], frame: bytes) -> Request:
         """Send a request, and return when the bus has it; nobody waits for that with the lock."""
         begins = transfer.data is not None and transfer.request is None
         with self._sending:
@@ -402,7 +328,7 @@ class SdoChannel:
         return request
 
     def _offer(
-        self, transfer: _Transfer[Any], frame: bytes, *, begins: bool
+        self, transfer: Transfer[Any], frame: bytes, *, begins: bool
     ) -> tuple[Request, Callable[[], bool]]:
         """Where it has to wait for its turn, it is asked again then whether it may go."""
 
@@ -417,7 +343,7 @@ class SdoChannel:
             raise
 
     def _await_sent(
-        self, transfer: _Transfer[Any], request: Request, sent: Callable[[], bool], *, begins: bool
+        self, transfer: Transfer[Any], request: Request, sent: Callable[[], bool], *, begins: bool
     ) -> None:
         try:
             if sent():
@@ -439,16 +365,16 @@ class SdoChannel:
         if begins:
             self._written.withdraw()
 
-    def _check_permitted(self, transfer: _Transfer[Any]) -> None:
+    def _check_permitted(self, transfer: Transfer[Any]) -> None:
         """Raise `NotPermitted` where a write that is about to begin must not."""
         why = self._objection(transfer)
         if why is not None:
             raise NotPermitted(f"{transfer.what}: not sent: {why}")
 
-    def _objection(self, transfer: _Transfer[Any]) -> str | None:
+    def _objection(self, transfer: Transfer[Any]) -> str | None:
         return transfer.permitted() or (None if self._urgent else self._distrust())
 
-    def _abort(self, transfer: _Transfer[Any], abort_code: int) -> None:
+    def _abort(self, transfer: Transfer[Any], abort_code: int) -> None:
         with self._sending:
             if not self._interrupted.is_set():  # else it was sent, and something else is in flight
                 self._end_transfer(transfer.index, transfer.subindex, abort_code)
@@ -460,9 +386,3 @@ class SdoChannel:
     def _check_interrupted(self) -> None:
         if self._interrupted.is_set():
             raise Interrupted
-
-
-def value_text(data: bytes) -> str:
-    """Bytes as a number where they can be one: `5000 (88 13)`."""
-    number = f"{int.from_bytes(data, 'little')} " if len(data) in (1, 2, 4, 8) else ""
-    return f"{number}({data[:16].hex(' ')}{' …' if len(data) > 16 else ''})"

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus.sdo_channel import INBOX, OUT_OF_SYNC, SdoChannel
+from drivers.bus.answers import INBOX
+from drivers.bus.sdo_channel import OUT_OF_SYNC, SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, Unavailable
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import ABSENT, AT_ONCE, CLOCK, LONG, VALUE, Fate, LateServer

@@ -1,0 +1,74 @@
+"""The responses of one SDO channel: fetched in their order, each assigned to the request that it answers."""
+
+import contextlib
+import queue
+import time
+from dataclasses import dataclass
+
+from drivers.bus.doubles import Doubles
+from drivers.bus.outstanding import Outstanding
+
+INBOX = 64  # responses that wait; what comes beyond is lost, which is as if it never came
+
+
+@dataclass(slots=True)
+class SdoCounters:
+    """What happened on one channel."""
+
+    transfers: int = 0
+    timeouts: int = 0
+    aborts: int = 0
+    stale: int = 0  # responses that belonged to no request
+    doubled: int = 0  # of these, second answers to one of the last requests
+    resyncs: int = 0  # times that something else was read first, because an answer might have been late
+    dropped: int = 0  # responses that nobody fetched in time
+
+
+class Answers:
+    """Put in by the bus's thread, fetched by that of the transfers."""
+
+    def __init__(self, outstanding: Outstanding, counters: SdoCounters) -> None:
+        self._outstanding = outstanding
+        self._counters = counters
+        self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._doubles = Doubles()
+
+    @property
+    def doubled(self) -> bool:
+        """Whether requests are answered twice, each of them."""
+        return self._doubles.found
+
+    def forget_doubles(self) -> None:
+        """They were another life's."""
+        self._doubles = Doubles()
+
+    def put(self, response: bytes) -> None:
+        """A response has come."""
+        if self._inbox.qsize() >= INBOX:
+            self._counters.dropped += 1
+        else:
+            self._inbox.put(response)
+
+    def wake(self) -> None:
+        """Let `fetch` return."""
+        self._inbox.put(None)
+
+    def fetch_waiting(self) -> None:
+        """Assign all that have come."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._assign(self._inbox.get_nowait())
+
+    def fetch(self, deadline: float) -> None:
+        """Wait for the next one and assign it; raises `queue.Empty` at the deadline."""
+        self._assign(self._inbox.get(timeout=max(0.0, deadline - time.monotonic())))
+
+    def _assign(self, response: bytes | None) -> None:
+        if response is None:
+            return
+        if self._outstanding.settle(response) is not None:
+            self._doubles.answered(response)
+            return
+        self._counters.stale += 1
+        if not self._outstanding.is_lost(response):
+            self._counters.doubled += self._doubles.again(response)
