@@ -38,6 +38,11 @@ class Answers:
         """Whether requests are answered twice, each of them."""
         return self._doubles.found
 
+    @property
+    def perhaps_doubled(self) -> bool:
+        """Whether the last one was, and it must be seen whether the next are."""
+        return self._doubles.suspected
+
     def forget_doubles(self) -> None:
         """They were another life's."""
         self._doubles = Doubles()

@@ -23,6 +23,11 @@ class Doubles:
         self._recent: deque[_Answered] = deque()
         self._clean = 0
 
+    @property
+    def suspected(self) -> bool:
+        """The last answer came twice; the next ones will tell."""
+        return not self.found and bool(self._recent) and self._recent[-1].twice
+
     def answered(self, answer: bytes) -> None:
         """A request was answered by this."""
         if not sdo.names_object(answer):

@@ -25,6 +25,7 @@ T = TypeVar("T")
 
 READ_ATTEMPTS = 3
 OUT_OF_SYNC = 3  # attempts in a row to bring a node in sync that does send something
+SECOND_LOOKS = 2  # reads before a write, where the last answer came twice: the first one's second may be slow
 _UNKNOWN = "whether the device took it is not known, read it back"
 
 
@@ -271,25 +272,29 @@ class SdoChannel:
 
         Or with the answer, where it comes meanwhile, late, to what this very read has asked before.
         """
-        at_once = self._urgent and transfer.is_expedited_write
-        if self._is_ambiguous(transfer) and not at_once:
+        if self._urgent and transfer.is_expedited_write:
+            return None
+        deadline = time.monotonic() + transfer.timeout_s
+        if self._is_ambiguous(transfer):
             self.counters.resyncs += 1
-            deadline = time.monotonic() + transfer.timeout_s
             while self._is_ambiguous(transfer):
-                self._read_another(transfer, deadline)
+                self._read_another(transfer, deadline, lambda: self._is_ambiguous(transfer))
+        if transfer.data is not None and self._answers.perhaps_doubled:
+            for _ in range(SECOND_LOOKS):
+                self._read_another(transfer, deadline, _always)
         return transfer.late_answer
 
     def _is_ambiguous(self, transfer: Transfer[Any]) -> bool:
         """Whether its answer could be one to an earlier request."""
         return self._outstanding.holds(transfer.about) and transfer.late_answer is None
 
-    def _read_another(self, transfer: Transfer[Any], deadline: float) -> None:
-        """Until it is answered, or it is known all the same what becomes of the transfer's own object."""
+    def _read_another(self, transfer: Transfer[Any], deadline: float, needed: Callable[[], bool]) -> None:
+        """Until it is answered, or no longer needed."""
         index, subindex = self._outstanding.probe(transfer.about)
         probe = read(self.label, index, subindex, transfer.timeout_s)
         request = self._hand_over(probe, next(probe.begin()))
         try:
-            while request.answer is None and self._is_ambiguous(transfer):
+            while request.answer is None and needed():
                 self._answers.fetch(deadline)
                 self._check_interrupted()
         except queue.Empty as error:

@@ -98,9 +98,9 @@ def test_after_a_boot_it_is_asked_again_what_it_is(gait: CanDevice, channel: str
     with FakeNode(channel, 5, dict(OBJECTS)) as fake:
         gait.start()
         until(lambda: gait.node.ready)
-        fake.objects[0x1018, 2] = b"\x43\0\0\0"
+        fake.objects[0x1018, 2], begun = b"\x43\0\0\0", gait.node.boots_begun
         fake.boot_up()
-        until(lambda: gait.node.life.boots)
+        until(lambda: gait.node.boots_begun > begun)
         refusal(gait)
         until(lambda: gait.node.ready)
         assert "0x43" in refusal(gait)
@@ -140,13 +140,25 @@ def test_once_there_is_but_one_again_it_is_written_again(gait: CanDevice, channe
         assert fake.writes == [(*STEP, b"\xa4\x01")]
 
 
+def test_a_device_that_boots_is_not_held_to_be_two_any_more(gait: CanDevice, channel: str) -> None:
+    with FakeNode(channel, 5, dict(OBJECTS), repeat_replies=2) as fake:
+        gait.start()
+        until(lambda: gait.node.upload(*STEP).result(WAIT_S) and gait.node.ready and gait.node.distrust)
+        fake.repeat_replies, begun = 1, gait.node.boots_begun
+        fake.boot_up()
+        until(lambda: gait.node.boots_begun > begun and gait.node.ready)
+        gait.node.download(*STEP, b"\xa4\x01").result(WAIT_S)
+        gait.stop()
+        assert fake.writes == [(*STEP, b"\xa4\x01")]
+
+
 def test_an_answer_that_comes_twice_now_and_then_changes_nothing(gait: CanDevice, channel: str) -> None:
     with FakeNode(channel, 5, dict(OBJECTS)) as fake:
         gait.start()
         until(lambda: gait.node.ready)
 
         def repeat_some(request: bytes) -> None:
-            fake.repeat_replies = 2 if request[0] == 0x40 and request[1] == STEP[0] & 0xFF else 1
+            fake.repeat_replies = 2 if request[:3] == b"\x40\x01\x20" else 1
 
         fake.on_request = repeat_some
         for _ in range(10):

@@ -176,6 +176,24 @@ def test_a_refusal_of_the_other_object_is_an_answer_too() -> None:
     assert number(server.channel.upload(CLOCK, 0)) == 3
 
 
+def test_a_device_that_answers_it_in_segments_is_told_that_they_are_not_wanted() -> None:
+    server = LateServer(iter([LOST]))
+    ended: list[bytes] = []
+    hear = server.hear
+
+    def segmented(request: bytes) -> None:
+        if request[0] == 0x80:
+            ended.append(request[1:4])
+        if request[:3] == b"\x40\x00\x10":
+            server.channel.on_response(0, b"\x41" + request[1:4] + (4).to_bytes(4, "little"))
+        else:
+            hear(request)
+
+    server.channel._outlet = Direct(segmented)
+    server.channel.upload(CLOCK, 0)
+    assert ended == [b"\x00\x20\x00", b"\x00\x10\x00"]
+
+
 def test_where_nothing_tells_which_answer_is_which_it_is_said_and_the_object_not_asked() -> None:
     server = LateServer(itertools.repeat(LOST))
     with pytest.raises(DeviceTimeout, match="reading 0x2000:00: no answer"):
@@ -339,6 +357,22 @@ def test_second_answers_are_counted() -> None:
         server.channel.upload(CLOCK, 0)
         server.channel.upload(VALUE, 0)
     assert server.channel.counters.doubled == 5  # the last is not fetched yet
+
+
+def test_a_write_after_an_answer_that_came_twice_waits_until_it_is_seen_whether_all_do() -> None:
+    """The first that two devices get must not be the one that shows that they are two."""
+    server = LateServer(itertools.chain([Fate(copies=2)], itertools.repeat(AT_ONCE)))
+    server.channel.upload(CLOCK, 0)
+    server.channel.download(VALUE, 0, NEW)
+    assert len(server.asked()) == 4, "once was by chance"
+    server.channel.download(VALUE, 0, OLD)
+    assert len(server.asked()) == 5
+    seen: list[tuple[int, bool]] = []
+    server.on_request = lambda request: seen.append((request[0], server.channel.doubled))
+    server.fates = itertools.repeat(Fate(copies=2))
+    server.channel.upload(CLOCK, 0)
+    server.channel.download(VALUE, 0, NEW)
+    assert [doubled for command, doubled in seen if command == 0x23] == [True]
 
 
 def test_a_value_is_known_once_the_device_has_confirmed_it() -> None:
