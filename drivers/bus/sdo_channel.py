@@ -91,11 +91,6 @@ class SdoChannel:
         """Whether something answers, but nobody can say to which request."""
         return self._unassigned >= OUT_OF_SYNC
 
-    @property
-    def written(self) -> dict[tuple[int, int], bytes]:
-        """What the device has confirmed to hold since it came up."""
-        return self._written.confirmed()
-
     def known(self, index: int, subindex: int, otherwise: bytes | None = None) -> bytes | None:
         """What the device has confirmed to hold since it came up, `otherwise` where nothing was written.
 

@@ -22,10 +22,6 @@ class Written:
         value = self._confirmed.get(key, otherwise)
         return None if key in self._unsure else value  # a write may have begun in between
 
-    def confirmed(self) -> dict[Object, bytes]:
-        """A copy of all that is known."""
-        return dict(self._confirmed)
-
     def is_unsure(self, key: Object) -> bool:
         """Whether it was written, and nobody knows whether the device took it."""
         return key in self._unsure

@@ -94,6 +94,21 @@ def test_nothing_is_written_before_it_was_asked_what_it_is(gait: CanDevice, chan
         assert fake.writes == [(*STEP, b"\xa4\x01")]
 
 
+def test_nothing_is_written_to_one_that_has_booted_and_not_said_yet_what_it_is(
+    gait: CanDevice, channel: str
+) -> None:
+    with FakeNode(channel, 5, dict(OBJECTS)) as fake:
+        gait.start()
+        until(lambda: gait.node.ready)
+        fake.silent, begun = True, gait.node.boots_begun
+        fake.boot_up()
+        until(lambda: gait.node.boots_begun > begun)
+        with pytest.raises(NotPermitted, match="not come up"):
+            gait.node.download(*STEP, b"\xa4\x01").result(WAIT_S)
+        gait.stop()
+        assert fake.writes == []
+
+
 def test_after_a_boot_it_is_asked_again_what_it_is(gait: CanDevice, channel: str) -> None:
     with FakeNode(channel, 5, dict(OBJECTS)) as fake:
         gait.start()
