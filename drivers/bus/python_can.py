@@ -1,7 +1,9 @@
 """Any interface that python-can knows, from slcan to virtual."""
 
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import can
 
@@ -10,6 +12,7 @@ from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 
 _NEVER_BLOCKS = ("virtual",)
+WRITE_S = 0.1  # how long an adapter may take for one frame, also for its last one
 
 
 class PythonCanTransport:
@@ -28,6 +31,8 @@ class PythonCanTransport:
             self._bus = can.Bus(settings.channel, settings.interface, ignore_config=True, **keys)
         except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
             raise Unavailable(f"{self._where} cannot be opened: {error}") from error
+        for port in self._serial_ports():
+            port.write_timeout = WRITE_S
 
     def receive(self, timeout_s: float) -> Sequence[Frame]:
         try:
@@ -46,7 +51,7 @@ class PythonCanTransport:
             data=None if can_id & REMOTE else data,
         )
         try:
-            self._bus.send(message, None if self.blocks else 0)
+            self._bus.send(message, WRITE_S if self.blocks else 0)
         except (can.CanError, OSError, ValueError) as error:
             raise Unavailable(f"{self._where} does not send: {error}") from error
         return True
@@ -61,7 +66,20 @@ class PythonCanTransport:
         """Most interfaces filter in Python, which costs more than it saves."""
 
     def close(self) -> None:
-        self._bus.shutdown()
+        """An adapter that does not take even its last word is let go all the same."""
+        try:
+            self._bus.shutdown()
+        except OSError as error:
+            raise Unavailable(f"{self._where} was not closed by its adapter: {error}") from error
+        finally:
+            for port in self._serial_ports():
+                port.close()
+
+    def _serial_ports(self) -> Iterator[Any]:
+        """Of an adapter on one; pyserial would write to it for ever."""
+        serial = sys.modules.get("serial")
+        if serial is not None:
+            yield from (one for one in vars(self._bus).values() if isinstance(one, serial.Serial))
 
 
 def _identifier(message: can.Message) -> int:
