@@ -8,6 +8,7 @@ import operator
 from dataclasses import dataclass
 from enum import Enum
 
+from drivers.bus.values import size_of
 from eds.datatypes import DATA_TYPES
 from gateway.coding import Coding, CodingError, Number, text
 from gateway.config import ParameterSettings
@@ -143,6 +144,20 @@ class Parameter:
             raise self.refusal(Kind.OUT_OF_LIMIT, str(error)) from error
         self._check_limits(self.decode(data), f", which is what the device would hold of {text(value)},")
         return data
+
+    def accepts(self, data: bytes) -> Number:
+        """The value of bytes that may be written as they are: what a device held before.
+
+        Raises:
+            RpcError: read_only, not_allowed, mismatch or out_of_limit.
+
+        """
+        self.check_writable()
+        if len(data) != size_of(self.data_type):
+            raise self.refusal(Kind.MISMATCH, f"{data.hex(' ')} is no {self.coding.type.name}")
+        value = self.decode(data)
+        self._check_limits(value, "")
+        return value
 
     def decode(self, data: bytes) -> Number:
         """The value that the device's bytes mean; raises `RpcError` (mismatch) where they mean none."""
