@@ -5,18 +5,20 @@ the device.
 """
 
 import threading
-from collections.abc import Callable
-from concurrent.futures import Future
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
+from gateway.futures import outcome
 from gateway.modules.parameters import Parameter
 from gateway.modules.stop.authority import Address
 from gateway.wire import Kind, RpcError, refuse
 
 T = TypeVar("T")
+K = TypeVar("K")
 
 ANSWER_S = 3.0  # longer than the drivers' own time-outs: beyond, something urgent, a stop, has the device
 PATIENCE = 3  # times the usual, for an answer that must be known
@@ -63,13 +65,25 @@ class Change:
         return self.parameter.name
 
 
-def result(future: "Future[T]", timeout_s: float = ANSWER_S) -> T:
+def result(future: "Future[T]", more_s: float = 0.0) -> T:
     """What comes of it; raises `TimeoutError`, and asks no more, where that takes too long."""
     try:
-        return future.result(timeout_s)
+        return future.result(ANSWER_S + more_s)
     except TimeoutError:
         future.cancel()
         raise
+
+
+def results(futures: "Mapping[K, Future[T]]") -> "dict[K, T | Exception]":
+    """What comes of all of them, in the time of one; an error stands in its place as itself."""
+    wait(futures.values(), ANSWER_S)
+    found: dict[K, T | Exception] = dict.fromkeys(futures, TimeoutError("no answer"))
+    for key, future in futures.items():
+        if future.done():
+            told = outcome(future)
+            found[key] = told
+        future.cancel()
+    return found
 
 
 def read(parameter: Parameter, node: Node) -> bytes:
@@ -116,10 +130,7 @@ def download(
         return "nobody waits for it any more" if given_up.is_set() else objection(address)
 
     try:
-        result(
-            node.download(index, subindex, data, timeout_s, permitted=permitted),
-            ANSWER_S + (timeout_s or 0.0),
-        )
+        result(node.download(index, subindex, data, timeout_s, permitted=permitted), timeout_s or 0.0)
     except TimeoutError:
         given_up.set()
         raise

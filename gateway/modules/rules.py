@@ -5,13 +5,12 @@ the allowed states of the drives that they may move.
 """
 
 import time
-from collections.abc import Iterable, Mapping
-from concurrent.futures import Future, wait
+from collections.abc import Collection, Iterable, Mapping
+from concurrent.futures import Future
 from typing import Any
 
 from drivers.bus.settings import DeviceSettings
 from drivers.bus.values import unsigned
-from drivers.errors import DriverError
 from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
 from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
@@ -19,7 +18,7 @@ from drivers.joint.settings import JointSettings
 from gateway.coding import too_far
 from gateway.config import RobotConfig
 from gateway.modules.component import ComponentModule
-from gateway.modules.objects import ANSWER_S, Node, result
+from gateway.modules.objects import Node, results
 from gateway.modules.parameters import Parameter
 from gateway.modules.stop.authority import Address
 from gateway.records.undo import UndoChange
@@ -129,28 +128,23 @@ class Rules:
                 text = f"the state of {drive} is {said}; this parameter may be written in: {wanted}"
                 raise parameter.refusal(Kind.WRONG_STATE, text)
 
-    def states(self, drives: Iterable[str]) -> dict[str, Known]:
+    def states(self, drives: Collection[str]) -> dict[str, Known]:
         """Each drive's state as it says now, all of them asked at once."""
-        asked = {drive: self._ask(drive) for drive in drives}
-        wait([answer for answer in asked.values() if answer is not None], ANSWER_S)
-        return {drive: self._told(drive, answer) for drive, answer in asked.items()}
+        components = self._component.robot.components
+        told = results({drive: self._ask(drive) for drive in drives if drive in components})
+        return {drive: self._known(drive, told.get(drive)) for drive in drives}
 
-    def _ask(self, drive: str) -> "Future[bytes] | None":
-        component: Any = self._component.robot.components.get(drive)
-        if component is None:
-            return None
+    def _ask(self, drive: str) -> "Future[bytes]":
+        component: Any = self._component.robot.components[drive]
         index = STATUSWORD + AXIS_OFFSET * self._config.joint[drive].axis
         answer: Future[bytes] = component.node.upload(index, 0)
         return answer
 
-    def _told(self, drive: str, answer: "Future[bytes] | None") -> Known:
-        if answer is None:
-            return None, self._component.absent.get(drive, "it is not there")
-        try:
-            statusword = unsigned(result(answer, 0.0))
-        except (DriverError, TimeoutError) as error:
-            return None, str(error) or "no answer"
-        return drive_state(statusword), f"its statusword is 0x{statusword:04X}"
+    def _known(self, drive: str, told: bytes | Exception | None) -> Known:
+        if isinstance(told, bytes):
+            statusword = unsigned(told)
+            return drive_state(statusword), f"its statusword is 0x{statusword:04X}"
+        return None, self._component.absent.get(drive, "it is not there") if told is None else str(told)
 
 
 def allowed_states(parameter: Parameter) -> frozenset[DriveState] | None:

@@ -7,12 +7,12 @@ be written now stays to be taken back, and so does what nobody knows.
 """
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import wait
 from contextlib import suppress
 from dataclasses import dataclass
 
+from drivers.bus.values import size_of
 from drivers.errors import DeviceTimeout, DriverError, Mismatch, NotPermitted
-from gateway.modules.objects import ANSWER_S, Node, ask_patiently, download, result
+from gateway.modules.objects import Node, ask_patiently, download, result, results
 from gateway.modules.parameters import Parameter
 from gateway.modules.rules import OutOfReach, Rules
 from gateway.modules.stop.authority import LOCKED, Address, Authority
@@ -102,7 +102,7 @@ class Attempt:
         if self._is_written_again(change.address):
             raise _NotYet("not yet: a later write of it is to be taken back first")
         before = bytes.fromhex(change.before)
-        held = self._read(change, node)
+        held = self._read(change, parameter, node)
         if held == before:
             return UNCHANGED
         if held.hex() not in (change.written, change.made or change.written):
@@ -114,7 +114,7 @@ class Attempt:
         self._check_states(parameter)
         with suppress(TimeoutError):  # what the device holds now is what counts
             download(node, change.address, before, self._objection)
-        held = self._read(change, node)
+        held = self._read(change, parameter, node)
         if held != before:
             raise Mismatch(f"{before.hex(' ')} was written back, the device holds {held.hex(' ')}")
         return TAKEN_BACK
@@ -130,7 +130,7 @@ class Attempt:
         if same in self._refused:
             raise _NotYet(self._refused[same])
 
-    def _read(self, change: UndoChange, node: Node) -> bytes:
+    def _read(self, change: UndoChange, parameter: Parameter, node: Node) -> bytes:
         place = change.bus, change.node_id
         if place in self._silent:
             raise DeviceTimeout(self._silent[place])
@@ -139,7 +139,7 @@ class Attempt:
         except TimeoutError as error:
             self._silent[place] = _words(error)
             raise
-        return data[: len(change.before) // 2]
+        return data[: size_of(parameter.data_type)]  # some devices answer with more
 
     def _find_silent(self, changes: Sequence[UndoChange]) -> None:
         """Several that are dead take no longer than one: each node is asked, all of them at once."""
@@ -148,14 +148,8 @@ class Attempt:
         for place, change in first.items() if len(first) > 1 else ():
             with suppress(OutOfReach):
                 asked[place] = ask_patiently(self._rules.reach(change)[1], change.address)
-        wait(asked.values(), ANSWER_S)
-        for place, answer in asked.items():
-            try:
-                result(answer, 0.0)
-            except TimeoutError as error:
-                self._silent[place] = _words(error)
-            except DriverError:
-                continue  # it answers
+        told = results(asked)
+        self._silent = {place: _words(one) for place, one in told.items() if isinstance(one, TimeoutError)}
 
 
 def _left_alone(change: UndoChange, held: bytes) -> str:

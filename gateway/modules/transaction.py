@@ -81,6 +81,8 @@ class Transaction:
         try:
             for change in self._changes:
                 self._apply(change)
+            for change in self._changes:
+                self._check_leave(change)  # a stop may have come with the last download
             self._ledger.done()
         except RpcError as error:
             raise self._roll_back(error) from error

@@ -137,10 +137,10 @@ class Journal:
         file = self.path.open("a+b", buffering=0)
         try:
             said = self._take_up(file)
+            durable.sync_folder(self.path.parent)
         except BaseException:
             file.close()
             raise
-        durable.sync_folder(self.path.parent)
         self._file = file
         if said is not None:
             log.warning("the journal %s: %s", self.path, said)
