@@ -17,6 +17,7 @@ MOST_STARTS = "StartLimitBurst=30"
 _WATCHED = "Restart=on-failure\nRestartSec=1\nWatchdogSec=10\nCPUWeight=500"
 _CALLED = "Restart=on-abnormal\nRestartSec=1\nCPUWeight=20"  # with a wrong file it waits for the next client
 _BOUNDS = "MemoryMax=256M\nTasksMax=64\nLimitNOFILE=8192\nEnvironment=MALLOC_ARENA_MAX=1"
+_URGENT = "LimitRTPRIO=30\nLimitMEMLOCK=infinity"  # for the threads that stop the drives
 
 # What a gateway can do without. It reads other processes and serial ports, and speaks CAN and TCP.
 _HARDENED = """\
@@ -84,7 +85,7 @@ class Service:
             f"ExecStart={self._command}",
             _WATCHED if self.at_boot else _CALLED,
         ]
-        lines += [_BOUNDS, _HARDENED_USER if self.of_user else f"{self._account}\n{_HARDENED}"]
+        lines += [_BOUNDS, _URGENT, _HARDENED_USER if self.of_user else f"{self._account}\n{_HARDENED}"]
         return "\n".join(lines) + "\n" + (self._wanted if self.at_boot else "")
 
     @property

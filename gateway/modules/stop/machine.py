@@ -220,16 +220,18 @@ def unproved(state: State, findings: Mapping[str, Finding]) -> Iterator[str]:
 
 def table() -> str:
     """`TRANSITIONS` as a table in Markdown, for people: one row an input, one column a phase."""
-    lines = [["", *(f"**{phase}**" for phase in Phase)]]
+    lines = [["", *(f"**{phase}**" for phase in Phase)], ["---"] * (len(Phase) + 1)]
     lines += [[str(one), *(_cell(phase, one) for phase in Phase)] for one in Input]
     rows = [f"| {' | '.join(cells)} |" for cells in lines]
-    done = [f"{number} {action}" for number, action in enumerate(Action, 1)]
-    return "\n".join([rows[0], "|---" * len(lines[0]) + "|", *rows[1:], "", "; ".join(done) + "."])
+    return "\n".join([*rows, "", "; ".join(f"{_sign(one)} {one}" for one in Action)])
 
 
 def _cell(phase: Phase, one: Input) -> str:
     row = TRANSITIONS[phase].get(one)
     if row is None:
-        return "refused" if phase in REFUSALS.get(one, {}) else "–"
-    numbers = "".join(str(list(Action).index(action) + 1) for action in row[1])
-    return f"{row[0]} {numbers}".strip()
+        return "refused" if phase in REFUSALS.get(one, {}) else ""
+    return " ".join([str(row[0]), *map(_sign, row[1])])
+
+
+def _sign(action: Action) -> str:
+    return "①②③④⑤⑥⑦⑧"[list(Action).index(action)]

@@ -9,6 +9,8 @@ import threading
 import time
 from collections.abc import Callable
 
+from gateway.modules.stop.memory import MemoryLock
+
 log = logging.getLogger(__name__)
 
 Work = Callable[[], object]
@@ -26,12 +28,14 @@ class StopThread:
         self._thread = threading.Thread(target=self._run, name="stop", daemon=True)
 
     def start(self) -> None:
+        MemoryLock.begin()
         self._thread.start()
 
     def close(self) -> None:
         """Do what was given, and end."""
         self._work.put(None)
         self._thread.join()
+        MemoryLock.end()
 
     def put(self, work: Work) -> None:
         """Do it as soon as can be; from any thread, never waits."""

@@ -211,7 +211,7 @@ class TestTrip:
 
         monkeypatch.setattr(bench.left, "quick_stop", fail)
         bend(bench, 2.5)
-        assert bench.right.stops >= 1
+        until(lambda: bench.right.stops >= 1, "stopped")
 
     def test_what_is_on_trial_is_taken_back(self, serve: Serve, bench: Bench) -> None:
         client = serve(LIMIT)

@@ -10,7 +10,7 @@ import pytest
 from gateway.config import ConfigError
 from gateway.modules.scheduling import Scheduling
 from gateway.modules.tasks import Schedule, Spent, Tasks
-from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config, serving
+from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config, serving, until
 from tests.unit.gateway.recorded import Process, Recorded, Thread, single
 
 MS = 1_000_000
@@ -66,25 +66,33 @@ def test_how_a_thread_is_scheduled(tasks: Tasks) -> None:
     assert (tasks.cores(40), tasks.cores(7), tasks.cores(8)) == ({1, 3, 4, 5}, {0, 1}, set())
 
 
-def test_real_threads_run_and_their_ends_are_noticed() -> None:
+@pytest.fixture
+def real() -> Iterator[Tasks]:
     tasks = Tasks()
+    yield tasks
+    tasks.close()
+
+
+def test_real_threads_run_and_their_ends_are_noticed(real: Tasks) -> None:
     ended = threading.Event()
     thread = threading.Thread(target=ended.wait)
     thread.start()
     try:
-        tasks.meet()
+        real.meet()
         me, other = (os.getpid(), os.getpid()), (os.getpid(), thread.native_id or 0)
-        before = tasks.look()
-        while tasks.look()[me].ran_ns < before[me].ran_ns + MS:
+        before = real.look()
+        while real.look()[me].ran_ns < before[me].ran_ns + MS:
             pass
         assert other in before
-        assert os.getpid() in tasks.named([tasks.name(os.getpid())])
+        assert os.getpid() in real.named([real.name(os.getpid())])
     finally:
         ended.set()
         thread.join()
-    tasks.meet()
-    assert other not in tasks.look()
-    tasks.close()
+    kernels = Path(f"/proc/self/task/{thread.native_id}")
+    until(lambda: not kernels.exists(), "the thread's end")  # Python's is told before the kernel's
+    assert other not in real.look()
+    real.meet()
+    assert thread.native_id not in real.threads(os.getpid())
 
 
 def test_a_control_process_and_its_threads_since_the_last_look(recorded: Recorded) -> None:

@@ -15,7 +15,7 @@ from ml.registry.registry import Registry
 from ml.serving.predictor import Prediction, Window, judged, replayed
 from ml.store import Store, StoreUnreachable
 from ml.store.objects import Objects
-from server_gui.core.prediction import following
+from server_gui.core.prediction import following, inbox
 from server_gui.core.prediction import predicting as module
 from server_gui.core.prediction.news import Serves
 from server_gui.core.prediction.predicting import Predicting
@@ -39,8 +39,9 @@ EVERY_NS = 100 * MS
 
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tests send at once what robots send in seconds: nothing of that is late."""
+    """Tests send at once what robots send in seconds: nothing of that is late, or too much to wait."""
     monkeypatch.setattr(following, "LATE_NS", 3_600_000 * MS)
+    monkeypatch.setattr(inbox, "MOST_NS", 3_600_000 * MS)
 
 
 def send(to: Predicting, rows: Floats, robot: str = ROBOT, begin_ns: int = 0) -> None:

@@ -1,0 +1,47 @@
+"""Keeps the process's pages in memory while drives can be stopped: none is fetched from a disk then."""
+
+import ctypes
+import os
+import resource
+import threading
+
+_CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall(2), asm-generic/mman.h
+
+
+class MemoryLock:
+    """Locked between the first `begin` and the last `end`: the lock belongs to the whole process."""
+
+    problem: str | None = None  # why it is not locked, in words
+    _lock = threading.Lock()
+    _held = 0
+
+    @classmethod
+    def begin(cls) -> None:
+        """Lock what is used now, and what is used from now on as soon as it is."""
+        with cls._lock:
+            if cls._held == 0:
+                cls.problem = _call("mlockall", _CURRENT | _FUTURE | _ON_FAULT) if _is_allowed() else _LIMITED
+            cls._held += 1
+
+    @classmethod
+    def end(cls) -> None:
+        with cls._lock:
+            cls._held -= 1
+            if cls._held == 0 and cls.problem is None:
+                _call("munlockall")
+
+
+_LIMITED = "memory is not locked: allow it with LimitMEMLOCK=infinity, or CAP_IPC_LOCK"
+
+
+def _is_allowed() -> bool:
+    """Under a limit, a lock on all that is to come would make later allocations fail instead."""
+    soft, _hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    return soft == resource.RLIM_INFINITY or os.geteuid() == 0
+
+
+def _call(name: str, *arguments: int) -> str | None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if getattr(libc, name)(*arguments) == 0:
+        return None
+    return f"memory is not locked ({os.strerror(ctypes.get_errno())})"
