@@ -181,6 +181,20 @@ def test_answers_that_fail_in_mid_transaction_leave_all_as_they_were_in_the_end(
     until(lambda: read(writer) == before, "as it was")
 
 
+def test_a_trial_ends_in_time_also_where_no_sample_comes(robot: SimulatedRobot, writer: Client) -> None:
+    """The drive answers SDO; that its position is missing is another matter."""
+    torque = robot.exoskeleton.drives["left_knee"].dictionary[KNEE_TORQUE]
+    before = torque.number()
+    ask(robot.folder.path, {"fault": "tpdo_silent", "on": "left_knee"})
+    quality = "component.snapshot"
+    until(lambda: writer.call(quality)["quality"]["left_knee"]["state"] == "lost", "it is not seen")
+    writer.call("parameter.write", changes={"left_knee.max_torque": 60.0}, trial_s=0.2)
+    assert torque.number() != before
+    until(lambda: writer.call("robot.describe")["trials"] == [], "its time was over")
+    assert torque.number() == before
+    assert writer.call(quality)["quality"]["left_knee"]["state"] == "lost"
+
+
 def test_a_write_goes_through_a_storm_of_emergencies(robot: SimulatedRobot, writer: Client) -> None:
     """8000h is the vendor's to define: the drive goes on."""
     ask(robot.folder.path, {"fault": "bus_load", "params": {"percent": 90, "cob_id": 0x081}})
