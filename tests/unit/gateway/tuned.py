@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from drivers.errors import DeviceTimeout
 from gateway.config import RobotConfig
 from gateway.futures import outcome
 from gateway.loop import Loop
@@ -23,8 +24,11 @@ from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoFile
 from gateway.registry import Context
 from gateway.wire import RpcError
-from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Bench, config
+from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Bench, FakeNode, config
 
+LONG_S = 100.0  # a trial that does not end by itself in a test
+STEP_LENGTH, CYCLE_TIME, TOE_HEIGHT = "gait.step_length", "gait.cycle_time", "gait.toe_height"
+MAX_TORQUE = "left_knee.max_torque"
 STEP: Address = ("main", 16, 0x2001, 0)
 CYCLE: Address = ("main", 16, 0x2002, 0)
 TOE: Address = ("main", 16, 0x2003, 0)
@@ -149,3 +153,48 @@ def held(bench: Bench, address: Address) -> int:
     """What a device holds, as a number."""
     node = {16: bench.gait, 2: bench.left, 5: bench.right}[address[1]].node
     return int.from_bytes(node.objects[address[2:]], "little")
+
+
+def drives(bench: Bench, statusword: int) -> None:
+    for drive in (bench.left, bench.right):
+        drive.set_state(statusword)
+
+
+def u16(value: int) -> bytes:
+    return value.to_bytes(2, "little")
+
+
+def somebody_writes(bench: Bench, address: Address, value: int) -> None:
+    bench.gait.node.objects[address[2:]] = u16(value)
+
+
+class Gate:
+    """Holds up the first download of an object in the writer's thread."""
+
+    def __init__(self, node: FakeNode, index: int) -> None:
+        self.reached, self._open = threading.Event(), threading.Event()
+        self._index = index
+        node.before_download = self._wait
+
+    def _wait(self, index: int, _data: bytes) -> None:
+        if index == self._index and not self.reached.is_set():
+            self.reached.set()
+            assert self._open.wait(DEADLINE_S)
+
+    def wait(self) -> None:
+        assert self.reached.wait(DEADLINE_S)
+
+    def open(self) -> None:
+        self._open.set()
+
+
+def silent_but_for(reads: int) -> Callable[[int], None]:
+    """A device that answers so many reads more."""
+    left = [None] * reads
+
+    def before_upload(_index: int) -> None:
+        if not left:
+            raise DeviceTimeout("no answer")
+        left.pop()
+
+    return before_upload
