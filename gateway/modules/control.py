@@ -122,14 +122,7 @@ class ControlModule:
 
     def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Future[messages.Written]":
         self._leases.require(session)
-        written = self._tuning.write(params.changes, session, params.trial_s)
-        return then(written, lambda answer: self._still_held(session, answer))
-
-    def _still_held(self, session: "Session", written: messages.Written) -> messages.Written:
-        """A lease that ended while its trial was being written did not take it back."""
-        if written.trial_s is not None and not self._leases.held_by(session):
-            self._tuning.trials.revert_of(session, "the lease ended while it was written")
-        return written
+        return self._tuning.write(params.changes, session, params.trial_s)
 
     def _confirm(
         self, session: "Session", params: messages.WriteNumberParams

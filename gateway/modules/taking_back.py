@@ -71,6 +71,8 @@ class Attempt:
 
     def _objection(self, address: Address) -> str | None:
         """A stop is held, or has claimed the object meanwhile. From any thread."""
+        if address not in self._authority.locked:
+            return None
         undo = self._undos.get(self._write)
         claimed = undo is None or all(change.address != address for change in undo.changes)
         return LOCKED if claimed else self._authority.objection_to(address)

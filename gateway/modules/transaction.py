@@ -23,19 +23,21 @@ NOT_WRITTEN = "not written"
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """What one write may do: what it might when it was asked for, until a stop, or the gateway's end."""
+    """What one write may do: what it might when it was asked for, until a stop, or until nobody wants it."""
 
     permit: Permit
-    ending: Callable[[], bool]
+    overtaken: Callable[[], str | None]  # by what it has become pointless
 
     def objection(self, address: Address) -> str | None:
         """Why an object must not be written now, in words. From any thread."""
-        return ENDING if self.ending() else self.permit.objection(address)
+        return self.overtaken() or self.permit.objection(address)
 
     def kind(self, said: str) -> Kind:
         """What an objection means."""
-        kinds = {ENDING: Kind.UNAVAILABLE, self.permit.authority.frozen(): Kind.NOT_ALLOWED}
-        return kinds.get(said, Kind.STOPPED)
+        if said == ENDING:
+            return Kind.UNAVAILABLE
+        allowed = said not in (self.overtaken(), self.permit.authority.frozen())
+        return Kind.STOPPED if allowed else Kind.NOT_ALLOWED
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ class _Trial:
         self.ends_ns: int | None = None
         self.timer: Timer | None = None
         self.why: str | None = None
+        self.trying = False  # an attempt to take it back is under way
         self.problem: str | None = None
         self.outcome: dict[str, str] = {}
         self.retry_s = FIRST_RETRY_S
@@ -56,6 +57,14 @@ class _Trial:
         self.timer = timer
 
 
+class Coming:
+    """A trial that was asked for: who ends all trials, or those of its client, ends it before it begins."""
+
+    def __init__(self, session: "Session") -> None:
+        self.session = session
+        self.over: str | None = None  # why
+
+
 class Trials:
     """All trials of a robot. It belongs to the loop's thread, but for `claim` and `close`."""
 
@@ -69,8 +78,6 @@ class Trials:
         wrote: Callable[[Iterable[str]], None],
     ) -> None:
         """`changed` is told whenever `pending` may be another, `wrote` which parameters may be."""
-        self.reverts = 0  # how often all were taken back: a trial that was asked for before is, too
-        self._why_all = ""
         self._loop = loop
         self._writer = writer
         self._jobs = jobs
@@ -78,6 +85,7 @@ class Trials:
         self._changed = changed
         self._wrote = wrote
         self._closed = False
+        self._coming: set[Coming] = set()
         self._trials: dict[int, _Trial] = {}
         self._ended: OrderedDict[int, str] = OrderedDict()
 
@@ -89,23 +97,30 @@ class Trials:
     def infos(self) -> list[TrialInfo]:
         return [trial.info for trial in self._trials.values()]
 
-    def begin(
-        self, undo: Undo, trial_s: float, session: "Session", taken_over: Iterable[int], reverts: int
-    ) -> None:
-        """A write has succeeded on trial; it was asked for when `reverts` was this."""
+    def expect(self, session: "Session") -> Coming:
+        """A trial was asked for; what has been expected is `dismissed` in any case."""
+        coming = Coming(session)
+        self._coming.add(coming)
+        return coming
+
+    def dismiss(self, coming: Coming) -> None:
+        self._coming.discard(coming)
+
+    def begin(self, undo: Undo, trial_s: float, coming: Coming, taken_over: Iterable[int]) -> None:
+        """A write has succeeded on trial."""
         for other in taken_over:
             self._forget(other, f"it was taken over by write {undo.write}")
-        trial = self._trials[undo.write] = _Trial(undo, session)
+        trial = self._trials[undo.write] = _Trial(undo, coming.session)
         trial.ends_ns = time.monotonic_ns() + round(trial_s * 1e9)
         trial.set_timer(self._loop.call_later(trial_s, lambda: self._take_back(trial, "its time was over")))
         self._changed()
-        if reverts != self.reverts:
-            self._take_back(trial, self._why_all)
+        if coming.over is not None:
+            self._take_back(trial, coming.over)
 
     def take_up(self, undo: Undo, why: str, ready: "Future[None]", problem: str | None = None) -> None:
         """Take back what a failed roll-back or an ended gateway has left, once its devices are `ready`."""
         trial = self._trials[undo.write] = _Trial(undo, None)
-        trial.problem = problem
+        trial.why, trial.problem = why, problem
         ready.add_done_callback(lambda _ready: self._loop.call(lambda: self._take_back(trial, why)))
         self._changed()
 
@@ -135,15 +150,11 @@ class Trials:
 
     def revert_of(self, session: "Session", why: str) -> None:
         """Take back every trial of one client."""
-        for trial in tuple(self._trials.values()):
-            if trial.session is session:
-                self._take_back(trial, why)
+        self._revert(lambda one: one.session is session, why)
 
     def revert_all(self, why: str) -> None:
-        """Take back everything that is on trial, and what is being written to be."""
-        self.reverts, self._why_all = self.reverts + 1, why
-        for trial in tuple(self._trials.values()):
-            self._take_back(trial, why)
+        """Take back everything that is on trial."""
+        self._revert(lambda _one: True, why)
 
     def claim(self) -> "Future[None]":
         """A stop has set what stops the controllers: nothing of that is taken back. From any thread."""
@@ -157,6 +168,12 @@ class Trials:
 
     # In the loop's thread.
 
+    def _revert(self, chosen: "Callable[[_Trial | Coming], bool]", why: str) -> None:
+        for coming in filter(chosen, self._coming):
+            coming.over = coming.over or why
+        for trial in tuple(filter(chosen, self._trials.values())):
+            self._take_back(trial, why)
+
     def _end(self) -> None:
         for trial in self._trials.values():
             trial.set_timer(None)
@@ -168,8 +185,9 @@ class Trials:
             self._fail(trial, _ending())
         if self._closed or self._trials.get(write) is not trial:
             return
-        if trial.why is not None and trial.timer is None:
-            return  # an attempt is under way
+        if trial.trying:
+            return
+        trial.trying = True
         trial.why = said = trial.why or why
         trial.ends_ns = None
         trial.set_timer(None)
@@ -179,6 +197,7 @@ class Trials:
 
     def _attempted(self, trial: _Trial, ended: "Future[TakenBack | None]") -> None:
         write, found = trial.undo.write, outcome(ended)
+        trial.trying = False
         if found is None:  # it was confirmed, taken over or claimed before its turn came
             self._forget(write, "nothing of it was left to be taken back")
             self._changed()

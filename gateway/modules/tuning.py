@@ -9,6 +9,7 @@ import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -24,12 +25,12 @@ from gateway.modules.ledger import WriteLedger
 from gateway.modules.objects import Change, device_error
 from gateway.modules.parameters import Parameter
 from gateway.modules.rules import Rules
-from gateway.modules.stop.authority import Authority
+from gateway.modules.stop.authority import Authority, Permit
 from gateway.modules.stop.machine import Phase
 from gateway.modules.storage import Command, Storage
-from gateway.modules.transaction import Leave, Outcome, Transaction
+from gateway.modules.transaction import ENDING, Leave, Outcome, Transaction
 from gateway.modules.trial_jobs import TrialJobs
-from gateway.modules.trials import Trials
+from gateway.modules.trials import Coming, Trials
 from gateway.modules.writer import Turn, Writer
 from gateway.records.records import Records
 from gateway.records.undo import Undo
@@ -41,6 +42,24 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Changed = Callable[[], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """One write, and what it may do."""
+
+    changes: list[Change]
+    who: str
+    trial_s: float | None
+    coming: Coming
+    permit: Permit
+
+    @property
+    def over(self) -> str | None:
+        """Why a trial is pointless by now."""
+        if self.trial_s is None or self.coming.over is None:
+            return None
+        return f"its trial is over already: {self.coming.over}"
 
 
 class Tuning:
@@ -63,8 +82,8 @@ class Tuning:
         self._joints = tuple(config.joint)
         self._rules = Rules(config, component, self._parameters)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
-        self._writing: dict[int, list[Change]] = {}
-        self._ending = False
+        self._asked: set[_Asked] = set()  # writes that have not been answered
+        self._ending: str | None = None
         self._writer = Writer()
         jobs = TrialJobs(self._rules, authority, records, self._writer)
         self.trials = Trials(loop, self._writer, jobs, records.undo, changed, self._forget)
@@ -72,7 +91,7 @@ class Tuning:
 
     def close(self) -> None:
         """Take back what is being written, and end the writer's thread."""
-        self._ending = True
+        self._ending = ENDING
         self.trials.close()
         self._writer.close()
 
@@ -101,7 +120,7 @@ class Tuning:
 
     def enabling_objection(self, joints: Iterable[str]) -> str | None:
         """Why these drives must not be enabled now: what is on trial could not be taken back then."""
-        names = {one.name: "is being written" for some in self._writing.values() for one in some}
+        names = {one.name: "is being written" for asked in self._asked for one in asked.changes}
         for trial in self.trials.infos():
             how = f"is on trial (write {trial.write} of {trial.who}); confirm or revert that first"
             names |= dict.fromkeys(trial.values, how)
@@ -137,15 +156,16 @@ class Tuning:
         if len({change.parameter.name for change in changes}) != len(changes):
             raise refuse(Kind.BAD_PARAMS, "a parameter is written twice, by its name and by its address")
         ready = self._component.when_ready({one.parameter.component for one in changes})
-        begin = partial(self._begin, changes, self._leave(), session, trial_s, self.trials.reverts)
-        return then(ready, lambda _none: begin())
+        asked = _Asked(changes, session.who, trial_s, self.trials.expect(session), self._authority.permit())
+        self._asked.add(asked)
+        answer = then(ready, lambda _none: self._begin(asked))
+        answer.add_done_callback(lambda _answer: self._end(asked))
+        return answer
 
     def store(self, command: Command, who: str, component: str) -> "Future[Stored]":
         """Let a device keep its values, or forget them; see `Storage.run`."""
-        return self._storage.run(command, who, component, self._leave())
-
-    def _leave(self) -> Leave:
-        return Leave(self._authority.permit(), lambda: self._ending)
+        leave = Leave(self._authority.permit(), lambda: self._ending)
+        return self._storage.run(command, who, component, leave)
 
     # Reading
 
@@ -209,24 +229,22 @@ class Tuning:
             raise refuse(Kind.UNKNOWN_NAME, f"there is no parameter {name!r}; parameter.list has them all")
         return Change(parameter, self._rules.node(parameter), parameter.encode(value))
 
-    def _begin(
-        self,
-        changes: list[Change],
-        leave: Leave,
-        session: "Session",
-        trial_s: float | None,
-        reverts: int,
-    ) -> "Future[Written]":
-        self._check_enabling(changes)
-        number = next(self._numbers)
-        ledger = WriteLedger(self._records, self._rules.address, number, session.who, trial_s)
+    def _begin(self, asked: "_Asked") -> "Future[Written]":
+        self._check_enabling(asked.changes)
+        ledger = WriteLedger(
+            self._records, self._rules.address, next(self._numbers), asked.who, asked.trial_s
+        )
+        leave = Leave(asked.permit, lambda: self._ending or asked.over)
         let_pass = partial(self._writer.let_pass, Turn.WRITE)
-        transaction = Transaction(changes, self._rules, leave, ledger, let_pass)
-        self._forget(change.name for change in changes)
-        self._writing[number] = changes
+        transaction = Transaction(list(asked.changes), self._rules, leave, ledger, let_pass)
+        self._forget(change.name for change in asked.changes)
         ended = back(self._loop, self._writer.submit(transaction.run, Turn.WRITE))
-        ended.add_done_callback(lambda ended: self._follow(ledger, ended, session, reverts))
+        ended.add_done_callback(lambda ended: self._follow(asked, ledger, ended))
         return then(ended, lambda outcome: self._written(outcome, ledger))
+
+    def _end(self, asked: "_Asked") -> None:
+        self._asked.discard(asked)
+        self.trials.dismiss(asked.coming)
 
     def _check_enabling(self, changes: Iterable[Change]) -> None:
         """The other half of `enabling_objection`: whichever was asked for first is done."""
@@ -237,16 +255,13 @@ class Tuning:
                 text = "an enabling is under way; wait for its answer"
                 raise change.parameter.refusal(Kind.WRONG_STATE, text)
 
-    def _follow(
-        self, ledger: WriteLedger, ended: "Future[Outcome]", session: "Session", reverts: int
-    ) -> None:
+    def _follow(self, asked: "_Asked", ledger: WriteLedger, ended: "Future[Outcome]") -> None:
         """What stays of a write: its trial, or what could not be rolled back."""
-        del self._writing[ledger.number]
         kept = ledger.kept
         if kept is None:
             return
-        if ended.exception() is None and ledger.trial_s is not None:
-            self.trials.begin(kept, ledger.trial_s, session, ledger.taken_over, reverts)
+        if ended.exception() is None and asked.trial_s is not None:
+            self.trials.begin(kept, asked.trial_s, asked.coming, ledger.taken_over)
         else:
             self.trials.take_up(kept, "its roll-back failed", done(None), ledger.problem)
 

@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
@@ -15,8 +16,11 @@ from gateway.records import durable
 log = logging.getLogger(__name__)
 
 
+Bytes = Annotated[str, msgspec.Meta(pattern=r"^([0-9a-f]{2})*$")]  # hexadecimal
+
+
 class UndoChange(msgspec.Struct, frozen=True):
-    """One object that was, or was about to be, written: where it is, its bytes (hexadecimal) and values.
+    """One object that was, or was about to be, written: where it is, its bytes and values.
 
     `made` is what the device has made of `written`, where it was read back as something else.
     """
@@ -27,11 +31,11 @@ class UndoChange(msgspec.Struct, frozen=True):
     node_id: int
     index: int
     subindex: int
-    before: str
-    written: str
+    before: Bytes
+    written: Bytes
     before_value: float
     written_value: float
-    made: str = ""
+    made: Bytes = ""
 
     @property
     def address(self) -> tuple[str, int, int, int]:

@@ -129,6 +129,23 @@ def test_the_newest_is_taken_back_first_also_when_it_has_to_wait(calm: Bench, tm
     assert [data for _, data in calm.gait.node.written()] == [u16(420), u16(400), u16(420)]
 
 
+def test_a_trial_that_another_gateway_has_begun_is_not_confirmed(calm: Bench, tmp_path: Path) -> None:
+    """Nobody has watched over it in between."""
+    write_undo(tmp_path, entry(7, change(STEP, STEP_LENGTH, 400, 420)))
+    somebody_writes(calm, STEP, 420)
+    calm.gait.node.ready = False
+    with tuned(tmp_path) as robot:
+        error = robot.refused(lambda: robot.tuning.trials.confirm(7))
+        assert "it is being taken back: the gateway ended while it was on trial" in str(error)
+
+
+def test_what_is_no_entry_makes_the_file_a_damaged_one(calm: Bench, tmp_path: Path) -> None:
+    path = write_undo(tmp_path, entry(7, change(STEP, STEP_LENGTH, 400, 420, written="4 times")))
+    with tuned(tmp_path) as robot:
+        assert (robot.trials(), len(robot.told("undo file damaged"))) == ([], 1)
+    assert list(path.parent.glob("undo.json.broken-*"))
+
+
 def test_a_write_never_has_the_number_of_what_is_to_be_taken_back(calm: Bench, tmp_path: Path) -> None:
     future = 2**60
     write_undo(tmp_path, entry(future, change(TORQUE, MAX_TORQUE, 1000, 500)))

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.errors import DeviceTimeout
+from gateway.modules.ledger import WriteLedger
 from tests.unit.gateway.harness import DEADLINE_S, Bench, until
 from tests.unit.gateway.tuned import (
     CYCLE,
@@ -66,10 +67,38 @@ def test_a_trial_that_was_being_written_when_all_were_taken_back_is_too(robot: T
     gate.wait()
     robot.do(lambda: robot.tuning.trials.revert_all("guard rule tilt: too far"))
     gate.open()
+    error: Any = write.exception(DEADLINE_S)
+    assert (error.kind, "its trial is over already: guard rule tilt: too far" in str(error)) == (
+        "rolled_back",
+        True,
+    )
+    assert (held(bench, CYCLE), robot.undos()) == (1200, [])
+
+
+def test_a_trial_that_all_are_taken_back_after_is_written_and_before_it_begins_is_too(
+    robot: Tuned, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = WriteLedger.done
+
+    def slow(ledger: WriteLedger) -> None:
+        done(ledger)
+        robot.do(lambda: robot.tuning.trials.revert_of(robot.session, "the lease has ended"))
+
+    monkeypatch.setattr(WriteLedger, "done", slow)
+    robot.write({CYCLE_TIME: 1.3}, LONG_S)
+    until(lambda: robot.trials() == [], "taken back")
+    assert held(bench, CYCLE) == 1200
+    assert robot.told("taken back")[0]["reason"] == "the lease has ended"
+
+
+def test_a_lease_that_ends_does_not_end_what_is_no_trial(robot: Tuned, bench: Bench) -> None:
+    gate = Gate(bench.gait.node, CYCLE[2])
+    write = robot.ask(robot.writing({CYCLE_TIME: 1.3}))
+    gate.wait()
+    robot.do(lambda: robot.tuning.trials.revert_of(robot.session, "the lease has ended"))
+    gate.open()
     write.result(DEADLINE_S)
-    until(lambda: held(bench, CYCLE) == 1200, "taken back")
-    until(lambda: robot.told("taken back") != [], "told")
-    assert robot.told("taken back")[0]["reason"] == "guard rule tilt: too far"
+    assert held(bench, CYCLE) == 1300
 
 
 def test_a_trial_ends_in_time_also_in_the_middle_of_a_long_write(robot: Tuned, bench: Bench) -> None:
