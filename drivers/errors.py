@@ -5,8 +5,8 @@
     ├── Unavailable        the interface, port, file or node is not there (and may come back)
     ├── DeviceTimeout      the device did not answer in time (also a TimeoutError)
     ├── DeviceAbort        the device refused, with a CiA 301 abort code
-    ├── Mismatch           the device holds another value than the one that was written
-    └── NotPermitted       it was not sent, because who decides what may be written objected
+    ├── NotPermitted       a write is forbidden now, or nobody knows who would take it; nothing was sent
+    └── Mismatch           the device holds another value than the one that was written
 
 Every message names the device, the object and the value, and says what to do.
 """
@@ -36,9 +36,9 @@ class DeviceAbort(DriverError):
         self.abort_code = abort_code
 
 
+class NotPermitted(DriverError):
+    """What may not be written now was not sent."""
+
+
 class Mismatch(DriverError):
     """Reading back gave another value than the one written."""
-
-
-class NotPermitted(DriverError):
-    """It was not sent: who decides what may be written objected; the message says why."""

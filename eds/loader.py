@@ -167,7 +167,10 @@ def _readdressed(ini: IniText, where: str, cob_id: int, owner: _Owner) -> str:
 
 
 def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDictionary) -> None:
-    """Limits that the importer drops (reals, odd widths), and those that contradict themselves."""
+    """Limits that the importer drops (reals, odd widths).
+
+    Those that contradict each other stay, and are told: without them everything would be allowed.
+    """
     for name, keys in sections.items():
         if "LowLimit" not in keys and "HighLimit" not in keys:
             continue
@@ -178,9 +181,9 @@ def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDict
             variable.max = _limit(variable, keys.get("HighLimit"))
             if variable.min is not None and variable.max is not None and variable.min > variable.max:
                 ini.warn(
-                    f"[{name}]", f"LowLimit {variable.min} is above HighLimit {variable.max}; both left out"
+                    f"[{name}]",
+                    f"LowLimit {variable.min} is above HighLimit {variable.max}; no value is allowed",
                 )
-                variable.min = variable.max = None
 
 
 def _limit(variable: ODVariable, text: str | None) -> int | None:

@@ -4,6 +4,7 @@ The result holds only sections and keys that the importer reads, each in its can
 value it can parse. Every repair that could change a meaning is a finding.
 """
 
+import math
 import re
 from collections.abc import Callable
 
@@ -226,9 +227,10 @@ def _boolean_text(text: str) -> str | None:
 
 def _real_text(text: str) -> str | None:
     try:
-        return repr(float(text))
+        number = float(text)
     except ValueError:
         return None
+    return None if math.isnan(number) else repr(number)
 
 
 _VALUES: dict[str, Callable[[str], str | None]] = {

@@ -91,6 +91,15 @@ class Coding:
                 f"{text(value)} is {counts} for the device, which does not fit {self.type.name}"
             ) from error
 
+    def nearest(self, limit: Number) -> Number:
+        """A limit as its device can hold it: the REAL32 that is nearest to 0.6 lies above it."""
+        if self.type.kind != "real":
+            return limit
+        try:
+            return self.decode(self.encode(limit))
+        except CodingError:
+            return limit  # beyond all that it can hold
+
     def _real(self, number: float) -> bytes:
         try:
             return struct.pack(_REAL_FORMATS[self.type.bits or 0], self._finite(number))

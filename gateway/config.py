@@ -20,8 +20,10 @@ from gateway.guard.settings import WATCHES, GuardSettings
 from gateway.modules.stop.settings import StopSettings
 from gateway.modules.stop.settings import complaints as about_stop
 from gateway.records.folder import default_folder
+from gateway.sdo_ids import complaints as about_sdo
 
 Table = Mapping[str, Any]
+Node = tuple[str, int]  # a bus by its name, and a node id there
 OnBus = JointSettings | DeviceSettings | CanImuSettings | InclinometerSettings
 
 CONTROLWORD = 0x6040
@@ -134,15 +136,26 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     guard: GuardSettings | None = None
     control_loop: ControlLoopSettings | None = None
 
+    def node_of(self, component: str) -> Node:
+        """Where a joint or device is: bus and node id."""
+        table = self.joint[component] if component in self.joint else self.device[component]
+        return table.bus, table.node_id
+
     def sharing(self, component: str) -> tuple[str, ...]:
         """The joints and devices on one's node, itself among them: the axes of one drive."""
-        tables: dict[str, JointTable | DeviceTable] = {**self.joint, **self.device}
-        bus, node_id = tables[component].bus, tables[component].node_id
-        return tuple(name for name, one in tables.items() if (one.bus, one.node_id) == (bus, node_id))
+        node = self.node_of(component)
+        return tuple(name for name in (*self.joint, *self.device) if self.node_of(name) == node)
 
     def drives_of(self, component: str) -> tuple[str, ...]:
         """The joints that its parameters may move: those on its node; where it has none, every joint."""
         return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
+
+    def on_buses(self) -> Iterator[tuple[str, OnBus]]:
+        """Every table of something on a CAN bus, with its header."""
+        for table in COMPONENT_TABLES:
+            for name, settings in getattr(self, table).items():
+                if isinstance(settings, OnBus):
+                    yield f"[{table}.{name}]", settings
 
     @property
     def records(self) -> Path:
@@ -266,12 +279,14 @@ def _check_keys(where: str, table: Table, allowed: list[str] | None, required: l
 def _complaints(config: RobotConfig) -> Iterator[str]:
     yield from _about_names(config)
     yield from _about_nodes(config)
+    yield from about_sdo(config)
     yield from _about_ports(config)
     for table, devices in (("joint", config.joint), ("device", config.device)):
         for name, device in devices.items():
             yield from _about_release(_header(table, name), name, device)
     for name, parameter in config.parameter.items():
         yield from _about_parameter(config, name, parameter)
+    yield from _about_same_objects(config)
     yield from about_stop(config, config.stop)
     if config.control_loop is not None:
         yield from _about_control_loop(config, config.control_loop)
@@ -298,7 +313,7 @@ def _about_nodes(config: RobotConfig) -> Iterator[str]:
     own = {
         (name, bus.node_id): f"[can.{name}]" for name, bus in config.can.items() if bus.node_id is not None
     }
-    for where, settings in _on_buses(config):
+    for where, settings in config.on_buses():
         if settings.bus not in config.can:
             known = ", ".join(config.can) or "none"
             yield f"{where} bus: there is no bus {settings.bus!r}; [can.NAME] tables here: {known}"
@@ -311,14 +326,6 @@ def _about_nodes(config: RobotConfig) -> Iterator[str]:
             yield f"{where} node_id: {settings.node_id} on bus {settings.bus!r} belongs to {other}"
         seen[(*node, axis)] = where
         whole[node] = where
-
-
-def _on_buses(config: RobotConfig) -> Iterator[tuple[str, OnBus]]:
-    """Every table of something on a CAN bus, by its header."""
-    for table in COMPONENT_TABLES:
-        for name, settings in getattr(config, table).items():
-            if isinstance(settings, OnBus):
-                yield f"[{table}.{name}]", settings
 
 
 def _about_ports(config: RobotConfig) -> Iterator[str]:
@@ -353,6 +360,20 @@ def _about_release(where: str, name: str, device: JointTable | DeviceTable) -> I
     for entry in device.release:
         if entry.startswith(f"{name}."):
             yield f"{where} release: write {entry.removeprefix(f'{name}.')!r}, without the table's own name"
+
+
+def _about_same_objects(config: RobotConfig) -> Iterator[str]:
+    """Two names, each with limits of its own, would let one write what the other one forbids."""
+    seen: dict[tuple[Node, tuple[int, int]], str] = {}
+    for name, parameter in config.parameter.items():
+        where = _header("parameter", name)
+        node = config.node_of(name.partition(".")[0])
+        other = seen.setdefault((node, parameter.address), where)
+        if other != where:
+            yield (
+                f"{where} object: {parameter.object} of node {node[1]} on bus {node[0]!r} is {other} "
+                "already; keep one of the two tables"
+            )
 
 
 def _about_parameter(config: RobotConfig, name: str, parameter: ParameterSettings) -> Iterator[str]:

@@ -1,5 +1,7 @@
 """SDO abort codes in words that a person can act on (CiA 301 table 22)."""
 
+NO_OBJECT = 0x0602_0000
+
 ABORT_CODES: dict[int, str] = {
     0x0503_0000: "toggle bit not alternated",
     0x0504_0000: "the SDO protocol timed out",
@@ -11,7 +13,7 @@ ABORT_CODES: dict[int, str] = {
     0x0601_0000: "the object does not allow this access",
     0x0601_0001: "the object is write-only",
     0x0601_0002: "the object is read-only",
-    0x0602_0000: "the device has no such object; its EDS is of another firmware",
+    NO_OBJECT: "the device has no such object; its EDS is of another firmware",
     0x0604_0041: "the object cannot be mapped to a PDO",
     0x0604_0042: "the mapping is longer than a PDO",
     0x0604_0043: "the parameter does not fit this device",

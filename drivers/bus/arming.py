@@ -95,6 +95,8 @@ class Arming:
     def _arm(self, sdo: SdoChannel) -> None:
         if self._heartbeat.problem is not None:
             raise NotArmed(self._heartbeat.problem)
+        if self.node.distrust is not None:
+            raise NotArmed(self.node.distrust)
         for offset in self._axes:
             _check_reaction(sdo, ABORT_CONNECTION + offset)
         if self._entry is None or unsigned(sdo.upload(CONSUMER, self._entry)[:4]) != self._ours:

@@ -1,19 +1,23 @@
 """One supervised CAN bus: opens, hands out frames, names what is wrong, and comes back.
 
-Everything is received in one thread of the bus, which calls each frame's handlers directly. The bus is open
-while somebody holds it: its owner between `start` and `stop`, and every node that is attached.
+Everything is received in one thread of the bus, which calls each frame's handlers directly; everything is
+sent through its `Sender`. The bus is open while somebody holds it: its owner between `start` and `stop`, and
+every node that is attached.
 """
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from drivers.bus.bus_state import BusState, bus_state
 from drivers.bus.frames import ERROR, FrameHandler, Transport
 from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.opening import open_transport
+from drivers.bus.sender import Sender, always
 from drivers.bus.settings import CanSettings, Role
 from drivers.bus.switching import FastSwitching
 from drivers.errors import Unavailable
@@ -59,19 +63,18 @@ class CanBus:
         self.problem: str | None = None  # why it is not open, in words
         self.state = BusState.ACTIVE  # as the controller's error frames say, where the interface has them
         self.frames = 0
-        self.sent = self.sent_bytes = 0  # frames, and what they carried
         self.opened = 0  # times
-        self.failed_handlers = 0
+        self.failed_handlers = 0  # those of users' ticks are among them
         self.unclaimed: set[int] = set()  # identifiers that came and nobody asked for
         self.nodes: dict[int, Node] = {}  # one object a node id, whoever uses it
         self._handlers: dict[int, FrameHandler] = {}
         self._subscribers: dict[int, tuple[FrameHandler, ...]] = {}
         self._users: tuple[BusUser, ...] = ()
         self._owner = BusUser()
+        self._sender = Sender(name, self._why_closed)
         self._cycles = MasterCycles(name, settings, self.send)
         self._life = threading.Lock()  # the thread's start and end; the thread itself never takes it
         self._lock = threading.Lock()  # users, subscribers and transport
-        self._send_lock = threading.Lock()
         self._stopping = threading.Event()
         self._transport: Transport | None = None
         self._thread: threading.Thread | None = None
@@ -88,6 +91,16 @@ class CanBus:
         """Frames that came and were lost since the bus opened, as far as the interface tells."""
         transport = self._transport
         return 0 if transport is None else transport.dropped
+
+    @property
+    def sent(self) -> int:
+        """Frames that left since it was made."""
+        return self._sender.sent
+
+    @property
+    def sent_bytes(self) -> int:
+        """What those frames carried."""
+        return self._sender.sent_bytes
 
     def start(self) -> None:
         """Keep the bus open, nodes or not; idempotent, returns at once."""
@@ -133,15 +146,13 @@ class CanBus:
             kept = tuple(known for known in self._subscribers.get(can_id, ()) if known != handler)
             self._set_handlers(can_id, kept)
 
-    def send(self, can_id: int, data: bytes) -> None:
-        """Put a frame on the bus; raises `Unavailable`."""
-        with self._send_lock:
-            transport = self._transport
-            if transport is None:
-                raise Unavailable(f"bus {self.name} is not open: {self.problem or 'nobody holds it'}")
-            transport.send(can_id, data)
-            self.sent += 1
-            self.sent_bytes += len(data)
+    def send(self, can_id: int, data: bytes, wanted: Callable[[], bool] = always) -> None:
+        """Put a frame on the bus; raises `Unavailable`. See `Sender.send`."""
+        self._sender.send(can_id, data, wanted)
+
+    def send_urgent(self, can_id: int, data: bytes) -> bool:
+        """Put a frame on the bus ahead of all that waits, without ever blocking. See `Sender.send_urgent`."""
+        return self._sender.send_urgent(can_id, data)
 
     def start_node(self, node_id: int) -> None:
         """Let a node that came up send its PDOs (NMT start): a master's part, an observer does nothing.
@@ -165,20 +176,26 @@ class CanBus:
         else:
             self._handlers[can_id] = handlers[0] if len(handlers) == 1 else _all(handlers)
 
+    def _why_closed(self) -> str:
+        return f"bus {self.name} is not open: {self.problem or 'nobody holds it'}"
+
     def _run(self) -> None:
         retry_s = FIRST_RETRY_S
         while not self._stopping.is_set():
+            began = time.monotonic()
             try:
                 transport = open_transport(self.settings)
-                retry_s = FIRST_RETRY_S
+                began = time.monotonic()
                 self._serve(transport)
-            except Unavailable as error:
-                self.problem = str(error)
+            except Exception as error:  # noqa: BLE001 - whatever a transport raises, the bus is to come back
+                self.problem = _words(error)
+            if time.monotonic() - began > LAST_RETRY_S:
+                retry_s = FIRST_RETRY_S  # it was well for a while
             self._stopping.wait(retry_s)
             retry_s = min(2 * retry_s, LAST_RETRY_S)
 
     def _serve(self, transport: Transport) -> None:
-        """Hand out frames until told to stop; raises `Unavailable` when the interface goes."""
+        """Hand out frames until told to stop; raises what ended it, `Unavailable` when the interface goes."""
         problem = "it was closed"
         with self._lock:
             self._transport, self.problem, self.state = transport, None, BusState.ACTIVE
@@ -186,23 +203,30 @@ class CanBus:
             users = self._users
         FastSwitching.begin()
         try:
+            self._sender.start(transport)
             if self.role is Role.MASTER:
                 self._cycles.start()
             for user in users:
                 user.bus_opened()
             self._receive(transport)
-        except Unavailable as error:
-            problem = str(error)
+        except Exception as error:
+            problem = _words(error)
             raise
         finally:
-            self._cycles.stop()
-            FastSwitching.end()
-            with self._send_lock:
-                self._transport = None
-            transport.close()
-            self.problem = problem
-            for user in self._users:
-                user.bus_closed()
+            self._shut(transport, problem)
+
+    def _shut(self, transport: Transport, problem: str) -> None:
+        """Let go of it in this order; what fails keeps nothing of the rest from being done."""
+        self.problem = problem
+        self._transport = None
+        self._sender.stop()
+        with contextlib.ExitStack() as last_to_first:
+            for user in reversed(self._users):
+                last_to_first.callback(user.bus_closed)
+            last_to_first.callback(FastSwitching.end)
+            last_to_first.callback(self._sender.join)
+            last_to_first.callback(transport.close)
+            last_to_first.callback(self._cycles.stop)
 
     def _receive(self, transport: Transport) -> None:
         tick_ns = round(TICK_S * 1e9)
@@ -220,14 +244,23 @@ class CanBus:
                 try:
                     handler(stamp_ns, data)
                 except Exception as error:  # noqa: BLE001 - one wrong handler must not silence every joint
-                    self.failed_handlers += 1
-                    self.problem = f"internal error at frame 0x{can_id:X}: {type(error).__name__}: {error}"
+                    self._failed(f"at frame 0x{can_id:X}", error)
             now_ns = time.monotonic_ns()
             if now_ns >= next_tick_ns:
                 next_tick_ns = now_ns + tick_ns
                 accepted = self._accept(transport, accepted)
-                for user in self._users:
-                    user.tick(now_ns)
+                self._tick(now_ns)
+
+    def _tick(self, now_ns: int) -> None:
+        for user in self._users:
+            try:
+                user.tick(now_ns)
+            except Exception as error:  # noqa: BLE001 - nor one wrong user
+                self._failed("at a tick", error)
+
+    def _failed(self, where: str, error: Exception) -> None:
+        self.failed_handlers += 1
+        self.problem = f"internal error {where}: {type(error).__name__}: {error}"
 
     def _accept(self, transport: Transport, before: frozenset[int] | None) -> frozenset[int] | None:
         """Once all is ready only what is subscribed matters; before, any frame helps to say what is wrong."""
@@ -241,6 +274,12 @@ class CanBus:
             self.state = bus_state(can_id, data) or self.state
         elif len(self.unclaimed) < MAX_UNCLAIMED:
             self.unclaimed.add(can_id)
+
+
+def _words(error: Exception) -> str:
+    return (
+        str(error) if isinstance(error, Unavailable) else f"internal error: {type(error).__name__}: {error}"
+    )
 
 
 def _all(handlers: tuple[FrameHandler, ...]) -> FrameHandler:

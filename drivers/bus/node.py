@@ -1,7 +1,8 @@
 """One CANopen node: it comes up, is asked by one worker, and starts anew when it reboots or its bus goes.
 
 A node is up when it answers SDO: then its users read what they need (`boot`), and it is ready. Where it is
-stuck, `problem` says at which step, in words.
+stuck, `problem` says at which step, in words. It is written to only where it is known to be the device that
+it should be, and the only one; else `distrust` says why not.
 """
 
 import threading
@@ -14,7 +15,7 @@ from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo_channel import Interrupted, SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
 from drivers.bus.stuck import why_silent
@@ -26,6 +27,7 @@ T = TypeVar("T")
 
 FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
+_NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 EMCY, SDO_REQUEST, SDO_RESPONSE = 0x080, 0x600, 0x580
 
 
@@ -48,7 +50,9 @@ class Node(BusUser):
         self.description = description
         self.life = NodeLife(times.heartbeat_timeout_s)
         self.ready = False
-        self.findings: tuple[str, ...] = ()
+        self.boots_begun = 0  # attempts to read what is needed of it
+        self._findings: tuple[str, ...] = ()
+        self._stranger: str | None = _NOT_ASKED  # why it may not be the device that it should be
         self._times = times
         self._users: tuple[tuple[NodeUser, str], ...] = ()  # with their names
         self._lock = threading.RLock()
@@ -57,14 +61,40 @@ class Node(BusUser):
         self._guard_ns = 0
         self._guard_problem: str | None = None
         self._generation = 0  # counts what makes an earlier boot worthless
+        self._booted_generation = 0  # of the boot that is under way, or was the last
         self._booting: Future[None] | None = None
         self._retry_s = FIRST_RETRY_S
         self._retry_ns = 0
         self._request_id, response_id = times.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
-        self.channel = SdoChannel(f"node {node_id} on {bus.name}", self._send_request, times.sdo_timeout_s)
+        self.channel = SdoChannel(
+            f"node {node_id} on {bus.name}", self._send_request, times.sdo_timeout_s, lambda: self.distrust
+        )
         self.worker = SdoWorker(self.channel)
         self._emcy_id = EMCY + node_id
         self._handlers = {HEARTBEAT + node_id: self._on_heartbeat, response_id: self._on_response}
+
+    @property
+    def distrust(self) -> str | None:
+        """Why nothing is written to it, in words; it is read and stopped all the same."""
+        if self._stranger is not None:
+            return self._stranger
+        if self.channel.doubled:
+            return (
+                f"two devices answer as node {self.node_id}: nothing is written to it; "
+                "give one of them another node id"
+            )
+        if self.channel.out_of_sync:
+            return (
+                f"nobody can say to which request node {self.node_id} answers: nothing is written to it; "
+                "is another SDO client using this channel?"
+            )
+        return None
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What an integrator should know about it, in words."""
+        distrust = self.distrust
+        return self._findings if distrust in (None, _NOT_ASKED) else (*self._findings, distrust)
 
     # What users ask.
 
@@ -103,10 +133,19 @@ class Node(BusUser):
         return self.worker.submit(lambda sdo: self._trim(index, subindex, sdo.upload(index, subindex)))
 
     def download(
-        self, index: int, subindex: int, data: bytes, timeout_s: float | None = None
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        timeout_s: float | None = None,
+        permitted: Callable[[], str | None] | None = None,
     ) -> Future[None]:
-        """Write an object, once: `DeviceTimeout` means that nobody knows whether the device took it."""
-        return self.worker.submit(lambda sdo: sdo.download(index, subindex, data, timeout_s))
+        """Write an object, once: `DeviceTimeout` means that nobody knows whether the device took it.
+
+        Fails with `NotPermitted` where `distrust`, or `permitted` at the last moment, says why it must not be
+        written; see `SdoChannel.download`.
+        """
+        return self.worker.submit(lambda sdo: sdo.download(index, subindex, data, timeout_s, permitted))
 
     def run(
         self,
@@ -140,6 +179,9 @@ class Node(BusUser):
             "sdo_timeouts": sdo.timeouts,
             "sdo_aborts": sdo.aborts,
             "sdo_stale": sdo.stale,
+            "sdo_doubled": sdo.doubled,
+            "sdo_resyncs": sdo.resyncs,
+            "sdo_dropped": sdo.dropped,
             "bus_opened": self.bus.opened,
             "bus_dropped": self.bus.dropped,
         }
@@ -174,6 +216,7 @@ class Node(BusUser):
         first = self.life.heard_ns is None
         state = self.life.on_heartbeat(stamp_ns, data)
         if state is NmtState.BOOT_UP:
+            self.channel.rebooted()
             self._begin_anew()
             self._start_boot()
         elif state is not None and first and not self.ready:
@@ -193,8 +236,10 @@ class Node(BusUser):
         with self._lock:
             self._generation += 1
             self.ready = False
+            self._stranger = _NOT_ASKED
             self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
             users = self._users
+        self.channel.forget_written()
         for user, _ in users:
             user.forget()
 
@@ -202,25 +247,43 @@ class Node(BusUser):
         with self._lock:
             if self._booting is None or self._booting.done():
                 self._retry_ns = time.monotonic_ns() + round(self._retry_s * 1e9)
-                self._booting = self.worker.submit(self._boot)
+                self._booting = self.worker.submit(self._boot, current=self._boot_is_current)
+
+    def _boot_is_current(self) -> bool:
+        return self._booted_generation == self._generation
 
     def _boot(self, sdo: SdoChannel) -> None:
-        generation = self._generation
+        self.boots_begun += 1
+        self._booted_generation = self._generation
         try:
             self._come_up(sdo)
         except DriverError as error:
-            self._step = self._explain(error)
+            self._try_later(self._explain(error))
+        except Interrupted:
+            raise
+        except Exception as error:  # noqa: BLE001 - it must be told, and not be tried without a pause
+            self._try_later(f"internal error: {type(error).__name__}: {error}")
+        else:
+            with self._lock:
+                self.ready = self._boot_is_current()
+                self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
+
+    def _try_later(self, step: str) -> None:
+        with self._lock:
+            if not self._boot_is_current():
+                self._retry_ns = 0
+                return
+            self._step = step
             self._retry_ns = time.monotonic_ns() + round(self._retry_s * 1e9)
             self._retry_s = min(2 * self._retry_s, LAST_RETRY_S)
-            return
-        with self._lock:
-            self.ready = generation == self._generation
-            self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
 
     def _come_up(self, sdo: SdoChannel) -> None:
         sdo.upload(0x1000, 0, attempts=1, timeout_s=min(self._retry_s, self._times.sdo_timeout_s))
-        sdo.written.clear()
-        self.findings = (*self._settings_findings(), *self._identity_findings(sdo))
+        stranger = self._identity_problem(sdo)
+        with self._lock:
+            if self._boot_is_current():
+                self._stranger = stranger
+        self._findings = self._settings_findings()
         period_ms = self._optional(sdo, 0x1017, 0)
         self.life.expect_every(period_ms / 1000 if period_ms else self._guard_s)
         self._follow_emcy(sdo)
@@ -240,15 +303,21 @@ class Node(BusUser):
         unused = self._times.guard_time_s is not None and self._guard_s is None
         return ("guard_time_s is not used: node guarding is the master's",) if unused else ()
 
-    def _identity_findings(self, sdo: SdoChannel) -> tuple[str, ...]:
+    def _identity_problem(self, sdo: SdoChannel) -> str | None:
+        """Why it may be another device than its EDS is for."""
         expected = (self.description.vendor_id, self.description.product_code)
-        found = (self._optional(sdo, 0x1018, 1), self._optional(sdo, 0x1018, 2))
-        names = ("vendor id", "product code")
-        return tuple(
-            f"1018h {name} is 0x{is_:X}, the EDS {self.description.path.name} is for 0x{should:X}"
-            for name, should, is_ in zip(names, expected, found, strict=True)
-            if should and is_ is not None and is_ != should
-        )
+        problems = []
+        for subindex, name, should in zip((1, 2), ("vendor id", "product code"), expected, strict=True):
+            if not should or not self.description.has(0x1018, subindex):
+                continue
+            found = self._optional(sdo, 0x1018, subindex)
+            if found != should:
+                is_ = "cannot be read" if found is None else f"is 0x{found:X}"
+                file = self.description.path.name
+                problems.append(f"1018h {name} {is_}, the EDS {file} is for 0x{should:X}")
+        if not problems:
+            return None
+        return f"{'; '.join(problems)}: nothing is written to it; correct its eds or its node_id"
 
     def _follow_emcy(self, sdo: SdoChannel) -> None:
         cob_id = self._optional(sdo, 0x1014, 0)

@@ -9,6 +9,8 @@ from drivers.bus.frames import ERROR, EXTENDED, REMOTE, Frame
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 
+_NEVER_BLOCKS = ("virtual",)
+
 
 class PythonCanTransport:
     """An open python-can bus."""
@@ -17,7 +19,9 @@ class PythonCanTransport:
         """Open it; raises `Unavailable`."""
         self.dropped = 0  # python-can does not tell
         self.warning: str | None = None
+        self.blocks = settings.interface not in _NEVER_BLOCKS
         self._where = f"{settings.interface} channel {settings.channel}"
+        self.full = f"{self._where} does not send: does anybody on the bus acknowledge?"
         keys = settings.more if settings.bitrate is None else {**settings.more, "bitrate": settings.bitrate}
         try:
             # The robot's file says everything: what python-can finds in its own files must not change it.
@@ -34,7 +38,7 @@ class PythonCanTransport:
             return ()
         return ((time.monotonic_ns(), _identifier(message), bytes(message.data)),)
 
-    def send(self, can_id: int, data: bytes) -> None:
+    def try_send(self, can_id: int, data: bytes) -> bool:
         message = can.Message(
             arbitration_id=can_id & 0x1FFF_FFFF,
             is_extended_id=bool(can_id & EXTENDED),
@@ -42,9 +46,16 @@ class PythonCanTransport:
             data=None if can_id & REMOTE else data,
         )
         try:
-            self._bus.send(message)
+            self._bus.send(message, None if self.blocks else 0)
         except (can.CanError, OSError, ValueError) as error:
             raise Unavailable(f"{self._where} does not send: {error}") from error
+        return True
+
+    def flush(self) -> bool:
+        return True
+
+    def await_room(self, timeout_s: float) -> None:
+        """It always takes a frame, or fails."""
 
     def accept(self, can_ids: frozenset[int] | None) -> None:
         """Most interfaces filter in Python, which costs more than it saves."""

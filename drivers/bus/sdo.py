@@ -1,23 +1,31 @@
 """SDO client transfers as pure generators: expedited and segmented upload and download (CiA 301 §7.2.4).
 
-A transfer yields the 8 bytes of a request, or `None` where it goes on waiting, and is sent each response.
-A response that does not belong to the request (another object, a stale duplicate, a late answer) never
-confirms it: it is passed over.
+A transfer yields the 8 bytes of a request and is sent the response to it. Which response that is, among
+late, doubled and foreign ones, is for `outstanding` to say; `answers` says which can be.
 """
 
 import struct
 from collections.abc import Generator
 
-Upload = Generator[bytes | None, bytes, bytes]
-Download = Generator[bytes | None, bytes, None]
+Upload = Generator[bytes, bytes, bytes]
+Download = Generator[bytes, bytes, None]
 
 MAX_UPLOAD = 1 << 20  # bytes; no object of a drive comes near
 
 _HEADER = struct.Struct("<BHB")
-_ABORT = 0x80
+ABORT = 0x80
+SPECIFIER = 0xE0
 _TOGGLE = 0x10
 _SEGMENT = 7
 EXPEDITED = 4  # bytes that fit into the first request
+_UPLOAD, _UPLOAD_SEGMENT, _DOWNLOAD, _DOWNLOAD_SEGMENT = 0x40, 0x60, 0x20, 0x00  # client's specifiers
+_UPLOADED, _UPLOADED_SEGMENT, _DOWNLOADED, _DOWNLOADED_SEGMENT = 0x40, 0x00, 0x60, 0x20  # the server's
+_ANSWERS = {
+    _UPLOAD: _UPLOADED,
+    _UPLOAD_SEGMENT: _UPLOADED_SEGMENT,
+    _DOWNLOAD: _DOWNLOADED,
+    _DOWNLOAD_SEGMENT: _DOWNLOADED_SEGMENT,
+}
 
 INVALID_COMMAND = 0x0504_0001
 OUT_OF_MEMORY = 0x0504_0005
@@ -41,14 +49,45 @@ class SdoProtocolError(Exception):
         self.abort_code = abort_code
 
 
+def multiplexer(index: int, subindex: int) -> bytes:
+    """How frames name an object: bytes 1 to 3 of those that do."""
+    return index.to_bytes(2, "little") + bytes([subindex])
+
+
+def names_object(response: bytes) -> bool:
+    """Whether a response says which object it is about; those of segments do not."""
+    return response[0] == ABORT or response[0] & SPECIFIER in (_UPLOADED, _DOWNLOADED)
+
+
+def answers(response: bytes, request: bytes, about: bytes) -> bool:
+    """Whether a response can be the one to a request about this object; `about` is its multiplexer."""
+    if response[0] == ABORT:
+        return response[1:4] == about
+    specifier = _ANSWERS[request[0] & SPECIFIER]
+    if specifier in (_UPLOADED, _DOWNLOADED):
+        return response[0] & SPECIFIER == specifier and response[1:4] == about
+    return response[0] & (SPECIFIER | _TOGGLE) == specifier | request[0] & _TOGGLE
+
+
+def concludes(response: bytes, request: bytes) -> bool:
+    """Whether a response ends the upload that this request began: with data, or refused."""
+    ends = response[0] == ABORT or response[0] & (SPECIFIER | 0x02) == _UPLOADED | 0x02
+    return ends and request[0] & SPECIFIER == _UPLOAD
+
+
+def is_expedited_download(request: bytes) -> bool:
+    """Whether a request is a write that needs no other."""
+    return request[0] & (SPECIFIER | 0x02) == _DOWNLOAD | 0x02
+
+
 def abort_request(index: int, subindex: int, abort_code: int) -> bytes:
     """The request that ends a transfer."""
-    return _HEADER.pack(_ABORT, index, subindex) + struct.pack("<I", abort_code)
+    return _HEADER.pack(ABORT, index, subindex) + struct.pack("<I", abort_code)
 
 
 def upload(index: int, subindex: int) -> Upload:
     """Read an object; returns its bytes as they came."""
-    response = yield from _ask(_HEADER.pack(0x40, index, subindex) + bytes(4), index, subindex, 0x40)
+    response = yield from _ask(_HEADER.pack(_UPLOAD, index, subindex) + bytes(4))
     command = response[0]
     if command & 0x02:  # expedited
         unused = (command >> 2) & 3 if command & 0x01 else 0
@@ -56,17 +95,17 @@ def upload(index: int, subindex: int) -> Upload:
     size = int.from_bytes(response[4:8], "little") if command & 0x01 else None
     if size is not None and size > MAX_UPLOAD:
         raise SdoProtocolError(f"announces {size} bytes", OUT_OF_MEMORY)
-    data = yield from _upload_segments(index, subindex)
+    data = yield from _upload_segments()
     if size is not None and len(data) != size:
         raise SdoProtocolError(f"announced {size} bytes and sent {len(data)}")
     return data
 
 
-def _upload_segments(index: int, subindex: int) -> Upload:
+def _upload_segments() -> Upload:
     data = bytearray()
     toggle = 0
     while True:
-        response = yield from _ask_segment(bytes([0x60 | toggle]) + bytes(7), index, subindex, toggle)
+        response = yield from _ask(bytes([_UPLOAD_SEGMENT | toggle]) + bytes(7))
         unused = (response[0] >> 1) & 7
         data += response[1 : 8 - unused]
         if response[0] & 0x01:
@@ -86,41 +125,20 @@ def download(index: int, subindex: int, data: bytes) -> Download:
     if not data:
         raise ValueError(f"0x{index:04X}:{subindex:02X}: nothing to write")
     if len(data) <= EXPEDITED:
-        yield from _ask(expedited(index, subindex, data), index, subindex, 0x60)
+        yield from _ask(expedited(index, subindex, data))
         return
-    header = _HEADER.pack(0x21, index, subindex)
-    yield from _ask(header + struct.pack("<I", len(data)), index, subindex, 0x60)
+    yield from _ask(_HEADER.pack(0x21, index, subindex) + struct.pack("<I", len(data)))
     toggle = 0
     for start in range(0, len(data), _SEGMENT):
         segment = data[start : start + _SEGMENT]
         last = start + _SEGMENT >= len(data)
-        command = toggle | (_SEGMENT - len(segment)) << 1 | last
-        request = bytes([command]) + segment.ljust(_SEGMENT, b"\0")
-        yield from _ask_segment(request, index, subindex, toggle, specifier=0x20)
+        command = _DOWNLOAD_SEGMENT | toggle | (_SEGMENT - len(segment)) << 1 | last
+        yield from _ask(bytes([command]) + segment.ljust(_SEGMENT, b"\0"))
         toggle ^= _TOGGLE
 
 
-def _ask(request: bytes, index: int, subindex: int, specifier: int) -> Generator[bytes | None, bytes, bytes]:
-    """Send `request`; the first response about this very object, as `specifier` or an abort."""
+def _ask(request: bytes) -> Generator[bytes, bytes, bytes]:
     response = yield request
-    while True:
-        command, at_index, at_subindex = _HEADER.unpack_from(response)
-        if command == _ABORT and (at_index, at_subindex) in ((index, subindex), (0, 0)):
-            raise SdoAborted(int.from_bytes(response[4:8], "little"))
-        if command & 0xE0 == specifier and (at_index, at_subindex) == (index, subindex):
-            return response
-        response = yield None
-
-
-def _ask_segment(
-    request: bytes, index: int, subindex: int, toggle: int, specifier: int = 0x00
-) -> Generator[bytes | None, bytes, bytes]:
-    """Send `request`; the response with its toggle bit. One with the other bit repeats the last one."""
-    response = yield request
-    while True:
-        command, at_index, at_subindex = _HEADER.unpack_from(response)
-        if command == _ABORT and (at_index, at_subindex) in ((index, subindex), (0, 0)):
-            raise SdoAborted(int.from_bytes(response[4:8], "little"))
-        if command & 0xF0 == specifier | toggle:
-            return response
-        response = yield None
+    if response[0] == ABORT:
+        raise SdoAborted(int.from_bytes(response[4:8], "little"))
+    return response

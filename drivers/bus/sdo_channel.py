@@ -1,6 +1,8 @@
 """Blocking SDO transfers over one channel to one node, errors in the drivers' own words.
 
-A read that stays unanswered is repeated; a write never is, because the device may have taken it.
+A read that stays unanswered is repeated; a write never is, because the device may have taken it. As long as
+an earlier request about an object may still be answered, the next one is not sent: first another object is
+read, whose answer shows that none of those can come any more (see `outstanding`).
 """
 
 import contextlib
@@ -9,15 +11,22 @@ import threading
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import partial
+from typing import Any, Generic, TypeVar
 
 from drivers.bus import sdo
 from drivers.bus.aborts import abort_text
-from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
+from drivers.bus.doubles import Doubles
+from drivers.bus.outstanding import Outstanding, Request
+from drivers.bus.written import Written
+from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
 
 T = TypeVar("T")
 
 READ_ATTEMPTS = 3
+INBOX = 64  # responses that wait for the worker; what comes beyond is lost, which is as if it never came
+OUT_OF_SYNC = 3  # attempts in a row to bring a node in sync that does send something
+_UNKNOWN = "whether the device took it is not known, read it back"
 
 
 class Interrupted(Exception):
@@ -36,29 +45,115 @@ class SdoCounters:
     timeouts: int = 0
     aborts: int = 0
     stale: int = 0  # responses that belonged to no request
+    doubled: int = 0  # of these, second answers to one of the last requests
+    resyncs: int = 0  # times that something else was read first, because answers might have been late
+    dropped: int = 0  # responses that nobody fetched in time
+
+
+def _nothing() -> str | None:
+    return None
+
+
+def _always() -> bool:
+    return True
+
+
+def _interrupted() -> None:
+    raise Interrupted
+
+
+@dataclass(slots=True)
+class _Transfer(Generic[T]):
+    begin: Callable[[], Generator[bytes, bytes, T]]
+    index: int
+    subindex: int
+    what: str
+    timeout_s: float
+    data: bytes | None = None  # what it writes
+    permitted: Callable[[], str | None] = _nothing
+    request: Request | None = None  # the last one that was sent
+
+    @property
+    def about(self) -> bytes:
+        return sdo.multiplexer(self.index, self.subindex)
+
+    @property
+    def late_answer(self) -> bytes | None:
+        """To a read that was given up, and all of it."""
+        asked = self.request
+        if asked is None or asked.answer is None or not sdo.concludes(asked.answer, asked.frame):
+            return None
+        return asked.answer
+
+    @property
+    def write_begun(self) -> bool:
+        return self.data is not None and self.request is not None
 
 
 class SdoChannel:
     """One SDO channel. `upload` and `download` are for one thread; the rest for any."""
 
-    def __init__(self, label: str, send: Callable[[bytes], None], timeout_s: float) -> None:
-        """`send` puts a request on the bus, or raises `Unavailable`."""
+    def __init__(
+        self,
+        label: str,
+        send: Callable[[bytes], None],
+        timeout_s: float,
+        distrust: Callable[[], str | None] = _nothing,
+    ) -> None:
+        """`send` puts a request on the bus, or raises `Unavailable`; `distrust` says why not to write."""
         self.label = label
         self.timeout_s = timeout_s
         self.counters = SdoCounters()
-        self.written: dict[
-            tuple[int, int], bytes
-        ] = {}  # what each object was sent last, since the node came up
         self._send = send
+        self._distrust = distrust
         self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._interrupted = threading.Event()
         self._sending = threading.Lock()  # so that nothing goes out behind what interrupted it
         self._in_flight: tuple[int, int] | None = None  # the object that a transfer is about
-        self._ahead: bytes | None = None  # a request that went out before the job that waits for its answer
+        self._ahead: Request | None = None  # went out before the job that waits for its answer
+        self._outstanding = Outstanding()
+        self._doubles = Doubles()
+        self._unassigned = 0  # failed attempts to bring it in sync, in a row
+        self._written = Written()
+        self._urgent = False
+        self._current: Callable[[], bool] = _always
+        self._pause: Callable[[], None] = _interrupted
+
+    @property
+    def doubled(self) -> bool:
+        """Whether its requests are answered twice, each of them."""
+        return self._doubles.found
+
+    @property
+    def out_of_sync(self) -> bool:
+        """Whether something answers, but nobody can say to which request."""
+        return self._unassigned >= OUT_OF_SYNC
+
+    @property
+    def written(self) -> dict[tuple[int, int], bytes]:
+        """What the device has confirmed to hold since it came up."""
+        return self._written.confirmed()
+
+    def known(self, index: int, subindex: int, otherwise: bytes | None = None) -> bytes | None:
+        """What the device has confirmed to hold since it came up, `otherwise` where nothing was written.
+
+        `None` where nobody knows: a write of it is under way, or stayed unanswered.
+        """
+        return self._written.known((index, subindex), otherwise)
+
+    def is_unsure(self, index: int, subindex: int) -> bool:
+        """Whether it was written, and nobody knows whether the device took it."""
+        return self._written.is_unsure((index, subindex))
+
+    # What comes, and who is first.
 
     def on_response(self, _stamp_ns: int, data: bytes) -> None:
         """A frame with the identifier of this channel's responses; called in the bus's thread."""
-        if len(data) == 8:
+        if len(data) != 8:
+            return
+        if self._inbox.qsize() >= INBOX:
+            self.counters.dropped += 1
+        else:
             self._inbox.put(data)
 
     def interrupt(self, ahead: bytes | None = None) -> None:
@@ -70,119 +165,261 @@ class SdoChannel:
         with self._sending:
             self._interrupted.set()
             self._ahead = None
-            with contextlib.suppress(Unavailable):  # whoever waits for an answer is told
-                if self._in_flight is not None:
-                    self._send(sdo.abort_request(*self._in_flight, sdo.GENERAL_ERROR))
-                if ahead is not None:
-                    self._send(ahead)
-                    self._ahead = ahead
+            if self._in_flight is not None:
+                self._end_transfer(*self._in_flight, sdo.GENERAL_ERROR)
             self._in_flight = None
+            if ahead is not None:
+                self._written.doubt((int.from_bytes(ahead[1:3], "little"), ahead[3]))
+                with contextlib.suppress(Unavailable):  # whoever waits for an answer is told
+                    self._ahead = self._put(ahead[1:4], ahead)
 
     def wake(self) -> None:
         """Let a job that waits for an answer look whether it was interrupted."""
         self._inbox.put(None)
 
-    def resume(self) -> None:
-        """Allow transfers again."""
+    def resume(
+        self,
+        *,
+        urgent: bool = False,
+        current: Callable[[], bool] = _always,
+        pause: Callable[[], None] = _interrupted,
+    ) -> None:
+        """Allow transfers again, to one job.
+
+        The writes of an `urgent` one wait for nothing, and are sent whoever answers. Transfers of one that is
+        no longer `current` fail. `pause` is called where it is interrupted, and returns when it may go on.
+        """
+        self._urgent, self._current, self._pause = urgent, current, pause
         self._interrupted.clear()
+
+    def forget_written(self) -> None:
+        """The device may hold other values than it was given."""
+        self._written.forget()
+
+    def rebooted(self) -> None:
+        """The node has booted: it has forgotten what it was asked and given."""
+        self._outstanding.forget()
+        self._written.forget()
+        self._doubles = Doubles()
+        self._unassigned = 0
+
+    # Transfers.
 
     def upload(
         self, index: int, subindex: int, attempts: int = READ_ATTEMPTS, timeout_s: float | None = None
     ) -> bytes:
-        """Read an object; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
+        """Read an object; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`.
+
+        What it returns, the device held after this was called.
+        """
         what = f"{self.label}: reading 0x{index:04X}:{subindex:02X}"
-        wait_s = timeout_s or self.timeout_s
+        steps = partial(sdo.upload, index, subindex)
+        read = _Transfer(steps, index, subindex, what, timeout_s or self.timeout_s)
         for _ in range(attempts - 1):
-            try:
-                return self._transfer(sdo.upload(index, subindex), index, subindex, what, wait_s)
-            except DeviceTimeout:
-                continue
-        return self._transfer(sdo.upload(index, subindex), index, subindex, what, wait_s)
+            with contextlib.suppress(DeviceTimeout):
+                return self._perform(read)
+        return self._perform(read)
 
-    def download(self, index: int, subindex: int, data: bytes, timeout_s: float | None = None) -> None:
-        """Write an object, once; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`."""
-        self._check_interrupted()
+    def download(
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        timeout_s: float | None = None,
+        permitted: Callable[[], str | None] | None = None,
+    ) -> None:
+        """Write an object, once; raises `DeviceAbort`, `DeviceTimeout` or `Unavailable`.
+
+        `permitted` says why it may not be written, `None` where it may: then it is in the bus's hands before
+        anything that interrupts this. It must return at once, and wait for nothing that such a caller has.
+        Where it objects, nothing is sent and `NotPermitted` is raised.
+        """
         what = f"{self.label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
-        unknown = "whether the device took it is not known, read it back"
-        self.written[index, subindex] = data
+        steps = partial(sdo.download, index, subindex, data)
+        may = permitted or _nothing
+        write = _Transfer(steps, index, subindex, what, timeout_s or self.timeout_s, data, may)
         try:
-            wait_s = timeout_s or self.timeout_s
-            self._transfer(sdo.download(index, subindex, data), index, subindex, what, wait_s)
+            self._perform(write)
+        except DeviceAbort:
+            self._written.withdraw()
+            raise
         except Interrupted as error:
-            raise DeviceTimeout(f"{what}: interrupted by an urgent request; {unknown}") from error
+            if not write.write_begun:
+                raise
+            raise DeviceTimeout(f"{what}: interrupted by an urgent request; {_UNKNOWN}") from error
         except DeviceTimeout as error:
-            raise DeviceTimeout(f"{error}; {unknown}") from error
+            if not write.write_begun:
+                raise
+            raise DeviceTimeout(f"{error}; {_UNKNOWN}") from error
+        else:
+            self._written.confirm((index, subindex), data)
+        finally:
+            self._written.leave()
 
-    def _transfer(
-        self, steps: Generator[bytes | None, bytes, T], index: int, subindex: int, what: str, timeout_s: float
-    ) -> T:
+    def _perform(self, transfer: _Transfer[T]) -> T:
+        while True:
+            try:
+                return self._attempt(transfer)
+            except Interrupted:
+                if transfer.write_begun:
+                    raise
+                self._pause()
+
+    def _attempt(self, transfer: _Transfer[T]) -> T:
         self._check_interrupted()
-        if self._ahead is None:
-            self._forget_stale()
+        if not self._current():
+            raise Unavailable(f"{transfer.what}: given up, the node began anew")
         self.counters.transfers += 1
         try:
-            return self._run(steps, (index, subindex), timeout_s)
+            return self._run(transfer)
         except sdo.SdoAborted as error:
             self.counters.aborts += 1
-            raise DeviceAbort(f"{what}: refused, {abort_text(error.abort_code)}", error.abort_code) from error
+            text = f"{transfer.what}: refused, {abort_text(error.abort_code)}"
+            raise DeviceAbort(text, error.abort_code) from error
         except sdo.SdoProtocolError as error:
-            self._abort(index, subindex, error.abort_code)
-            raise SdoProtocolBroken(f"{what}: the device {error}, against the SDO protocol") from error
+            self._abort(transfer, error.abort_code)
+            raise SdoProtocolBroken(
+                f"{transfer.what}: the device {error}, against the SDO protocol"
+            ) from error
         except queue.Empty as error:
             self.counters.timeouts += 1
-            self._abort(index, subindex, sdo.TIMED_OUT)
-            raise DeviceTimeout(f"{what}: no answer within {timeout_s:g} s") from error
+            self._abort(transfer, sdo.TIMED_OUT)
+            raise DeviceTimeout(f"{transfer.what}: no answer within {transfer.timeout_s:g} s") from error
         finally:
             self._in_flight = None
+            if transfer.request is not None:
+                transfer.request.given_up = True
 
-    def _run(self, steps: Generator[bytes | None, bytes, T], about: tuple[int, int], timeout_s: float) -> T:
+    def _run(self, transfer: _Transfer[T]) -> T:
+        self._fetch_waiting()
+        steps = transfer.begin()
+        request = next(steps)
+        answer = self._synchronise(transfer)
         try:
-            request = next(steps)
             while True:
-                if request is None:
-                    self.counters.stale += 1
-                else:
-                    self._ask(request, about)
-                    deadline = time.monotonic() + timeout_s
-                request = steps.send(self._response(deadline))
+                request = steps.send(answer or self._ask(transfer, request))
+                answer = None
         except StopIteration as done:
+            self._unassigned = 0
             result: T = done.value
             return result
 
-    def _ask(self, request: bytes, about: tuple[int, int]) -> None:
+    def _ask(self, transfer: _Transfer[Any], frame: bytes) -> bytes:
+        request = self._hand_over(transfer, frame)
+        deadline = time.monotonic() + transfer.timeout_s
+        while request.answer is None:
+            self._fetch(deadline)
+            if request.answer is None:
+                self._check_interrupted()
+        return request.answer
+
+    # In sync.
+
+    def _synchronise(self, transfer: _Transfer[Any]) -> bytes | None:
+        """Return when an answer about the object can only be to what is asked now.
+
+        Or with the answer, where it comes meanwhile, late, to what this very read has asked before.
+        """
+        at_once = self._urgent and transfer.data is not None and len(transfer.data) <= sdo.EXPEDITED
+        deadline = time.monotonic() + transfer.timeout_s
+        self.counters.resyncs += not at_once and self._outstanding.holds(transfer.about)
+        while transfer.late_answer is None and not at_once and self._outstanding.holds(transfer.about):
+            self._read_another(transfer, deadline)
+        return transfer.late_answer
+
+    def _read_another(self, transfer: _Transfer[Any], deadline: float) -> None:
+        """Until it is answered, or nothing more can be said about the transfer's own object."""
+        index, subindex = self._outstanding.probe(transfer.about)
+        steps = sdo.upload(index, subindex)
+        probe = _Transfer(lambda: steps, index, subindex, transfer.what, transfer.timeout_s)
+        request = self._hand_over(probe, next(steps))
+        try:
+            while request.answer is None and transfer.late_answer is None:
+                self._fetch(deadline)
+                self._check_interrupted()
+        except queue.Empty as error:
+            self.counters.timeouts += 1
+            self._unassigned += self._outstanding.heard
+            raise DeviceTimeout(
+                f"{transfer.what}: not asked, because an answer could be a late one to an earlier request; "
+                f"0x{index:04X}:{subindex:02X}, which would tell, was not answered within "
+                f"{transfer.timeout_s:g} s"
+            ) from error
+        finally:
+            request.given_up = True
+        if request.answer is not None and not sdo.concludes(request.answer, request.frame):
+            self._abort(probe, sdo.GENERAL_ERROR)  # its data is of no interest
+
+    def _fetch_waiting(self) -> None:
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._take(self._inbox.get_nowait())
+
+    def _fetch(self, deadline: float) -> None:
+        """Take the next response; raises `queue.Empty` at the deadline."""
+        self._take(self._inbox.get(timeout=max(0.0, deadline - time.monotonic())))
+
+    def _take(self, response: bytes | None) -> None:
+        if response is None:
+            return
+        if self._outstanding.settle(response) is not None:
+            self._doubles.answered(response)
+            return
+        self.counters.stale += 1
+        if not self._outstanding.is_lost(response):
+            self.counters.doubled += self._doubles.again(response)
+
+    # What goes out.
+
+    def _hand_over(self, transfer: _Transfer[Any], frame: bytes) -> Request:
         with self._sending:
             self._check_interrupted()
-            self._in_flight = about
-            if request != self._ahead:
-                self._send(request)
-            self._ahead = None
+            ahead, self._ahead = self._ahead, None
+            if ahead is None or ahead.frame != frame:
+                self._check_permitted(transfer)
+                ahead = None
+            begins = transfer.data is not None and transfer.request is None
+            if begins:
+                self._written.begin((transfer.index, transfer.subindex))
+            try:
+                transfer.request = ahead or self._put(transfer.about, frame)
+            except Unavailable:
+                if begins:
+                    self._written.withdraw()
+                raise
+            self._in_flight = (transfer.index, transfer.subindex)
+            return transfer.request
 
-    def _abort(self, index: int, subindex: int, abort_code: int) -> None:
+    def _check_permitted(self, transfer: _Transfer[Any]) -> None:
+        """Raise `NotPermitted` where a write that is about to begin must not."""
+        if transfer.data is None or transfer.request is not None:
+            return
+        why = transfer.permitted() or (None if self._urgent else self._distrust())
+        if why is not None:
+            raise NotPermitted(f"{transfer.what}: not sent: {why}")
+
+    def _put(self, about: bytes, frame: bytes) -> Request:
+        request = self._outstanding.add(about, frame)  # before it can be answered
+        try:
+            self._send(frame)
+        except Unavailable:
+            self._outstanding.drop(request)
+            raise
+        return request
+
+    def _abort(self, transfer: _Transfer[Any], abort_code: int) -> None:
         with self._sending:
             if not self._interrupted.is_set():  # else it was sent, and something else is in flight
-                self._send(sdo.abort_request(index, subindex, abort_code))
+                self._end_transfer(transfer.index, transfer.subindex, abort_code)
 
-    def _response(self, deadline: float) -> bytes:
-        """The next response; raises `queue.Empty` at the deadline and `Interrupted`."""
-        while True:
-            response = self._inbox.get(timeout=max(0.0, deadline - time.monotonic()))
-            if self._interrupted.is_set():
-                self._inbox.put(response)  # it may be the answer to what was sent ahead
-                raise Interrupted
-            if response is not None:
-                return response
+    def _end_transfer(self, index: int, subindex: int, abort_code: int) -> None:
+        """Tell the device, which answers nothing to that."""
+        with contextlib.suppress(Unavailable):
+            self._send(sdo.abort_request(index, subindex, abort_code))
 
     def _check_interrupted(self) -> None:
         if self._interrupted.is_set():
             raise Interrupted
-
-    def _forget_stale(self) -> None:
-        while True:
-            try:
-                response = self._inbox.get_nowait()
-            except queue.Empty:
-                return
-            self.counters.stale += response is not None
 
 
 def value_text(data: bytes) -> str:

@@ -2,7 +2,8 @@
 
 Two transfers to one node at a time corrupt each other, so everything that is asked of a node goes through
 its worker. A job is a function that is given the channel; an urgent one interrupts what is running. What was
-interrupted runs again afterwards, except that a write in flight fails as unknown.
+interrupted runs again afterwards, or goes on where it asks for that, except that a write in flight fails as
+unknown. Urgent jobs are done in the order in which they were asked for, and none interrupts another.
 """
 
 import heapq
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 from drivers.bus.sdo_channel import Interrupted, SdoChannel
@@ -19,13 +21,17 @@ from drivers.errors import Unavailable
 
 T = TypeVar("T")
 Job = Callable[[SdoChannel], T]
+Current = Callable[[], bool]
+
+URGENT, USUAL = 0, 1  # priorities
 
 
 @dataclass(order=True, slots=True)
 class _Task:
-    priority: int  # 0 urgent, 1 not
+    priority: int
     number: int  # first come, first served
     job: Job[Any] = field(compare=False)
+    current: Current | None = field(compare=False, default=None)
     future: Future[Any] = field(compare=False, default_factory=Future)
 
 
@@ -71,24 +77,33 @@ class SdoWorker:
             self._thread = None
 
     def submit(
-        self, job: Job[T], *, urgent: bool = False, ahead: bytes | None = None, wake: bool = True
+        self,
+        job: Job[T],
+        *,
+        urgent: bool = False,
+        ahead: bytes | None = None,
+        wake: bool = True,
+        current: Current | None = None,
     ) -> Future[T]:
         """Do `job` when its turn comes; the future's callbacks run in the worker's thread.
 
         `ahead` is the first request of an urgent job: it is sent now, by the caller's thread, if no other
         urgent job has the channel. With `wake=False` the worker may not notice before `wake` is called: who
-        sends requests to many nodes has no use for their threads in between.
+        sends requests to many nodes has no use for their threads in between. A job with `current` is long: it
+        is not begun again after urgent ones but goes on, until `current` says that it has become worthless;
+        then its next transfer raises `Unavailable`.
         """
-        task = _Task(0 if urgent else 1, next(self._numbers), job)
+        task = _Task(URGENT if urgent else USUAL, next(self._numbers), job, current)
         with self._changed:
             if not self._open:
                 task.future.set_exception(self._closed())
                 return task.future
-            if urgent and not self._has_urgent():
-                self.channel.interrupt(ahead)
+            interrupts = urgent and not self._has_urgent()
             heapq.heappush(self._tasks, task)
             if wake:
                 self._changed.notify()
+            if interrupts:
+                self.channel.interrupt(ahead)
         if urgent and wake:
             self.channel.wake()
         return task.future
@@ -110,32 +125,39 @@ class SdoWorker:
             with self._changed:
                 if repeated in self._repeated:
                     self._repeated.remove(repeated)
+                if repeated.task is not None:
+                    repeated.task.future.cancel()  # where it only waits
 
         return end
 
     def _has_urgent(self) -> bool:
-        waiting = bool(self._tasks) and self._tasks[0].priority == 0
-        return waiting or (self._running is not None and self._running.priority == 0)
+        return self._urgent_waits() or (self._running is not None and self._running.priority == URGENT)
+
+    def _urgent_waits(self) -> bool:
+        return bool(self._tasks) and self._tasks[0].priority == URGENT
 
     def _closed(self) -> Unavailable:
         return Unavailable(f"{self.channel.label}: its bus is not open, nothing can be asked of it")
 
     def _run(self) -> None:
         while (task := self._next()) is not None:
-            if not _begin(task.future):
-                continue
-            try:
-                result = task.job(self.channel)
-            except Interrupted:
-                self._put_back(task)
-            except Exception as error:  # noqa: BLE001 - it belongs to whoever waits for the future
-                task.future.set_exception(error)
-            else:
-                task.future.set_result(result)
+            self._do(task)
         for task in self._tasks:
             if _begin(task.future):
                 task.future.set_exception(self._closed())
         self._tasks.clear()
+
+    def _do(self, task: _Task) -> None:
+        if not _begin(task.future):
+            return
+        try:
+            result = task.job(self.channel)
+        except Interrupted:
+            self._put_back(task)
+        except Exception as error:  # noqa: BLE001 - it belongs to whoever waits for the future
+            task.future.set_exception(error)
+        else:
+            task.future.set_result(result)
 
     def _next(self) -> _Task | None:
         with self._changed:
@@ -143,11 +165,28 @@ class SdoWorker:
             while self._open:
                 wait_s = self._queue_due()
                 if self._tasks:
-                    self._running = heapq.heappop(self._tasks)
-                    self.channel.resume()
-                    return self._running
+                    return self._give_channel(heapq.heappop(self._tasks))
                 self._changed.wait(wait_s)
             return None
+
+    def _pause(self, long: _Task) -> None:
+        """Within a long job that was interrupted: do what is urgent, then let it go on."""
+        while (task := self._next_urgent(long)) is not long:
+            self._do(task)
+
+    def _next_urgent(self, long: _Task) -> _Task:
+        with self._changed:
+            if not self._open:
+                raise Interrupted
+            return self._give_channel(heapq.heappop(self._tasks) if self._urgent_waits() else long)
+
+    def _give_channel(self, task: _Task) -> _Task:
+        self._running = task
+        if task.current is None:
+            self.channel.resume(urgent=task.priority == URGENT)
+        else:
+            self.channel.resume(current=task.current, pause=partial(self._pause, task))
+        return task
 
     def _put_back(self, task: _Task) -> None:
         with self._changed:
@@ -158,7 +197,7 @@ class SdoWorker:
         now = time.monotonic()
         for repeated in self._repeated:
             if repeated.due <= now and (repeated.task is None or repeated.task.future.done()):
-                repeated.task = _Task(1, next(self._numbers), repeated.job)
+                repeated.task = _Task(USUAL, next(self._numbers), repeated.job)
                 heapq.heappush(self._tasks, repeated.task)
                 repeated.due = max(repeated.due + repeated.period_s, now)
         waiting = [r.due for r in self._repeated if r.task is None or r.task.future.done()]

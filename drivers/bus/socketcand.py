@@ -4,6 +4,7 @@ python-can's own client does not notice that the server has gone and loses the h
 to it; this one says what is wrong at once and costs less per frame.
 """
 
+import select
 import socket
 import time
 from collections.abc import Sequence
@@ -63,11 +64,15 @@ def send_message(can_id: int, data: bytes) -> str:
 class SocketcandTransport:
     """An open connection to one CAN channel of a socketcand server."""
 
+    blocks = False
+
     def __init__(self, host: str, port: int, channel: str) -> None:
         """Connect and enter raw mode; raises `Unavailable`."""
         self.dropped = 0  # messages that were no frames
         self.warning: str | None = None
         self._where = f"socketcand at {host}:{port}"
+        self.full = f"{self._where} takes no frames: is the CAN server, or the network to it, stuck?"
+        self._unsent = b""  # of a frame that was taken
         self._parser = SocketcandParser()
         self._early: list[str] = []
         try:
@@ -86,6 +91,10 @@ class SocketcandTransport:
         except Unavailable:
             self._socket.close()
             raise
+        self._out = self._socket.dup()  # the same connection, whose time-out is for receiving only
+        self._out.setblocking(False)
+        self._room = select.poll()
+        self._room.register(self._out, select.POLLOUT)
 
     def receive(self, timeout_s: float) -> Sequence[Frame]:
         """Frames that came; stamped together when they were taken from the socket."""
@@ -101,19 +110,39 @@ class SocketcandTransport:
                 self.dropped += 1
         return frames
 
-    def send(self, can_id: int, data: bytes) -> None:
+    def try_send(self, can_id: int, data: bytes) -> bool:
         if can_id & REMOTE:
             raise Unavailable(f"{self._where}: the protocol has no remote frames, so no node guarding")
-        try:
-            self._socket.sendall(send_message(can_id, data).encode("ascii"))
-        except OSError as error:
-            raise Unavailable(f"{self._where} is gone ({error})") from error
+        if not self.flush():
+            return False
+        line = send_message(can_id, data).encode("ascii")
+        sent = self._write(line)
+        self._unsent = line[sent:] if sent else b""
+        return sent > 0
+
+    def flush(self) -> bool:
+        if self._unsent:
+            self._unsent = self._unsent[self._write(self._unsent) :]
+        return not self._unsent
+
+    def await_room(self, timeout_s: float) -> None:
+        self._room.poll(timeout_s * 1000)
 
     def accept(self, can_ids: frozenset[int] | None) -> None:
         """The protocol's raw mode has no filters."""
 
     def close(self) -> None:
+        self._out.close()
         self._socket.close()
+
+    def _write(self, line: bytes) -> int:
+        """How much of it the connection took."""
+        try:
+            return self._out.send(line)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise Unavailable(f"{self._where} is gone ({error})") from error
 
     def _read(self, timeout_s: float) -> list[str]:
         try:

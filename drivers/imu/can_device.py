@@ -4,14 +4,12 @@ import threading
 from pathlib import Path
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.frames import EXTENDED
+from drivers.bus.frames import wire_id
 from drivers.imu import witmotion_can
 from drivers.imu.formats import FORMATS
 from drivers.imu.settings import CanImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality
-
-STANDARD_IDS = 0x7FF
 
 
 class CanImu(TrunkImu, BusUser):
@@ -21,7 +19,7 @@ class CanImu(TrunkImu, BusUser):
         super().__init__(name, settings, FORMATS["witmotion"].conventions, settings.attitude, beside)
         self._bus = bus
         self._label = f"0x{settings.can_id:03X}"
-        self._can_id = settings.can_id | (EXTENDED if settings.can_id > STANDARD_IDS else 0)
+        self._can_id = wire_id(settings.can_id)
         self._lock = threading.Lock()  # frames come in the bus's thread
         self._started = False
         self._frames = self._foreign = 0

@@ -27,6 +27,7 @@ from drivers.joint.quantities import POSITION, STATUSWORD, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
 from drivers.joint.remap import disable, free_tpdo, remap
 from drivers.joint.settings import JointSettings
+from drivers.joint.stop_rpdo import find_stop_rpdo
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from eds import Description
@@ -108,23 +109,25 @@ class JointDrive(PowerDrive):
             reading = read_drive(sdo, self._description, self.settings.axis)
             plan = make_plan(self.settings, self._quantities, reading)
             plan = replace(plan, notes=(told, *plan.notes))
-        self.read_stop_channel(sdo)
+        stop_rpdo = find_stop_rpdo(self.node, sdo, self._offset)
         with self._lock:
             self.forget()
             if self._started:
-                self.reading, self._plan = reading, plan
+                self.reading, self._plan, self._stop_rpdo = reading, plan, stop_rpdo
                 self._install(plan)
 
     def forget(self) -> None:
         with self._lock:
             while self._undo:
                 self._undo.pop()()
-            self.reading = self._plan = None
+            self.reading = self._plan = self._stop_rpdo = None
             self.latest.clear()
             self._freshness.disconnected()
 
     def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
         """Bring the position into a free TPDO; returns what came of it, in words."""
+        if self.node.distrust is not None:
+            return f"configure_pdos: {self.node.distrust}"
         free = free_tpdo(reading.tpdos, self.node.node_id, self.node.bus.unclaimed)
         if free is None:
             return "configure_pdos: no TPDO of the drive is free, nothing was changed"
@@ -170,7 +173,10 @@ class JointDrive(PowerDrive):
 
     def _poll(self, polled: tuple[Source, ...], sdo: SdoChannel) -> None:
         for one in polled:
-            data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
+            try:
+                data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
+            except DeviceAbort:
+                continue  # its EDS knows it, this device does not: the others are there all the same
             self._take(one, int.from_bytes(data, "little", signed=one.quantity.signed), time.monotonic_ns())
 
     def _take(self, one: Source, counts: int, stamp_ns: int) -> None:

@@ -6,7 +6,7 @@ ends either way: nothing is sent any more, and nothing is tried again.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from drivers.bus.sdo_channel import Interrupted
 from drivers.errors import DeviceTimeout, DriverError, Unavailable
@@ -19,6 +19,7 @@ LOOK_S = 0.01  # between two looks at the statusword
 FAULT_RESET_S = 0.5  # between two attempts to reset a fault that stays
 STANDS_S, STANDS_SHARE = 0.05, 1e-4  # an axis that moves less than this share of a turn in this time stands
 OVERTAKEN = "a stop came in between"
+_UNKNOWN = "no state of CiA 402"
 _WAY_UP_STATES = (*WAY_UP, DriveState.OPERATION_ENABLED)
 
 
@@ -29,7 +30,8 @@ class Led:
     state: DriveState | None
     problem: str | None = None
     mode: int | None = None  # of operation (6061h), where it was enabled
-    asked_ns: int = 0  # when the request for that statusword was sent
+    # When the request was begun whose answer says the state (monotonic); 0: nothing was read.
+    asked_ns: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +43,39 @@ class Errand:
     counts_per_turn: float  # of the joint
 
 
+def look(axis: Axis) -> Led:
+    """What its statusword says now; where it does not tell, why."""
+    try:
+        return _read(axis)
+    except DriverError as error:
+        return Led(None, str(error))
+
+
 def lead_down(axis: Axis, errand: Errand) -> Led:
     """To SWITCH ON DISABLED from any state; an axis that drives or brakes comes to rest before."""
-    return _Descent(axis, errand).run()
+    return _unless_overtaken(errand, _Descent(axis, errand).run())
 
 
 def step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:
     """From `origin` to the state that follows it; an axis that is further up already is left as it is."""
+    if not errand.wanted():
+        return Led(None, OVERTAKEN)
     try:
-        return _step_up(axis, errand, origin)
+        return _unless_overtaken(errand, _step_up(axis, errand, origin))
     except Interrupted:
         return Led(None, OVERTAKEN)
     except DriverError as error:
-        return Led(None, str(error) if errand.wanted() else OVERTAKEN)
+        return _unless_overtaken(errand, Led(None, str(error)))
+
+
+def _unless_overtaken(errand: Errand, led: Led) -> Led:
+    return led if errand.wanted() else replace(led, problem=OVERTAKEN)
+
+
+def _read(axis: Axis) -> Led:
+    asked_ns = time.monotonic_ns()
+    state = axis.state()
+    return Led(state, None if state is not None else f"it is in {_UNKNOWN}", asked_ns=asked_ns)
 
 
 class _Descent:
@@ -67,9 +89,7 @@ class _Descent:
 
     def run(self) -> Led:
         deadline = time.monotonic() + self._errand.timeout_s
-        while time.monotonic() < deadline and self._led.problem is not None:
-            if not self._errand.wanted():
-                return replace(self._led, problem=OVERTAKEN)
+        while time.monotonic() < deadline and self._led.problem is not None and self._errand.wanted():
             try:
                 self._look()
             except DeviceTimeout:
@@ -82,15 +102,16 @@ class _Descent:
         return self._led
 
     def _look(self) -> None:
-        state = self._axis.state()
+        self._led = _read(self._axis)
+        state = self._led.state
         if state is DriveState.SWITCH_ON_DISABLED:
-            self._led = Led(state)
             return
-        words = "no state of CiA 402" if state is None else state.words
-        self._led = Led(state, f"it stays in {words}")
+        words = _UNKNOWN if state is None else state.words
+        self._led = replace(self._led, problem=f"it stays in {words}")
         if state is not None and self._may_step(state):
             for controlword in WAY_DOWN.get(state, ()):
-                self._axis.command(controlword)
+                if self._errand.wanted():
+                    self._axis.command(controlword)
 
     def _may_step(self, state: DriveState) -> bool:
         """An axis that brakes is not let go limp, and a fault is not reset again too soon."""
@@ -110,27 +131,27 @@ class _Descent:
 
 def _step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:
     controlword, target = WAY_UP[origin]
-    state = axis.state()
-    if state in _WAY_UP_STATES[_WAY_UP_STATES.index(target) :]:
-        return Led(state)
+    led = _read(axis)
+    if led.state in _WAY_UP_STATES[_WAY_UP_STATES.index(target) :]:
+        return led
     mode = None
-    if state is origin and target is DriveState.OPERATION_ENABLED:
+    if led.state is origin and target is DriveState.OPERATION_ENABLED:
         mode = hold_still(axis)
-        state = axis.state()
-    if state is not origin:
-        return Led(state, f"it is not in {origin.words}; reset it first")
+        led = _read(axis)
+    if led.state is not origin:
+        return replace(led, problem=f"it is not in {origin.words}; reset it first")
     if not errand.wanted():
-        return Led(state, OVERTAKEN)
+        return led
     axis.command(controlword)
     return replace(_await(axis, errand, origin, target), mode=mode)
 
 
 def _await(axis: Axis, errand: Errand, origin: DriveState, target: DriveState) -> Led:
     deadline = time.monotonic() + errand.timeout_s
-    state = axis.state()
-    while state is origin and time.monotonic() < deadline and errand.wanted():
+    led = _read(axis)
+    while led.state is origin and time.monotonic() < deadline and errand.wanted():
         time.sleep(LOOK_S)
-        state = axis.state()
-    if state is target:
-        return Led(state)
-    return Led(state, f"it did not go from {origin.words} to {target.words}")
+        led = _read(axis)
+    if led.state is target:
+        return led
+    return replace(led, problem=f"it did not go from {origin.words} to {target.words}")

@@ -38,6 +38,13 @@ _STANDARD = (
     Quantity("error_code", 0x603F, 0, "", signed=False, scale=1),
 )
 
+# Bits 0 to 3: negative and positive limit switch, home switch, interlock; from 16 on the maker's own. The
+# voltage is that of the DC link, in mV (CiA 402-2).
+_SURROUNDINGS = (
+    Quantity("digital_inputs", 0x60FD, 0, "", signed=False, scale=1),
+    Quantity("voltage", 0x6079, 0, "V", signed=False, scale=0.001),
+)
+
 # CiA 402 has no temperature: each vendor has its own object, °C per count. By vendor id and product code;
 # a product code of None stands for all of the vendor's drives.
 _TEMPERATURES: dict[tuple[int, int | None], tuple[int, int, float]] = {
@@ -54,7 +61,9 @@ def quantities(description: Description, axis: int) -> tuple[Quantity, ...]:
     description.require(
         [(index + offset, name) for index, name in REQUIRED], "a joint" if axis == 0 else f"axis {axis}"
     )
-    shifted = (_shift(quantity, offset) for quantity in (*_STANDARD, *_temperature(description)))
+    shifted = (
+        _shift(quantity, offset) for quantity in (*_STANDARD, *_temperature(description), *_SURROUNDINGS)
+    )
     return tuple(
         _as_described(quantity, description) for quantity in shifted if _described(quantity, description)
     )

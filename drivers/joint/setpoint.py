@@ -1,8 +1,12 @@
-"""Gives a drive the setpoint that moves nothing in the mode it is in (CiA 402-2: 607Ah, 60FFh, 6071h, …)."""
+"""Gives a drive the setpoint that moves nothing in the mode it is in (CiA 402-2: 607Ah, 60FFh, 6071h, …).
+
+In the cyclic modes the drive adds offsets to it, or feeds them forward; they are zeroed where it has them.
+"""
 
 from collections.abc import Mapping
 
-from drivers.errors import DriverError, Mismatch
+from drivers.bus.aborts import NO_OBJECT
+from drivers.errors import DeviceAbort, DriverError, Mismatch
 from drivers.joint.axis import POSITION_ACTUAL, Axis
 from drivers.joint.cia402 import MODES, option_text
 
@@ -22,6 +26,15 @@ SETPOINTS: Mapping[int, tuple[int, int, int, bool]] = {
 }
 
 
+# What a cyclic mode adds: index and bytes of position, velocity and torque offset (CiA 402-2 §14 to §16).
+_POSITION_OFFSET, _VELOCITY_OFFSET, _TORQUE_OFFSET = (0x60B0, 4), (0x60B1, 4), (0x60B2, 2)
+OFFSETS: Mapping[int, tuple[tuple[int, int], ...]] = {
+    8: (_POSITION_OFFSET, _VELOCITY_OFFSET, _TORQUE_OFFSET),
+    9: (_VELOCITY_OFFSET, _TORQUE_OFFSET),
+    10: (_TORQUE_OFFSET,),
+}
+
+
 def hold_still(axis: Axis) -> int:
     """Write it, read it back, and return the mode (6061h).
 
@@ -34,13 +47,27 @@ def hold_still(axis: Axis) -> int:
             f"{axis.sdo.label}: nobody knows what it would do in its mode of operation "
             f"({option_text(MODES, mode)}, 6061h is {mode}); set another one in 6060h"
         )
+    for index, size in OFFSETS.get(mode, ()):
+        _zero(axis, index, size)
     index, subindex, size, where_it_is = SETPOINTS[mode]
-    value = axis.read(POSITION_ACTUAL, size) if where_it_is else bytes(size)
+    _hold(axis, index, subindex, axis.read(POSITION_ACTUAL, size) if where_it_is else bytes(size))
+    return mode
+
+
+def _zero(axis: Axis, index: int, size: int) -> None:
+    """An offset that the drive does not have adds nothing."""
+    try:
+        _hold(axis, index, 0, bytes(size))
+    except DeviceAbort as error:
+        if error.abort_code != NO_OBJECT:
+            raise
+
+
+def _hold(axis: Axis, index: int, subindex: int, value: bytes) -> None:
     axis.write(index, value, subindex)
-    held = axis.read(index, size, subindex)
+    held = axis.read(index, len(value), subindex)
     if held != value:
         raise Mismatch(
             f"{axis.sdo.label}: 0x{index + axis.offset:04X}:{subindex:02X} holds {held.hex(' ')} after "
             f"{value.hex(' ')} was written, so its setpoint would move it"
         )
-    return mode

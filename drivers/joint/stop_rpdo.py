@@ -1,7 +1,7 @@
 """A quick stop by RPDO, for a bus whose master we are: sooner than SDO, and confirmed by nothing.
 
 The RPDO must take effect without anybody else's SYNC. Its other objects are sent as the drive has them: as
-they were when it came up, or as we have written them since.
+they were when it came up, or as we have written them since; where that is not known, it is not sent.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,11 @@ from drivers.bus.node import Node
 from drivers.bus.rpdo import Rpdo, find_rpdo, read_values
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.settings import Role
-from drivers.errors import DeviceAbort, Unavailable
+from drivers.errors import DeviceAbort
 from drivers.joint.commands import CONTROLWORD, Controlword
 
-Values = dict[tuple[int, int], bytes]
+Object = tuple[int, int]
+Values = dict[Object, bytes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,19 +25,26 @@ class StopRpdo:
     node: Node
     rpdo: Rpdo
     values: Values  # of its objects, when the drive came up
-    controlword: tuple[int, int]
+    controlword: Object
 
     def send(self) -> bool:
-        """Put the quick stop on the bus, from any thread; whether that could be done."""
+        """Put the quick stop on the bus, from any thread, without blocking; whether it left at once.
+
+        It is not sent where nobody knows what else it would carry.
+        """
         if self.node.life.nmt_state not in (NmtState.OPERATIONAL, None):
             return False  # RPDOs are dead in the other states
-        quick_stop: Values = {self.controlword: Controlword.QUICK_STOP.data}
-        try:
-            frame = self.rpdo.frame({**self.values, **self.node.channel.written, **quick_stop})
-            self.node.bus.send(self.rpdo.can_id, frame)
-        except Unavailable:
-            return False
-        return True
+        values: Values = {self.controlword: Controlword.QUICK_STOP.data}
+        for object_ in self.values.keys() - values.keys():
+            held = self._held(object_)
+            if held is None:
+                return False
+            values[object_] = held
+        return self.node.bus.send_urgent(self.rpdo.can_id, self.rpdo.frame(values))
+
+    def _held(self, object_: Object) -> bytes | None:
+        """What the device holds of an object now, as far as it has confirmed that; `None`: nobody knows."""
+        return self.node.channel.known(*object_, self.values[object_])
 
 
 def find_stop_rpdo(node: Node, sdo: SdoChannel, axis_offset: int) -> StopRpdo | None:

@@ -64,17 +64,19 @@ def _row(name: str, value: Number, info: ParameterInfo | None, held: ParameterVa
     stored = coding.decode(data)
     if data == coding.encode(held.value):
         return Row(name, info.unit, stored, held.value, Verdict.SAME)
-    verdict, why = next(_objections(info, stored, held.value), (Verdict.DIFFERENT, ""))
+    verdict, why = next(_objections(info, coding, stored, held.value), (Verdict.DIFFERENT, ""))
     return Row(name, info.unit, stored, held.value, verdict, why)
 
 
-def _objections(info: ParameterInfo, stored: Number, held: Number) -> Iterator[tuple[Verdict, str]]:
+def _objections(
+    info: ParameterInfo, coding: Coding, stored: Number, held: Number
+) -> Iterator[tuple[Verdict, str]]:
     """Why the robot would refuse to change it, the most lasting reason first."""
     if info.read_only is not None:
         yield Verdict.READ_ONLY, info.read_only
-    if info.min is not None and stored < info.min:
+    if info.min is not None and stored < coding.nearest(info.min):
         yield Verdict.OUT_OF_LIMITS, f"below {text(info.min)}"
-    if info.max is not None and stored > info.max:
+    if info.max is not None and stored > coding.nearest(info.max):
         yield Verdict.OUT_OF_LIMITS, f"above {text(info.max)}"
     if info.max_step is not None and too_far(held, stored, info.max_step):
         yield Verdict.TOO_FAR, f"at most {text(info.max_step)}"

@@ -7,7 +7,7 @@ from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Number, scaled
 from gateway.config import STORE, ParameterSettings, RobotConfig
 from gateway.modules.offer import offered
-from gateway.modules.parameters import Parameter
+from gateway.modules.parameters import Parameter, contradiction
 from gateway.sources import check_globs, matches
 
 
@@ -75,6 +75,8 @@ def described(
     if known is None or known.kind not in NUMBERS:
         return unusable(f"{settings.object} is no number in {description.path.name}; parameters are numbers")
     eds_low, eds_high = _scaled_limits(variable.min, variable.max, settings.scale)
+    least = max((limit for limit in (low, eds_low) if limit is not None), default=None)
+    most = min((limit for limit in (high, eds_high) if limit is not None), default=None)
     return Parameter(
         name,
         component,
@@ -83,9 +85,10 @@ def described(
         subindex,
         variable.data_type or 0,
         variable.access_type.lower(),
-        max((limit for limit in (low, eds_low) if limit is not None), default=None),
-        min((limit for limit in (high, eds_high) if limit is not None), default=None),
+        least,
+        most,
         description.has(STORE, 1),
+        contradiction(least, most, f'{description.path.name} or [parameter."{name}"]'),
         default=None if variable.default is None else scaled(variable.default, settings.scale),
     )
 

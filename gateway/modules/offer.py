@@ -17,10 +17,11 @@ from gateway.config import (
     STORE,
     DeviceTable,
     JointTable,
+    Node,
     ParameterSettings,
     RobotConfig,
 )
-from gateway.modules.parameters import WRITABLE, Lock, Parameter
+from gateway.modules.parameters import WRITABLE, Lock, Parameter, contradiction
 from gateway.sources import matches
 
 if TYPE_CHECKING:
@@ -55,13 +56,13 @@ def offered(
     config: RobotConfig, descriptions: Mapping[str, Description], own: Iterable[Parameter]
 ) -> Iterator[Parameter]:
     """The parameters of every table that says `parameters = "eds"`, without the file's `own`."""
-    taken = {(one.component, one.index, one.subindex): one.name for one in own}
-    shared: set[tuple[str, int]] = set()  # nodes whose common objects have their names already
+    taken = {(config.node_of(one.component), one.index, one.subindex): one.name for one in own}
+    shared: set[Node] = set()  # those whose common objects have their names already
     for kind, tables in (("joint", config.joint), ("device", config.device)):
         for component, table in tables.items():
             if table.parameters is None or component not in descriptions:
                 continue
-            node = (table.bus, table.node_id)
+            node = config.node_of(component)
             offer = _Offer(f"[{kind}.{component}]", component, table, descriptions[component], taken)
             yield from offer.parameters(common=node not in shared)
             shared.add(node)
@@ -76,13 +77,14 @@ class _Offer:
         component: str,
         table: JointTable | DeviceTable,
         description: Description,
-        taken: Mapping[tuple[str, int, int], str],
+        taken: Mapping[tuple[Node, int, int], str],
     ) -> None:
         self._where = where
         self._component = component
         self._table = table
         self._description = description
         self._taken = taken
+        self._node: Node = (table.bus, table.node_id)
         self._store = description.has(STORE, 1)
         self._mapped = {
             entry[:2]
@@ -105,7 +107,7 @@ class _Offer:
             data_type is not None
             and data_type.kind in NUMBERS
             and variable.access_type.lower() in WRITABLE
-            and (self._component, variable.index, variable.subindex) not in self._taken
+            and (self._node, variable.index, variable.subindex) not in self._taken
             and self._is_ours(variable.index, common=common)
         )
 
@@ -140,6 +142,7 @@ class _Offer:
             variable.min,
             variable.max,
             self._store,
+            contradiction(variable.min, variable.max, self._description.path.name),
             lock=self._lock(variable, name, address),
             table=self._where,
             default=variable.default,

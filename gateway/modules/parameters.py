@@ -44,6 +44,13 @@ _REMEDIES = {
 _LIMITS = (("min", operator.lt, "below the minimum"), ("max", operator.gt, "above the maximum"))
 
 
+def contradiction(least: Number | None, most: Number | None, where: str) -> str | None:
+    """Why no value can be within limits that contradict each other; `None` where they do not."""
+    if least is None or most is None or least <= most:
+        return None
+    return f"its limits allow nothing: minimum {text(least)} is above maximum {text(most)}; correct {where}"
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One parameter, resolved against its device's EDS. `problem` says why it cannot be used.
@@ -137,12 +144,17 @@ class Parameter:
 
         """
         self.check_writable()
-        self._check_limits(value, "")
+        unit, is_real = self.settings.unit, self.coding.type.kind == "real"
+        said = f"{text(value)} {unit}"
+        if not is_real:  # of which only what the device makes of it can be compared
+            self._check_limits(value, said)
         try:
             data = self.coding.encode(value)
         except CodingError as error:
             raise self.refusal(Kind.OUT_OF_LIMIT, str(error)) from error
-        self._check_limits(self.decode(data), f", which is what the device would hold of {text(value)},")
+        held = self.decode(data)
+        would_hold = f"{text(held)} {unit}, which is what the device would hold of {text(value)},"
+        self._check_limits(held, said if is_real else would_hold)
         return data
 
     def accepts(self, data: bytes) -> Number:
@@ -156,7 +168,7 @@ class Parameter:
         if len(data) != size_of(self.data_type):
             raise self.refusal(Kind.MISMATCH, f"{data.hex(' ')} is no {self.coding.type.name}")
         value = self.decode(data)
-        self._check_limits(value, "")
+        self._check_limits(value, f"{text(value)} {self.settings.unit}")
         return value
 
     def decode(self, data: bytes) -> Number:
@@ -166,10 +178,9 @@ class Parameter:
         except CodingError as error:
             raise self.refusal(Kind.MISMATCH, f"the device holds what is no value: {error}") from error
 
-    def _check_limits(self, value: Number, why: str) -> None:
-        unit = self.settings.unit
+    def _check_limits(self, value: Number, said: str) -> None:
         for which, is_beyond, word in _LIMITS:
             limit: Number | None = getattr(self, which)
-            if limit is not None and is_beyond(value, limit):
-                said = f"{text(value)} {unit}{why} is {word} {text(limit)} {unit}"
-                raise self.refusal(Kind.OUT_OF_LIMIT, said, limit)
+            if limit is not None and is_beyond(value, self.coding.nearest(limit)):
+                text_ = f"{said} is {word} {text(limit)} {self.settings.unit}"
+                raise self.refusal(Kind.OUT_OF_LIMIT, text_, limit)

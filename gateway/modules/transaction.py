@@ -119,6 +119,9 @@ class Transaction:
         said = self._leave.objection(self._rules.address(change.parameter))
         if said is not None:
             raise change.parameter.refusal(self._leave.kind(said), said)
+        silence = self._rules.silence(change.parameter.component)
+        if silence is not None:
+            raise change.parameter.refusal(Kind.UNAVAILABLE, silence)
         if change.node.distrust is not None:
             raise change.parameter.refusal(Kind.NOT_ALLOWED, change.node.distrust)
 

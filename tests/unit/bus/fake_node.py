@@ -2,6 +2,8 @@
 
 import struct
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -23,12 +25,15 @@ class FakeNode:
     repeat_replies: int = 1  # how often each answer is sent
     deaf_to: set[Object] = field(default_factory=set)  # requests about these are not answered
     interface: str = "virtual"
+    delay_s: float = 0.0  # from a request to its answer
+    on_request: Callable[[bytes], None] = lambda request: None
     on_write: Callable[[int, int, bytes], None] = lambda index, subindex, data: None
 
     def __post_init__(self) -> None:
         self.requests: list[bytes] = []
         self.writes: list[tuple[int, int, bytes]] = []
         self.seen: list[tuple[int, bytes]] = []
+        self._due: deque[tuple[float, bytes]] = deque()  # answers, and when
         self._download: tuple[int, int, bytearray] | None = None
         self._upload = b""
 
@@ -63,21 +68,25 @@ class FakeNode:
 
     def _serve(self) -> None:
         while not self._stopping.is_set():
-            message = self.bus.recv(0.02)
-            if message is None:
-                continue
-            self.seen.append((message.arbitration_id, bytes(message.data)))
-            if message.arbitration_id == 0x600 + self.node_id:
-                self._answer(bytes(message.data))
+            message = self.bus.recv(self._patience_s())
+            if message is not None:
+                self.seen.append((message.arbitration_id, bytes(message.data)))
+                if message.arbitration_id == 0x600 + self.node_id:
+                    self._answer(bytes(message.data))
+            while self._due and self._due[0][0] <= time.monotonic():
+                self.send(0x580 + self.node_id, self._due.popleft()[1])
+
+    def _patience_s(self) -> float:
+        return min(0.02, max(0.0, self._due[0][0] - time.monotonic())) if self._due else 0.02
 
     def _answer(self, request: bytes) -> None:
         self.requests.append(request)
+        self.on_request(request)
         command, index, subindex = struct.unpack_from("<BHB", request)
         if self.silent or command == 0x80 or ((index, subindex) in self.deaf_to and command >> 5 in (1, 2)):
             return
         reply = self._reply(command, index, subindex, request)
-        for _ in range(self.repeat_replies):
-            self.send(0x580 + self.node_id, reply)
+        self._due.extend([(time.monotonic() + self.delay_s, reply)] * self.repeat_replies)
 
     def _reply(self, command: int, index: int, subindex: int, request: bytes) -> bytes:
         specifier = command >> 5

@@ -17,7 +17,7 @@ from drivers.errors import DriverError, Mismatch
 from eds import Description
 from tests.unit.bus.conftest import IDENTITY
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import until
+from tests.unit.bus.waiting import WAIT_S, until
 
 Describe = Callable[[int], Description]
 Values = dict[int, int]
@@ -136,6 +136,24 @@ def test_a_drive_that_would_not_stop_is_not_armed_and_it_is_said_why(
         assert found.arming.armed is False
         assert found.node.ready, "the drive is served all the same"
         assert not found.fake.writes
+
+
+def test_a_drive_of_another_make_than_its_eds_is_not_armed(bench: Make) -> None:
+    with bench({**consumer(0), **option(3), (0x1018, 2): b"\x43\0\0\0"}) as found:
+        found.until_said("not armed", "1018h product code is 0x43", "nothing is written to it")
+        assert not found.fake.writes
+
+
+def test_two_drives_with_one_node_id_are_not_armed(bench: Make) -> None:
+    with bench({**consumer(0), **option(0)}) as found:
+        found.until_said("6007h is 0")
+        found.fake.repeat_replies = 2
+        found.until_said("not armed", "two devices answer as node 5")
+        found.fake.objects.update(option(3))
+        found.until_said("not armed", "two devices answer as node 5")
+        assert not found.fake.writes
+        found.fake.repeat_replies = 1
+        until(lambda: found.node.upload(0x1000, 0).result(WAIT_S) and found.arming.armed)
 
 
 def test_each_axis_of_a_drive_must_act(bench: Make) -> None:

@@ -1,5 +1,6 @@
 """A bus opens for those who hold it, says what is wrong, and comes back."""
 
+import itertools
 import socket
 import sys
 import threading
@@ -11,9 +12,10 @@ import pytest
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.bus_state import BusState, bus_state
-from drivers.bus.frames import ERROR, EXTENDED
+from drivers.bus.frames import ERROR, EXTENDED, wire_id
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
+from tests.unit.bus.narrow import NarrowTransport
 from tests.unit.bus.waiting import until
 
 
@@ -67,6 +69,14 @@ def test_an_extended_identifier_is_not_taken_for_a_short_one(bus: CanBus, peer: 
     assert got == ["long", "short"]
 
 
+@pytest.mark.parametrize(
+    ("cob_id", "expected"),
+    [(0x601, 0x601), (0x7FF, 0x7FF), (0x800, 0x800 | EXTENDED), (0x1FFF_FFFF, 0x9FFF_FFFF)],
+)
+def test_a_configured_identifier_above_eleven_bits_is_an_extended_one(cob_id: int, expected: int) -> None:
+    assert wire_id(cob_id) == expected
+
+
 def test_several_handlers_share_an_identifier_and_leave_one_by_one(bus: CanBus, peer: can.BusABC) -> None:
     got: list[str] = []
 
@@ -106,6 +116,92 @@ def test_a_handler_that_fails_silences_nobody_and_is_told(bus: CanBus, peer: can
     until(lambda: got)
     assert bus.failed_handlers == 1
     assert "0x181: ZeroDivisionError: oops" in str(bus.problem)
+
+
+def test_a_user_that_fails_silences_nobody_and_is_told(bus: CanBus) -> None:
+    class Broken(BusUser):
+        def tick(self, now_ns: int) -> None:
+            raise ZeroDivisionError("oops")
+
+    user, broken = Recorder(), Broken()
+    bus.hold(broken)
+    bus.hold(user)
+    until(lambda: user.ticks > 1)
+    assert bus.opened == 1
+    assert "at a tick: ZeroDivisionError: oops" in str(bus.problem)
+    bus.release(broken)
+    bus.release(user)
+
+
+class TestUnexpectedErrors:
+    """What no transport should raise is named, and the bus comes back all the same."""
+
+    @pytest.fixture
+    def opened(self, monkeypatch: pytest.MonkeyPatch) -> list[NarrowTransport]:
+        """Every transport that was opened."""
+        opened: list[NarrowTransport] = []
+
+        def open_transport(_settings: CanSettings) -> NarrowTransport:
+            opened.append(NarrowTransport(room=1000))
+            return opened[-1]
+
+        monkeypatch.setattr("drivers.bus.bus.open_transport", open_transport)
+        return opened
+
+    def test_in_receiving(self, opened: list[NarrowTransport]) -> None:
+        bus, user = CanBus("main", CanSettings(interface="odd", channel="x")), Recorder()
+        bus.hold(user)
+        until(lambda: user.events == ["opened"])
+        opened[0].incoming.put(ZeroDivisionError("oops"))
+        until(lambda: user.events == ["opened", "closed"])
+        assert bus.problem == "internal error: ZeroDivisionError: oops"
+        assert opened[0].closed
+        until(lambda: user.events == ["opened", "closed", "opened"])
+        bus.send(0x601, b"")
+        assert opened[1].sent == [(0x601, b"")]
+        bus.release(user)
+
+    def test_in_opening(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        times: list[float] = []
+
+        def open_transport(_settings: CanSettings) -> NarrowTransport:
+            times.append(time.monotonic())
+            if len(times) < 4:
+                raise KeyError("host")
+            return NarrowTransport()
+
+        monkeypatch.setattr("drivers.bus.bus.open_transport", open_transport)
+        bus = CanBus("main", CanSettings(interface="odd", channel="x"))
+        bus.start()
+        until(lambda: bus.problem)
+        assert bus.problem == "internal error: KeyError: 'host'"
+        until(lambda: bus.opened)
+        pauses = [after - before for before, after in itertools.pairwise(times)]
+        assert all(pause >= least for pause, least in zip(pauses, (0.1, 0.2, 0.4), strict=True))
+        assert bus.problem is None
+        bus.stop()
+
+    def test_in_closing(self, opened: list[NarrowTransport], monkeypatch: pytest.MonkeyPatch) -> None:
+        bus, user = CanBus("main", CanSettings(interface="odd", channel="x")), Recorder()
+        bus.hold(user)
+        until(lambda: user.events == ["opened"])
+        monkeypatch.setattr(opened[0], "close", lambda: [][0])
+        opened[0].incoming.put(Unavailable("it is gone"))
+        until(lambda: user.events == ["opened", "closed"])
+        until(lambda: user.events == ["opened", "closed", "opened"])
+        bus.release(user)
+
+    def test_an_interface_that_opens_and_fails_at_once_is_not_opened_again_and_again(
+        self, opened: list[NarrowTransport], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(NarrowTransport, "receive", lambda self, timeout_s: [][0])
+        pauses: list[float] = []
+        bus = CanBus("main", CanSettings(interface="odd", channel="x"))
+        monkeypatch.setattr(bus._stopping, "wait", pauses.append)
+        bus.start()
+        until(lambda: len(pauses) > 6)
+        bus.stop()
+        assert pauses[:7] == [0.1, 0.2, 0.4, 0.8, 1.6, 2.0, 2.0]
 
 
 def test_users_are_told_that_the_bus_opened_and_that_time_passes(bus: CanBus) -> None:

@@ -61,7 +61,7 @@ def test_what_is_no_frame_is_passed_over(wire: tuple[SocketCanTransport, socket.
 
 def test_what_is_sent_is_a_can_frame(wire: tuple[SocketCanTransport, socket.socket]) -> None:
     transport, peer = wire
-    transport.send(0x601, b"\x40\x41\x60\x00\x00\x00\x00\x00")
+    transport.try_send(0x601, b"\x40\x41\x60\x00\x00\x00\x00\x00")
     assert peer.recv(100) == can_frame(0x601, b"\x40\x41\x60\x00\x00\x00\x00\x00")
 
 
@@ -69,7 +69,36 @@ def test_a_peer_that_is_gone_is_named(wire: tuple[SocketCanTransport, socket.soc
     transport, peer = wire
     peer.close()
     with pytest.raises(Unavailable, match="interface can0 does not send"):
-        transport.send(0x601, bytes(8))
+        transport.try_send(0x601, bytes(8))
+
+
+def test_what_the_socket_does_not_take_now_is_not_waited_for(
+    wire: tuple[SocketCanTransport, socket.socket],
+) -> None:
+    transport, peer = wire
+    count = 0
+    while transport.try_send(0x601, count.to_bytes(4, "little")):
+        count += 1
+    transport.await_room(0.0)  # there is none
+    assert not transport.try_send(0x601, b"")
+    for number in range(count):
+        assert peer.recv(100) == can_frame(0x601, number.to_bytes(4, "little"))
+    transport.await_room(1000.0)
+    assert transport.try_send(0x601, b"")
+
+
+def test_a_full_queue_of_the_interface_is_no_error() -> None:
+    class FullQueue(socket.socket):
+        def send(self, data: object, flags: int = 0) -> int:
+            raise OSError(errno.ENOBUFS, "No buffer space available")
+
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    transport = SocketCanTransport(FullQueue(fileno=ours.detach()), "interface can0")
+    assert not transport.try_send(0x601, b"")
+    transport.await_room(1000.0)  # the socket has room, and knows nothing of the queue
+    assert transport.full == "interface can0 does not send: does anybody on the bus acknowledge?"
+    transport.close()
+    theirs.close()
 
 
 def test_kernel_stamps_become_monotonic_and_drops_are_counted() -> None:

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.bus.frames import EXTENDED, Frame
+from drivers.bus.frames import EXTENDED, REMOTE, Frame
+from drivers.bus.sender import Sender
 from drivers.bus.socketcand import MAX_PENDING, SocketcandParser, SocketcandTransport, frame_of, send_message
 from drivers.errors import Unavailable
+from tests.unit.bus.waiting import until
 
 STREAM = (
     "< frame 181 1234.5 0102030405060708 >< frame 1FFFFFFF 0.0 AA >< error 20000004 1.0 >< frame 702 1.0 05 >"
@@ -105,6 +107,94 @@ def test_a_frame_glued_to_the_handshake_is_not_lost() -> None:
     with server(b"< hi >", b"< ok >", b"< ok >< frame 181 1.0 0102 >", keep_open=True) as port:
         transport = SocketcandTransport("127.0.0.1", port, "can0")
         assert [frame[1:] for frame in receive(transport)] == [(0x181, b"\x01\x02")]
+        transport.close()
+
+
+class Trickle(socket.socket):
+    """Takes seven bytes, then none, and so on: a network that is nearly stuck."""
+
+    def __init__(self, original: socket.socket) -> None:
+        super().__init__(fileno=original.detach())
+        self.setblocking(False)
+        self.calls = 0
+
+    def send(self, data: bytes, flags: int = 0) -> int:  # type: ignore[override]
+        self.calls += 1
+        if self.calls % 2 == 0:
+            raise BlockingIOError
+        return super().send(data[:7])
+
+
+@contextlib.contextmanager
+def listening() -> Iterator[tuple[int, bytearray]]:
+    """A server that takes all that comes after the handshake; its port, and what came."""
+    lines = bytearray()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def serve() -> None:
+            connection, _ = listener.accept()
+            with connection:
+                connection.sendall(b"< hi >")
+                for _ in range(2):
+                    connection.recv(100)
+                    connection.sendall(b"< ok >")
+                while data := connection.recv(777):
+                    lines.extend(data)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield listener.getsockname()[1], lines
+        thread.join()
+
+
+FRAMES = [(0x601, number.to_bytes(8, "big")) for number in range(20)]
+LINES = "".join(send_message(*frame) for frame in FRAMES)
+
+
+def test_a_frame_that_leaves_in_part_is_mixed_with_no_other() -> None:
+    with listening() as (port, lines):
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        transport._out = Trickle(transport._out)
+        refused = 0
+        for frame in FRAMES:
+            while not transport.try_send(*frame):
+                refused += 1
+        while not transport.flush():
+            transport.await_room(1000.0)
+        transport.close()
+    assert refused >= len(FRAMES)
+    assert lines.decode() == LINES
+
+
+def test_what_is_left_of_a_frame_follows_though_nobody_sends_another() -> None:
+    with listening() as (port, lines):
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        transport._out = Trickle(transport._out)
+        sender = Sender("main", lambda: "bus main is not open")
+        sender.start(transport)
+        for frame in FRAMES:
+            sender.send(*frame)
+        until(lambda: lines.decode() == LINES)
+        sender.stop()
+        transport.close()
+        sender.join()
+
+
+def test_what_a_stuck_network_does_not_take_now_is_not_waited_for() -> None:
+    with server(b"< hi >", b"< ok >", b"< ok >", keep_open=True) as port:
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        while transport.try_send(*FRAMES[0]):
+            pass
+        transport.await_room(0.0)
+        assert "is the CAN server, or the network to it, stuck?" in transport.full
+        transport.close()
+
+
+def test_a_remote_frame_is_refused_in_words() -> None:
+    with server(b"< hi >", b"< ok >", b"< ok >", keep_open=True) as port:
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        with pytest.raises(Unavailable, match="no remote frames, so no node guarding"):
+            transport.try_send(0x702 | REMOTE, b"")
         transport.close()
 
 

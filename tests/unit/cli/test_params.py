@@ -11,8 +11,10 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from eds import dcf
+from gateway.cli.params_diff import Verdict, compare
 from gateway.cli.params_file import COMMANDS
 from gateway.main import main
+from gateway.messages import ParameterInfo, ParameterValue
 from gateway.modules.parameters import Lock
 from gateway.wire import LINE_LIMIT
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, config, serving
@@ -193,6 +195,25 @@ def test_what_the_robot_would_refuse_is_said_before_anything_is_sent(
     assert words in captured.out
     assert "nothing was sent, the robot would refuse 1 value" in captured.err
     assert robot.bench.gait.node.written() == []
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [
+        (0.6, Verdict.DIFFERENT),  # 0.60000002 in the device, whose maximum that is then
+        (-0.7, Verdict.DIFFERENT),  # -0.69999999
+        (0.6000001, Verdict.OUT_OF_LIMITS),
+        (-0.7000001, Verdict.OUT_OF_LIMITS),
+    ],
+)
+def test_a_real_at_its_very_limit_is_within_it(value: float, verdict: Verdict) -> None:
+    info = ParameterInfo(
+        name="knee.gain", unit="", min=-0.7, max=0.6, max_step=None, live=True, states=None, component="knee",
+        object="0x2000:0", access="rw", store=False, type="REAL32",
+    )  # fmt: skip
+    held = ParameterValue(0.0, "", -0.7, 0.6, 0)
+    (row,) = compare({"knee.gain": value}, {"knee.gain": info}, {"knee.gain": held})
+    assert row.verdict is verdict
 
 
 def test_a_device_that_does_not_tell_stops_the_whole_file(

@@ -202,12 +202,20 @@ def test_limits_of_reals_and_negative_hex_are_kept(tmp_path: Path) -> None:
     assert (integer24.min, integer24.max) == (-1, 5)
 
 
-def test_limits_that_contradict_each_other_are_left_out_and_reported(tmp_path: Path) -> None:
+def test_limits_that_contradict_each_other_are_kept_and_reported(tmp_path: Path) -> None:
     description = load(tmp_path, variable("2000", LowLimit="5", HighLimit="1"))
     found = description.variable(0x2000)
     assert found is not None
-    assert (found.min, found.max) == (None, None)
-    assert warnings(description) == ["[2000] LowLimit 5 is above HighLimit 1; both left out"]
+    assert (found.min, found.max) == (5, 1)
+    assert warnings(description) == ["[2000] LowLimit 5 is above HighLimit 1; no value is allowed"]
+
+
+def test_a_limit_that_is_no_number_is_none_and_is_reported(tmp_path: Path) -> None:
+    description = load(tmp_path, variable("2000", DataType="0x0008", LowLimit="nan", HighLimit="2.5"))
+    found = description.variable(0x2000)
+    assert found is not None
+    assert (found.min, found.max) == (None, 2.5)
+    assert warnings(description) == ["[2000] LowLimit 'nan' is no clear REAL32; left out"]
 
 
 @pytest.mark.parametrize("text", ["$NODEID+0x180", "0x180+$NODEID", "NODEID + 0x180", "$NodeId+384"])

@@ -111,6 +111,19 @@ def test_further_keys_of_a_bus_are_python_cans_own(tmp_path: Path) -> None:
             "scale: 0 would make every value 0",
         ),
         (
+            HEAD
+            + JOINT
+            + '[parameter."knee.x"]\nobject="0x2001:0"\n[parameter."knee.y"]\nobject="0x2001:0x0"',
+            """0x2001:0x0 of node 2 on bus 'main' is [parameter."knee.x"] already; keep one""",
+        ),
+        (
+            HEAD
+            + JOINT
+            + JOINT.replace("knee", "hip")
+            + 'axis = 1\n[parameter."knee.x"]\nobject="0x2001:1"\n[parameter."hip.x"]\nobject="0x2001:1"',
+            '[parameter."hip.x"] object: 0x2001:1 of node 2 on bus \'main\' is [parameter."knee.x"] already',
+        ),
+        (
             HEAD + JOINT + '[parameter."knee.x"]\nobject="0x2001:0"\nmax_step=0',
             "max_step: expected `float` > 0",
         ),
@@ -130,6 +143,13 @@ def test_what_is_wrong_is_named_with_table_key_and_remedy(tmp_path: Path, text: 
 def test_two_axes_of_one_drive_share_a_node(tmp_path: Path) -> None:
     robot = config(tmp_path, HEAD + JOINT + JOINT.replace("knee", "hip") + "axis = 1\n")
     assert robot.joint["hip"].node_id == robot.joint["knee"].node_id
+
+
+def test_objects_of_two_nodes_or_two_objects_of_one_are_different_parameters(tmp_path: Path) -> None:
+    hip = JOINT.replace("knee", "hip").replace("node_id = 2", "node_id = 3")
+    tables = '[parameter."knee.x"]\nobject="0x2001:0"\n[parameter."knee.y"]\nobject="0x2001:1"\n'
+    robot = config(tmp_path, HEAD + JOINT + hip + tables + '[parameter."hip.x"]\nobject="0x2001:0"\n')
+    assert list(robot.parameter) == ["knee.x", "knee.y", "hip.x"]
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from gateway.coding import EXACT_COUNTS, Coding, CodingError, Number
 from gateway.config import ConfigError, DeviceTable, JointTable
 from gateway.modules.catalogue import Catalogue, resolve
 from gateway.modules.parameters import Lock
+from gateway.wire import RpcError
 from tests.unit.gateway.harness import DISABLED, HEAD, ROBOT, Bench, Client, config, serving
 
 KNEE = """
@@ -196,6 +197,49 @@ def test_the_second_axis_offers_its_own_objects_and_none_that_the_first_has(tmp_
     ]
     assert known["ankle.object_6840"].lock is Lock.CONTROLWORD
     assert known["ankle.object_6872"].lock is None
+
+
+CONTRADICTING = """\
+[2001]
+ParameterName=Gain
+DataType=0x0006
+AccessType=rw
+LowLimit=100
+HighLimit=10
+[2002]
+ParameterName=Step
+DataType=0x0006
+AccessType=rw
+LowLimit=10
+HighLimit=100
+"""
+
+
+def test_limits_that_contradict_each_other_lock_what_they_are_of(tmp_path: Path) -> None:
+    (tmp_path / "limits.eds").write_text(CONTRADICTING)
+    table = '[parameter."knee.size"]\nobject = "0x2002:0"\n'
+    for eds_file, release in (("limits.eds", '["*"]'), ("limits.eds", '["gain"]')):
+        one = catalogue(tmp_path, release, eds_file)["knee.gain"]
+        assert one.info.problem == (
+            "its limits allow nothing: minimum 100 is above maximum 10; correct limits.eds"
+        )
+        with pytest.raises(RpcError, match="its limits allow nothing"):
+            one.encode(50)
+    for limits, problem in (("min = 50", None), ("min = 101", "minimum 101"), ("max = 9", "maximum 9")):
+        known = catalogue(tmp_path, "[]", "limits.eds", table + limits)
+        said = known["knee.size"].problem
+        assert (said is None) if problem is None else (problem in str(said))
+        assert said is None or 'correct limits.eds or [parameter."knee.size"]' in said
+    own = '[parameter."knee.gain"]\nobject = "0x2001:0"\nmin = 20\nmax = 30\n'
+    assert catalogue(tmp_path, "[]", "limits.eds", own)["knee.gain"].problem is not None
+
+
+def test_what_another_axis_of_the_node_names_is_not_offered_once_more(tmp_path: Path) -> None:
+    text = "[2000]\nParameterName=Gain\nDataType=0x0006\nAccessType=rw\n"
+    (tmp_path / "axes.eds").write_text(text)
+    ankle = KNEE.format(eds="axes.eds", release='["*"]').replace("joint.knee", "joint.ankle") + "axis = 1\n"
+    ankle += '[parameter."ankle.gain"]\nobject = "0x2000:0"\nmax = 5\n'
+    assert list(catalogue(tmp_path, '["*"]', "axes.eds", ankle)) == ["ankle.gain", "knee.*"]
 
 
 def test_a_release_that_means_nothing_is_seen_where_parameters_are(tmp_path: Path) -> None:

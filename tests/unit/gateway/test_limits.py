@@ -74,6 +74,31 @@ ACCEPTED = [
     (b"", Kind.MISMATCH),
     (b"\x05\x00", Kind.MISMATCH),
 ]  # bytes within −5 and 5, what comes of them
+CONTRADICTIONS: list[tuple[float | None, float | None, bool]] = [
+    (None, None, False),
+    (1, None, False),
+    (None, 1, False),
+    (1, 1, False),
+    (-0.5, 0.5, False),
+    (2, 1, True),
+    (0.5, -0.5, True),
+]  # minimum, maximum, whether they contradict each other
+REAL_LIMITS = [
+    (REAL32, 1.0, None, 0.6, 0.6, None),  # the device holds 0.60000002
+    (REAL32, 1.0, None, 0.6, 0.60000003, None),  # and so it does of this
+    (REAL32, 1.0, None, 0.6, 0.6000001, Kind.OUT_OF_LIMIT),
+    (REAL32, 1.0, 0.7, None, 0.7, None),  # 0.69999999
+    (REAL32, 1.0, 0.7, None, 0.6999999, Kind.OUT_OF_LIMIT),
+    (REAL32, 0.001, -0.6, 0.6, 0.6, None),
+    (REAL32, 0.001, -0.6, 0.6, -0.6, None),
+    (REAL32, -0.001, -0.6, 0.6, 0.6, None),
+    (REAL32, 1.0, -1e300, 1e300, 5.0, None),  # no REAL32 reaches them
+    (REAL64, 0.001, None, 0.6, 0.6, None),  # 0.6000000000000001
+    (REAL64, 1.0, None, 0.6, 0.6000000000000001, Kind.OUT_OF_LIMIT),
+    (INTEGER8, 0.25, None, 0.7, 0.7, Kind.OUT_OF_LIMIT),  # the device would hold 0.75
+    (INTEGER8, 0.1, None, 0.6, 0.6, None),
+    (INTEGER8, 0.1, None, 0.6, 0.64, Kind.OUT_OF_LIMIT),
+]  # type, scale, min, max, value, what comes of it
 
 
 def check_parameter(module: ModuleType) -> None:
@@ -92,6 +117,12 @@ def check_parameter(module: ModuleType) -> None:
     for low, high, value, kind in LIMITS:
         limited = one(min=low, max=high)
         assert refused(lambda limited=limited, value=value: limited.encode(value)) == kind  # type: ignore[misc]
+    for least, most, expected in CONTRADICTIONS:
+        assert (module.contradiction(least, most, "drive.eds") is not None) is expected
+    for data_type, scale, least, most, value, kind in REAL_LIMITS:
+        settings = ParameterSettings(object="0x2000:0", scale=scale)
+        real = module.Parameter("knee.x", "knee", settings, 0x2000, 0, data_type, "rw", least, most)
+        assert refused(lambda real=real, value=value: real.encode(value)) == kind  # type: ignore[misc]
     for lock in module.Lock:
         locked = one(lock=lock, table="[joint.knee]")
         assert (refused(locked.check_readable), locked.read_only) == (None, lock.value)
@@ -150,6 +181,13 @@ DECODED: list[tuple[int, float, bytes, float | None]] = [
     (REAL64, 1e300, b"\xff\xff\xff\xff\xff\xff\xef\x7f", None),
     (0x09, 1.0, b"text", None),
 ]  # type, scale, bytes, value
+NEAREST: list[tuple[int, float, float, float]] = [
+    (REAL32, 1.0, 0.6, 0.6000000238418579),
+    (REAL32, 1.0, 0.5, 0.5),
+    (REAL32, 1.0, 1e39, 1e39),
+    (REAL64, 1.0, 0.6, 0.6),
+    (INTEGER8, 0.25, 0.7, 0.7),
+]  # type, scale, limit, as the device can hold it
 STEPS = [
     (1.0, 1.5, 0.5, False),
     (1.5, 1.0, 0.5, False),
@@ -172,6 +210,8 @@ def check_coding(module: ModuleType) -> None:
     for data_type, scale, data, expected in DECODED:
         found = _coded(module, lambda: module.Coding(data_type, scale).decode(data))  # noqa: B023
         assert (found, type(found)) == (expected, type(expected))
+    for data_type, scale, limit, expected in NEAREST:
+        assert module.Coding(data_type, scale).nearest(limit) == expected
     for before, after, most, too_far in STEPS:
         assert module.too_far(before, after, most) is too_far
 
@@ -198,6 +238,17 @@ STRICTER = [
 ]  # the file's min, max and scale; what counts beside the EDS's 0 … 2500
 
 
+WITHIN: list[tuple[float | None, float | None, float, bool]] = [
+    (2500, None, 1.0, True),
+    (2501, None, 1.0, False),
+    (None, 0, 1.0, True),
+    (None, -1, 1.0, False),
+    (250, None, 0.1, True),
+    (250.1, None, 0.1, False),
+    (1, 2, -1.0, False),
+]  # the file's min, max and scale; whether the EDS's 0 … 2500 leaves anything
+
+
 def check_described(module: ModuleType) -> None:
     for low, high, scale, expected_low, expected_high in STRICTER:
         settings = ParameterSettings(object="0x6072:0", min=low, max=high, scale=scale)
@@ -205,6 +256,11 @@ def check_described(module: ModuleType) -> None:
         assert (found.min, found.max, found.lock, found.problem) == (expected_low, expected_high, None, None)
         assert (found.data_type, found.access, found.store) == (0x06, "rw", True)
         assert found.default == pytest.approx(1000 * scale)
+    for least, most, scale, within in WITHIN:
+        settings = ParameterSettings(object="0x6072:0", min=least, max=most, scale=scale)
+        found = module.described("knee.x", settings, {"knee": drive()}, {})
+        assert (found.problem is None) is within
+        assert refused(found.check_writable) == (None if within else Kind.UNAVAILABLE)
     for object_, absent in (("0x7000:0", {}), ("0x1008:0", {}), ("0x6072:0", {"knee": "no power"})):
         found = module.described("knee.x", ParameterSettings(object=object_), {"knee": drive()}, absent)
         assert found.problem is not None
@@ -328,9 +384,18 @@ CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] =
     (
         check_parameter,
         parameters,
-        ("_LIMITS", "read_only", "check_readable", "check_writable", "encode", "accepts", "_check_limits"),
+        (
+            "_LIMITS",
+            "read_only",
+            "check_readable",
+            "check_writable",
+            "encode",
+            "accepts",
+            "_check_limits",
+            "contradiction",
+        ),
     ),
-    (check_coding, coding, ("scaled", "too_far", "decode", "encode", "_finite")),
+    (check_coding, coding, ("scaled", "too_far", "decode", "encode", "nearest", "_finite")),
     (check_described, catalogue, ("described", "_scaled_limits")),
     (check_locks, offer, ("_lock", "_axis", "_of_first_axis")),
     (check_states, rules, ("check_value", "check_states", "allowed_states")),

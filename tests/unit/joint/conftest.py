@@ -26,6 +26,10 @@ AXIS = (
     (0x605A, 3, 2, 2),
     (0x6076, 7, 4, 400),
 )
+SURROUNDINGS = (
+    (0x6079, 7, 4, 48_000),
+    (0x60FD, 7, 4, 0x8001_0008),
+)
 COMMON = (
     (0x1000, 7, 4, 0x00020192),
     (0x6007, 3, 2, 1),
@@ -40,6 +44,13 @@ def drive_objects(axes: int = 1) -> Objects:
             (index + axis * 0x800, 0): value.to_bytes(size, "little") for index, _, size, value in AXIS
         }
     return objects
+
+
+def surroundings(axis: int = 0) -> Objects:
+    """Supply voltage and digital inputs of an axis."""
+    return {
+        (index + axis * 0x800, 0): value.to_bytes(size, "little") for index, _, size, value in SURROUNDINGS
+    }
 
 
 def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 1) -> Objects:
@@ -58,7 +69,7 @@ def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 1) -> 
 def drive_eds(objects: Objects) -> str:
     """An EDS of exactly these objects."""
     types = {index: data_type for index, data_type, _, _ in COMMON} | {
-        index + axis * 0x800: data_type for index, data_type, _, _ in AXIS for axis in range(8)
+        index + axis * 0x800: data_type for index, data_type, _, _ in AXIS + SURROUNDINGS for axis in range(8)
     }
     sections = []
     for index, subindex in sorted(objects):

@@ -20,6 +20,7 @@ class SdoDrive:
         self.states: list[DriveState] = [state]
         self.aborts: dict[int, int] = {}  # index → code
         self.deaf_to: set[int] = set()  # controlwords that do nothing
+        self.stuck: set[int] = set()  # objects that keep their value, whatever is written
         self.on_request: Callable[[int], None] = lambda index: None
         self.values: dict[tuple[int, int], bytes] = {
             (0x6061, 0): bytes([mode]),
@@ -50,7 +51,7 @@ class SdoDrive:
     def _reply(self, request: bytes, index: int, subindex: int) -> bytes:
         if index in self.aborts:
             return b"\x80" + request[1:4] + self.aborts[index].to_bytes(4, "little")
-        if request[0] != 0x40:
+        if request[0] != 0x40 and (index, subindex) in self.values | {(0x6040, 0): b""}:
             self._write(index, subindex, request[4 : 8 - (request[0] >> 2 & 3)])
             return b"\x60" + request[1:4] + bytes(4)
         self.values[0x6041, 0] = statusword(self.state).to_bytes(2, "little")
@@ -62,7 +63,8 @@ class SdoDrive:
     def _write(self, index: int, subindex: int, data: bytes) -> None:
         self.written.append((index, subindex, data))
         if index != 0x6040:
-            self.values[index, subindex] = data
+            if index not in self.stuck:
+                self.values[index, subindex] = data
             return
         word, before = int.from_bytes(data, "little"), self.controlwords[-1] if self.controlwords else 0x80
         self.controlwords.append(word)

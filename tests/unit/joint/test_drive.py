@@ -15,7 +15,7 @@ from drivers.joint.quick_stop import StopOutcome
 from drivers.samples import Sample, State
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.bus.waiting import WAIT_S, until
-from tests.unit.joint.conftest import drive_objects, tpdo
+from tests.unit.joint.conftest import drive_objects, surroundings, tpdo
 
 Make = Callable[..., JointDrive]
 
@@ -144,6 +144,52 @@ def test_a_tpdo_with_an_event_timer_needs_no_help(joint: Make, channel: str) -> 
         assert knee.reading.tpdos[0].trigger == "every 0.01 s"
         until(lambda: read(knee, "error_code") is not None)
         assert read(knee, "statusword") is None
+        knee.stop()
+
+
+def test_digital_inputs_and_supply_voltage_are_told_where_the_drive_has_them(
+    joint: Make, channel: str
+) -> None:
+    objects = drive_objects(axes=2) | surroundings() | surroundings(axis=1)
+    objects[0x68FD, 0] = bytes(4)
+    with FakeNode(channel, 2, objects):
+        knee, ankle = (
+            joint(objects, slow_poll_hz=50),
+            joint(objects, name="left_ankle", axis=1, slow_poll_hz=50),
+        )
+        knee.start()
+        ankle.start()
+        until(lambda: read(knee, "voltage") is not None and read(ankle, "voltage") is not None)
+        assert read(knee, "voltage") == pytest.approx(48.0)
+        assert (read(knee, "digital_inputs"), read(ankle, "digital_inputs")) == (0x8001_0008, 0)
+        units = {one.quantity: one.unit for one in knee.channels}
+        assert (units["voltage"], units["digital_inputs"]) == ("V", "")
+        ankle.stop()
+        knee.stop()
+    before = [one.quantity for one in joint(drive_objects()).channels]
+    assert [one.quantity for one in knee.channels] == [*before[:-1], "digital_inputs", "voltage", "state"]
+
+
+def test_digital_inputs_are_taken_from_a_tpdo_that_brings_them(joint: Make, channel: str) -> None:
+    objects = drive_objects() | surroundings() | tpdo(1, 0x182, 0x60FD0020, 0x60790020)
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, slow_poll_hz=0)
+        knee.start()
+        until(lambda: knee.node.ready)
+        fake.send(0x182, struct.pack("<II", 0xFFFF_FFFF, 24_500))
+        until(lambda: knee.frames)
+        assert read(knee, "digital_inputs") == 0xFFFF_FFFF
+        assert read(knee, "voltage") == pytest.approx(24.5)
+        knee.stop()
+
+
+def test_what_the_device_does_not_have_hides_nothing_that_it_has(joint: Make, channel: str) -> None:
+    objects = drive_objects() | surroundings()
+    with FakeNode(channel, 2, objects, aborts={(0x60FD, 0): 0x0602_0000}):
+        knee = joint(objects, slow_poll_hz=50)
+        knee.start()
+        until(lambda: read(knee, "voltage") is not None)
+        assert read(knee, "digital_inputs") is None
         knee.stop()
 
 
@@ -388,5 +434,18 @@ def test_without_a_free_tpdo_nothing_is_changed(joint: Make, channel: str) -> No
         knee = joint(objects, configure_pdos=True)
         knee.start()
         until(lambda: "no TPDO of the drive is free" in quality(knee)[1])
+        assert fake.writes == []
+        knee.stop()
+
+
+def test_where_two_drives_have_its_node_id_nothing_is_changed_and_it_is_read(
+    joint: Make, channel: str
+) -> None:
+    objects = drive_objects() | tpdo(2, 0x80000282)
+    with FakeNode(channel, 2, objects, repeat_replies=2) as fake:
+        knee = joint(objects, configure_pdos=True)
+        knee.start()
+        until(lambda: read(knee, "position") is not None)
+        assert "configure_pdos: two devices answer as node 2: nothing is written" in quality(knee)[1]
         assert fake.writes == []
         knee.stop()

@@ -1,10 +1,13 @@
 """Ways through a drive's states: down from any, up one transition at a time, both ended by a stop."""
 
+import time
+
 import pytest
 
 from drivers.bus.sdo_channel import Interrupted
 from drivers.joint.cia402 import DriveState
-from drivers.joint.leading import OVERTAKEN, Errand, Led, lead_down, step_up
+from drivers.joint.commands import WAY_UP
+from drivers.joint.leading import OVERTAKEN, Errand, Led, lead_down, look, step_up
 from tests.unit.joint.sdo_drive import SdoDrive
 from tests.unit.joint.standard import LEAVES_BY_ITSELF, S
 
@@ -67,6 +70,54 @@ class TestDown:
         led = lead_down(drive.axis, ERRAND)
         assert led.state is S.SWITCHED_ON
         assert "0x6040" in str(led.problem)
+
+    def test_what_it_found_carries_when_that_was_asked(self) -> None:
+        drive = SdoDrive(S.SWITCHED_ON)
+        commanded_ns = 0
+
+        def note(index: int) -> None:
+            nonlocal commanded_ns
+            commanded_ns = time.monotonic_ns() if index == 0x6040 else commanded_ns
+
+        drive.on_request = note
+        led = lead_down(drive.axis, PATIENT)
+        assert commanded_ns < led.asked_ns < time.monotonic_ns()
+
+    def test_a_stop_that_comes_while_it_looks_whether_it_stands_leaves_it_its_current(self) -> None:
+        drive, wanted = SdoDrive(S.QUICK_STOP_ACTIVE), True
+
+        def stop(index: int) -> None:
+            nonlocal wanted
+            wanted = index != 0x6064
+
+        drive.on_request = stop
+        led = lead_down(drive.axis, Errand(lambda: wanted, 20.0, 409_600))
+        assert (led.state, led.problem) == (S.QUICK_STOP_ACTIVE, OVERTAKEN)
+        assert drive.controlwords == []
+
+    @pytest.mark.parametrize("state", [S.SWITCH_ON_DISABLED, S.SWITCHED_ON])
+    def test_a_stop_that_comes_with_the_last_look_is_told(self, state: DriveState) -> None:
+        drive, wanted = SdoDrive(state), True
+
+        def stop(index: int) -> None:
+            nonlocal wanted
+            wanted = wanted and not (index == 0x6041 and drive.state is S.SWITCH_ON_DISABLED)
+
+        drive.on_request = stop
+        led = lead_down(drive.axis, Errand(lambda: wanted, 20.0, 409_600))
+        assert (led.state, led.problem) == (S.SWITCH_ON_DISABLED, OVERTAKEN)
+
+    def test_a_stop_between_two_commands_ends_it(self) -> None:
+        drive, wanted = SdoDrive(S.FAULT), True
+        drive.deaf_to = {0x0080}
+
+        def stop(index: int) -> None:
+            nonlocal wanted
+            wanted = wanted and index != 0x6040
+
+        drive.on_request = stop
+        assert lead_down(drive.axis, Errand(lambda: wanted, 20.0, 409_600)) == Led(S.FAULT, OVERTAKEN)
+        assert drive.controlwords == [0x0000]
 
     def test_a_stop_ends_it(self) -> None:
         drive = SdoDrive(S.OPERATION_ENABLED)
@@ -133,6 +184,38 @@ class TestUp:
         assert step_up(drive.axis, PATIENT, S.SWITCHED_ON) == Led(S.OPERATION_ENABLED, mode=mode)
         assert drive.written == [setpoint, (0x6040, 0, b"\x0f\x00")]
 
+    @pytest.mark.parametrize(
+        ("mode", "zeroed"),
+        [(1, []), (7, []), (8, [0x60B0, 0x60B1, 0x60B2]), (9, [0x60B1, 0x60B2]), (10, [0x60B2])],
+    )
+    def test_before_it_is_enabled_nothing_is_added_to_its_setpoint(
+        self, mode: int, zeroed: list[int]
+    ) -> None:
+        drive = SdoDrive(S.SWITCHED_ON, mode=mode)
+        left = {
+            0x60B0: (500).to_bytes(4, "little"),
+            0x60B1: (-1 % 2**32).to_bytes(4, "little"),
+            0x60B2: b"\x64\x00",
+        }
+        drive.values |= {(index, 0): value for index, value in left.items()} | {(0x60C1, 1): bytes(4)}
+        assert step_up(drive.axis, PATIENT, S.SWITCHED_ON) == Led(S.OPERATION_ENABLED, mode=mode)
+        for index, value in left.items():
+            assert drive.values[index, 0] == (bytes(len(value)) if index in zeroed else value)
+        assert drive.written[-1] == (0x6040, 0, b"\x0f\x00")
+
+    @pytest.mark.parametrize(
+        ("mode", "index"), [(8, 0x60B0), (8, 0x60B1), (8, 0x60B2), (9, 0x60B1), (10, 0x60B2)]
+    )
+    def test_an_offset_that_stays_or_is_not_told_is_not_enabled(self, mode: int, index: int) -> None:
+        for refusal in (None, 0x0601_0002, 0x0800_0022):
+            drive = SdoDrive(S.SWITCHED_ON, mode=mode)
+            drive.values[index, 0] = b"\x01\x00\x00\x00"
+            drive.stuck.add(index)
+            drive.aborts |= {} if refusal is None else {index: refusal}
+            led = step_up(drive.axis, PATIENT, S.SWITCHED_ON)
+            assert f"0x{index:04X}" in str(led.problem)
+            assert drive.controlwords == []
+
     @pytest.mark.parametrize("mode", [0, 6, 0x80])
     def test_a_mode_of_which_nobody_knows_what_it_would_do_is_not_enabled(self, mode: int) -> None:
         drive = SdoDrive(S.SWITCHED_ON, mode=mode)
@@ -165,11 +248,40 @@ class TestUp:
         led = step_up(drive.axis, ERRAND, S.READY_TO_SWITCH_ON)
         assert led == Led(S.READY_TO_SWITCH_ON, "it did not go from ready to switch on to switched on")
 
-    def test_a_stop_that_has_come_already_lets_nothing_be_sent(self) -> None:
-        drive = SdoDrive(S.SWITCH_ON_DISABLED)
-        led = step_up(drive.axis, Errand(lambda: False, 20.0, 409_600), S.SWITCH_ON_DISABLED)
+    @pytest.mark.parametrize("origin", WAY_UP)
+    def test_a_stop_that_has_come_already_lets_nothing_be_sent(self, origin: DriveState) -> None:
+        drive = SdoDrive(origin)
+        led = step_up(drive.axis, Errand(lambda: False, 20.0, 409_600), origin)
         assert led.problem == OVERTAKEN
         assert drive.written == []
+
+    @pytest.mark.parametrize("last", [0x6041, 0x60FF, 0x6040])
+    @pytest.mark.parametrize("follows", [True, False])
+    def test_a_stop_that_comes_meanwhile_is_told_wherever_the_drive_is_then(
+        self, last: int, follows: bool
+    ) -> None:
+        drive, wanted = SdoDrive(S.SWITCHED_ON, mode=3), True
+        drive.deaf_to = set() if follows else {0x000F}
+
+        def stop(index: int) -> None:
+            nonlocal wanted
+            wanted = wanted and index != last
+
+        drive.on_request = stop
+        led = step_up(drive.axis, Errand(lambda: wanted, 20.0, 409_600), S.SWITCHED_ON)
+        assert led.problem == OVERTAKEN
+        assert drive.controlwords == ([0x000F] if last == 0x6040 else [])
+
+    def test_a_drive_that_is_up_already_when_a_stop_comes_is_overtaken_too(self) -> None:
+        drive, wanted = SdoDrive(S.OPERATION_ENABLED), True
+
+        def stop(_index: int) -> None:
+            nonlocal wanted
+            wanted = False
+
+        drive.on_request = stop
+        led = step_up(drive.axis, Errand(lambda: wanted, 20.0, 409_600), S.SWITCHED_ON)
+        assert (led.state, led.problem) == (S.OPERATION_ENABLED, OVERTAKEN)
 
     def test_what_was_interrupted_ends_and_is_not_begun_again(self) -> None:
         drive = SdoDrive(S.SWITCH_ON_DISABLED)
@@ -179,3 +291,23 @@ class TestUp:
 
         drive.on_request = interrupt
         assert step_up(drive.axis, PATIENT, S.SWITCH_ON_DISABLED) == Led(None, OVERTAKEN)
+
+
+class TestLook:
+    @pytest.mark.parametrize("state", S)
+    def test_one_read_says_the_state_and_when_it_was_asked(self, state: DriveState) -> None:
+        drive = SdoDrive(state)
+        requests: list[int] = []
+        drive.on_request = requests.append
+        before_ns = time.monotonic_ns()
+        led = look(drive.axis)
+        assert led == Led(state)
+        assert before_ns <= led.asked_ns <= time.monotonic_ns()
+        assert requests == [0x6041]
+
+    def test_what_cannot_be_read_says_why(self) -> None:
+        drive = SdoDrive(S.FAULT)
+        drive.aborts[0x6041] = 0x0800_0022
+        led = look(drive.axis)
+        assert (led.state, led.asked_ns) == (None, 0)
+        assert "0x6041" in str(led.problem)

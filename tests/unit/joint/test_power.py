@@ -1,22 +1,31 @@
 """A joint's drive is stopped by the channel that its bus allows, and a stop overtakes every way up."""
 
 import struct
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 import eds
 from drivers.bus.bus import CanBus
+from drivers.bus.node import Node
+from drivers.bus.sdo_worker import SdoWorker
 from drivers.bus.settings import CanSettings, Role
 from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
-from drivers.joint.leading import OVERTAKEN
+from drivers.joint.leading import OVERTAKEN, Led
+from drivers.joint.power import PowerDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
+from drivers.joint.stop_rpdo import StopRpdo
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.bus.waiting import WAIT_S, until
 from tests.unit.joint.conftest import Objects, drive_eds, drive_objects
+from tests.unit.joint.sdo_drive import SdoDrive
 from tests.unit.joint.standard import S, after, statusword
 
 OUR_SYNC = {"sync_period_s": 0.01}
@@ -132,6 +141,31 @@ class TestChannel:
             knee.stop()
             assert drive.rpdos() == [struct.pack("<Hbi", 2, 8, 4321), struct.pack("<Hbi", 2, 8, 77)]
 
+    def test_what_it_would_carry_beside_must_be_known(
+        self, make: Callable[..., JointDrive], channel: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        objects = drive_objects() | rpdo(255, *COMMAND_MODE_TARGET)
+        with Drive(channel, objects) as drive:
+            knee = started(make(objects, Role.MASTER))
+            monkeypatch.setattr(StopRpdo, "_held", lambda self, one: None if one == (0x607A, 0) else b"\x08")
+            assert knee.quick_stop().result(WAIT_S) is StopOutcome.CONFIRMED
+            knee.stop()
+            assert drive.rpdos() == []
+
+    def test_after_a_reboot_nothing_is_sent_by_the_mapping_of_before(
+        self, make: Callable[..., JointDrive], channel: str
+    ) -> None:
+        objects = drive_objects() | rpdo(255, *COMMAND_MODE_TARGET)
+        with Drive(channel, objects) as drive:
+            knee = started(make(objects, Role.MASTER))
+            drive.deaf_to.add((0x1000, 0))  # so that it does not come up again
+            drive.boot_up()
+            drive.heartbeat()  # operational already
+            until(lambda: knee.node.life.heartbeats and not knee.node.ready)
+            assert knee.quick_stop().result(WAIT_S) is StopOutcome.CONFIRMED
+            knee.stop()
+            assert drive.rpdos() == []
+
     @pytest.mark.parametrize("cob_id", [0x8000_0202])
     def test_an_rpdo_that_is_not_valid_is_none(
         self, make: Callable[..., JointDrive], channel: str, cob_id: int
@@ -215,12 +249,15 @@ def test_a_way_up_that_waits_for_its_turn_is_not_begun_after_a_stop(
         assert drive.controlwords() == [0x0002]
 
 
-def test_both_axes_of_a_drive_are_asked_before_one_has_confirmed(channel: str, tmp_path: Path) -> None:
+@pytest.fixture
+def axes(channel: str, tmp_path: Path) -> Iterator[tuple[FakeNode, list[JointDrive]]]:
+    """Two axes of one drive, both enabled."""
     objects = drive_objects(axes=2)
     path = tmp_path / "drive.eds"
     path.write_text(drive_eds(objects))
     bus = CanBus("main", CanSettings(interface="virtual", channel=channel))
     table = {"bus": "main", "node_id": 2, "eds": "", "counts_per_revolution": 1000, "gear_ratio": 1}
+    table |= {"stop_timeout_s": WAIT_S, "poll_hz": 0, "slow_poll_hz": 0}
     joints = [
         JointDrive(f"axis_{axis}", JointSettings(**table, axis=axis), bus, eds.load(path, 2))  # type: ignore[arg-type]
         for axis in range(2)
@@ -230,17 +267,117 @@ def test_both_axes_of_a_drive_are_asked_before_one_has_confirmed(channel: str, t
             one.start()
         until(lambda: all(one.node.ready for one in joints))
         say(fake, S.OPERATION_ENABLED)
-        stops = [one.quick_stop(wake=False) for one in joints]
-        for one in joints:
-            one.wake()
-        until(lambda: {0x6040, 0x6840} <= {index for index, _, _ in fake.writes}, "both were asked")
-        assert not any(stop.done() for stop in stops)
-        say(fake, S.QUICK_STOP_ACTIVE)
-        assert {stop.result(WAIT_S) for stop in stops} == {StopOutcome.CONFIRMED}
+        yield fake, joints
         for one in joints:
             one.stop()
+
+
+def stop_all(joints: list[JointDrive]) -> list[Future[StopOutcome]]:
+    stops = [one.quick_stop(wake=False) for one in joints]
+    for one in joints:
+        one.wake()
+    return stops
+
+
+def test_both_axes_of_a_drive_are_asked_before_one_has_confirmed(
+    axes: tuple[FakeNode, list[JointDrive]],
+) -> None:
+    fake, joints = axes
+    stops = stop_all(joints)
+    until(lambda: {0x6040, 0x6840} <= {index for index, _, _ in fake.writes}, "both were asked")
+    assert not any(stop.done() for stop in stops)
+    say(fake, S.QUICK_STOP_ACTIVE)
+    assert {stop.result(WAIT_S) for stop in stops} == {StopOutcome.CONFIRMED}
+
+
+@pytest.mark.parametrize("obeys", [0, 1])
+def test_an_axis_that_holds_is_confirmed_while_another_one_ignores_its_stop(
+    axes: tuple[FakeNode, list[JointDrive]], obeys: int
+) -> None:
+    fake, joints = axes
+    fake.objects[0x6041 + 0x800 * obeys, 0] = statusword(S.QUICK_STOP_ACTIVE).to_bytes(2, "little")
+    stops = stop_all(joints)
+    until(stops[obeys].done)
+    assert not stops[1 - obeys].done()
+    assert stops[obeys].result() is StopOutcome.CONFIRMED
+    say(fake, S.QUICK_STOP_ACTIVE)
+    assert stops[1 - obeys].result(WAIT_S) is StopOutcome.CONFIRMED
+
+
+def test_an_axis_that_is_stopped_later_is_asked_while_the_first_one_is_not_confirmed(
+    axes: tuple[FakeNode, list[JointDrive]],
+) -> None:
+    fake, joints = axes
+    first = joints[0].quick_stop()
+    until(lambda: fake.writes)
+    second = joints[1].quick_stop()
+    until(lambda: 0x6840 in {index for index, _, _ in fake.writes}, "it was asked")
+    assert not first.done()
+    say(fake, S.QUICK_STOP_ACTIVE)
+    assert {first.result(WAIT_S), second.result(WAIT_S)} == {StopOutcome.CONFIRMED}
 
 
 def say(fake: FakeNode, state: DriveState) -> None:
     """Both axes say this state."""
     fake.objects[0x6041, 0] = fake.objects[0x6841, 0] = statusword(state).to_bytes(2, "little")
+
+
+class TestWithoutABus:
+    """A drive that answers in the worker's own thread, so that every request is at its place."""
+
+    @pytest.fixture
+    def drive(self) -> SdoDrive:
+        return SdoDrive(S.OPERATION_ENABLED)
+
+    @pytest.fixture
+    def power(self, drive: SdoDrive) -> Iterator[PowerDrive]:
+        worker = SdoWorker(drive.channel)
+        worker.start()
+        node = SimpleNamespace(run=worker.submit, wake=worker.wake, channel=drive.channel)
+        settings = JointSettings(bus="main", node_id=2, eds="", counts_per_revolution=1000, gear_ratio=1)
+        yield PowerDrive(cast("Node", node), settings)
+        worker.stop()
+
+    def test_a_newer_stop_is_asked_for_again_and_believes_no_read_of_before(
+        self, drive: SdoDrive, power: PowerDrive
+    ) -> None:
+        requests: list[int] = []
+        newer: list[Future[StopOutcome]] = []
+        asked_ns = 0
+
+        def hear(index: int) -> None:
+            nonlocal asked_ns
+            requests.append(index)
+            if requests == [0x6040, 0x6041]:
+                asked_ns = time.monotonic_ns()
+                newer.append(power.quick_stop())
+
+        drive.on_request = hear
+        older = power.quick_stop()
+        assert older.result(WAIT_S) is StopOutcome.CONFIRMED
+        assert newer[0].result(WAIT_S) is StopOutcome.CONFIRMED
+        assert requests[:3] == [0x6040, 0x6041, 0x6040]
+        assert requests[3:].count(0x6041) == 3  # one for the older, two for the newer
+        assert power.confirmed_ns > asked_ns
+
+    def test_a_stop_that_is_not_confirmed_confirms_nothing(self, drive: SdoDrive, power: PowerDrive) -> None:
+        drive.deaf_to = {0x0002}
+        assert power.quick_stop().result(WAIT_S) is StopOutcome.UNCONFIRMED
+        assert power.confirmed_ns == 0
+
+    def test_a_look_sends_no_command(self, drive: SdoDrive, power: PowerDrive) -> None:
+        led = power.look().result(WAIT_S)
+        assert (led.state, led.problem) == (S.OPERATION_ENABLED, None)
+        assert drive.written == []
+
+    def test_a_look_waits_behind_a_stop_and_says_what_is_after_it(
+        self, drive: SdoDrive, power: PowerDrive
+    ) -> None:
+        looks: list[Future[Led]] = []
+        drive.on_request = lambda index: None if looks else looks.append(power.look())
+        stopped = power.quick_stop()
+        assert stopped.result(WAIT_S) is StopOutcome.CONFIRMED
+        until(lambda: looks)
+        led = looks[0].result(WAIT_S)
+        assert led.state is S.QUICK_STOP_ACTIVE
+        assert led.asked_ns > power.confirmed_ns

@@ -1,5 +1,9 @@
 """Quick stop: one controlword, confirmed by what the drive itself says, in every state of CiA 402."""
 
+import itertools
+import time
+from types import SimpleNamespace
+
 import pytest
 
 from drivers.bus.sdo_channel import SdoChannel
@@ -12,9 +16,12 @@ TIMEOUT_S = 0.3
 
 
 def quick_stop(channel: SdoChannel, axis_offset: int, timeout_s: float) -> StopOutcome:
-    stopping, axis = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, timeout_s), Axis(channel, axis_offset)
-    stopping.ask(axis)
-    return stopping.confirm(axis)
+    stopping = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, timeout_s, asked=False)
+    axis = Axis(channel, axis_offset)
+    channel.resume(urgent=True)
+    while (outcome := stopping.turn(axis)) is None:
+        pass
+    return outcome
 
 
 # State machine of a drive (CiA 402-2): what controlword 0002h makes of each state, by statusword.
@@ -31,7 +38,7 @@ AFTER_QUICK_STOP = {
 
 
 class Drive:
-    """Answers 6040h and 6041h of one axis, as its state machine does."""
+    """Answers 6040h and 6041h of one axis, as its state machine does; it has no other object."""
 
     def __init__(self, statusword: int, axis_offset: int = 0) -> None:
         self.statusword = statusword
@@ -63,7 +70,8 @@ class Drive:
             return b"\x80" + request[1:4] + (0x08000022).to_bytes(4, "little")
         if index == CONTROLWORD:
             return b"\x60" + request[1:4] + bytes(4)
-        assert index == STATUSWORD
+        if index != STATUSWORD:
+            return b"\x80" + request[1:4] + (0x06020000).to_bytes(4, "little")
         return b"\x4b" + request[1:4] + self.statusword.to_bytes(2, "little") + bytes(2)
 
 
@@ -133,3 +141,39 @@ def test_a_drive_that_another_master_enables_again_is_not_confirmed() -> None:
 def test_the_second_axis_of_a_drive_is_stopped_by_its_own_objects() -> None:
     drive = Drive(0x0027, axis_offset=0x800)
     assert quick_stop(drive.channel, 0x800, TIMEOUT_S) is StopOutcome.CONFIRMED
+
+
+def test_its_time_begins_when_the_worker_first_turns_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not before: another axis of the drive may have the channel."""
+    now = 0.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        now += seconds
+
+    clock = SimpleNamespace(monotonic=lambda: now, monotonic_ns=lambda: round(now * 1e9), sleep=sleep)
+    monkeypatch.setattr("drivers.joint.quick_stop.time", clock)
+    drive = Drive(0x0027)
+    stopping = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, TIMEOUT_S, asked=False)
+    sleep(2 * TIMEOUT_S)
+    while (outcome := stopping.turn(Axis(drive.channel, 0))) is None:
+        pass
+    assert outcome is StopOutcome.CONFIRMED
+
+
+def test_a_turn_is_one_request_or_a_moments_pause() -> None:
+    drive = Drive(0x0000)  # never says that it stops
+    stopping = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, TIMEOUT_S, asked=False)
+    transfers = []
+    while stopping.turn(Axis(drive.channel, 0)) is None:
+        transfers.append(drive.channel.counters.transfers)
+    assert {after - before for before, after in itertools.pairwise(transfers)} == {0, 1}
+
+
+def test_a_confirmed_stop_knows_when_the_reads_were_begun_that_it_rests_on() -> None:
+    drive = Drive(0x0027)
+    stopping = Stopping(Controlword.QUICK_STOP, STOPPED_STATES, TIMEOUT_S, asked=False)
+    asked_ns = 0
+    while stopping.turn(Axis(drive.channel, 0)) is None:
+        asked_ns = asked_ns or time.monotonic_ns()  # behind the controlword, before the first read
+    assert asked_ns <= stopping.read_ns <= time.monotonic_ns()

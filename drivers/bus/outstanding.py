@@ -1,0 +1,126 @@
+"""Which requests of one SDO channel are unanswered, and which of them an answer settles.
+
+An answer names its object but not its request. A server answers in the order of the requests, and CAN keeps
+the order of one identifier: so an answer is taken for that to the oldest request that it fits, and nothing
+that was sent before that one is answered any more.
+"""
+
+import threading
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import chain
+
+from drivers.bus import sdo
+
+MOST = 64  # requests whose order is remembered
+# What every device may be asked without harm (CiA 301 §7.5.2): type, identity, error register, heartbeat.
+PROBES = ((0x1000, 0), (0x1018, 1), (0x1001, 0), (0x1018, 2), (0x1017, 0))
+_SPARE = tuple((0x1018, subindex) for subindex in range(5, 255))  # that it has none is an answer too
+
+
+@dataclass(slots=True, eq=False)
+class Request:
+    """A request that was sent about an object (its `sdo.multiplexer`), and its answer once that came."""
+
+    about: bytes
+    frame: bytes
+    answer: bytes | None = None
+    given_up: bool = False  # nobody waits for the answer any more
+
+
+class Outstanding:
+    """Requests in the order in which they were sent. For any thread.
+
+    It does not grow while a node is silent: of what is older than the last `MOST` only the objects are kept.
+    An answer about one of these settles nothing, because nobody can say to which request it is.
+    """
+
+    def __init__(self) -> None:
+        self.heard = True  # something came since the last probe was chosen
+        self._requests: list[Request] = []
+        self._crowd: set[bytes] = set()  # what older requests are about
+        self._late: bytes | None = (
+            None  # what the last answer is about, where it came late: it may come twice
+        )
+        self._turn = 0
+        self._lock = threading.Lock()
+
+    def add(self, about: bytes, frame: bytes) -> Request:
+        """A request that is sent now."""
+        request = Request(about, frame)
+        with self._lock:
+            self._requests.append(request)
+            if len(self._requests) > MOST:
+                self._crowd.add(self._requests.pop(0).about)
+        return request
+
+    def drop(self, request: Request) -> None:
+        """It could not be sent."""
+        with self._lock:
+            if request in self._requests:
+                self._requests.remove(request)
+
+    def holds(self, about: bytes) -> bool:
+        """Whether an answer about this object may still come."""
+        with self._lock:
+            asked = any(request.about == about for request in self._requests)
+            return asked or about in self._crowd or (self._late is not None and self._late[1:4] == about)
+
+    def is_lost(self, answer: bytes) -> bool:
+        """Whether this may answer a request so old that nobody knows any more which."""
+        with self._lock:
+            return sdo.names_object(answer) and answer[1:4] in self._crowd
+
+    def settle(self, answer: bytes) -> Request | None:
+        """Take an answer; the request that it settles, `None` where it is none's or anybody's."""
+        with self._lock:
+            self.heard = True
+            at = None if answer == self._late else self._answered_by(answer)
+            if at is None:
+                return None
+            settled = self._requests[at]
+            del self._requests[: at + 1]
+            self._crowd.clear()
+            self._late = answer if settled.given_up else None
+            settled.answer = answer
+            self._answer_repeated(settled, answer)
+            return settled
+
+    def forget(self) -> None:
+        """The node has booted and knows of no request; it may have got the newest one since."""
+        with self._lock:
+            del self._requests[:-1]
+            self._crowd.clear()
+            self._late = None
+
+    def probe(self, avoid: bytes) -> tuple[int, int]:
+        """Another object than `avoid` to ask for, so that its answer settles what was asked before.
+
+        One that is not asked for already, because its answer settles everything. A node that stays silent is
+        asked for the same ones again: such objects are left for when it is heard.
+        """
+        with self._lock:
+            usual = [one for one in PROBES if sdo.multiplexer(*one) != avoid]
+            first = self._turn % len(usual)
+            usual = [*usual[first:], *usual[:first]]
+            self._turn += 1
+            asked = {request.about for request in self._requests} | self._crowd
+            spare: Collection[tuple[int, int]] = _SPARE if self.heard else ()
+            self.heard = False
+            fresh = (one for one in chain(usual, spare) if sdo.multiplexer(*one) not in asked)
+            return next(fresh, usual[0])
+
+    def _answered_by(self, answer: bytes) -> int | None:
+        if answer[0] == sdo.ABORT and answer[1:4] == bytes(3):  # of anything: only where there is but one
+            return 0 if len(self._requests) == 1 and not self._crowd else None
+        if sdo.names_object(answer) and answer[1:4] in self._crowd:
+            return None  # nobody knows to which
+        fitting = (at for at, one in enumerate(self._requests) if sdo.answers(answer, one.frame, one.about))
+        return next(fitting, None)
+
+    def _answer_repeated(self, settled: Request, answer: bytes) -> None:
+        """Where the same was written again, and nothing else in between, each is known by this."""
+        later = [one for one in self._requests if one.about == settled.about]
+        if sdo.is_expedited_download(settled.frame) and all(one.frame == settled.frame for one in later):
+            for one in later:
+                one.answer = answer

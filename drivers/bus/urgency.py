@@ -1,0 +1,20 @@
+"""Real-time priority for threads that must not wait for their turn, where the system allows it."""
+
+import os
+
+PRIORITY = 30  # of SCHED_FIFO: above all ordinary threads, below those of the kernel's interrupts (50)
+
+
+def make_urgent() -> str | None:
+    """Give the calling thread real-time priority; returns why it has none, in words.
+
+    What it forks or starts does not inherit it.
+    """
+    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    try:
+        os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
+    except OSError as error:
+        return (
+            f"no real-time priority ({error.strerror}): allow it with LimitRTPRIO={PRIORITY}, or CAP_SYS_NICE"
+        )
+    return None

@@ -1,0 +1,130 @@
+"""A write is permitted at the last moment, so that none follows the stop that forbids it."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo_worker import SdoWorker
+from drivers.errors import DriverError, NotPermitted
+from tests.unit.bus.late_server import VALUE, LateServer
+from tests.unit.bus.waiting import WAIT_S
+
+STOP = bytes.fromhex("2B 40 60 00 02 00 00 00")
+CONTROLWORD = 0x6040
+
+
+class Machine:
+    """What a stop forbids: it changes its state first, and sends then."""
+
+    def __init__(self) -> None:
+        self.server = LateServer(timeout_s=WAIT_S)
+        self.worker = SdoWorker(self.server.channel)
+        self.stopped = False
+
+    def permitted(self) -> str | None:
+        return "a stop is held" if self.stopped else None
+
+    def write(self, sdo: SdoChannel) -> None:
+        sdo.download(VALUE, 0, b"\1\0\0\0", permitted=self.permitted)
+
+    def stop(self) -> None:
+        def job(sdo: SdoChannel) -> None:
+            sdo.download(CONTROLWORD, 0, b"\x02\x00")
+
+        self.stopped = True
+        self.worker.submit(job, urgent=True, ahead=STOP)
+
+
+@pytest.fixture
+def machine() -> Iterator[Machine]:
+    machine = Machine()
+    machine.worker.start()
+    yield machine
+    machine.worker.stop()
+
+
+def test_a_write_that_is_permitted_is_sent(machine: Machine) -> None:
+    machine.worker.submit(machine.write).result(WAIT_S)
+    assert machine.server.asked() == [VALUE]
+
+
+def test_a_write_that_is_not_is_not_sent_and_says_why(machine: Machine) -> None:
+    machine.stopped = True
+    with pytest.raises(NotPermitted, match=r"writing 1 .*0x2001:00: not sent: a stop is held"):
+        machine.worker.submit(machine.write).result(WAIT_S)
+    assert machine.server.asked() == []
+    assert not machine.server.channel.is_unsure(VALUE, 0)
+    assert issubclass(NotPermitted, DriverError)
+
+
+def test_a_stop_during_the_decision_goes_out_behind_the_write_and_nothing_behind_the_stop(
+    machine: Machine,
+) -> None:
+    """Between the permission and the frame there is no room for a stop."""
+    stops: list[threading.Thread] = []
+
+    def slowly() -> str | None:
+        may = machine.permitted()
+        if not stops:
+            stops.append(threading.Thread(target=machine.stop))
+            stops[0].start()
+            stops[0].join(0.05)  # as long as it might need, if nothing held it
+        return may
+
+    def write(sdo: SdoChannel) -> None:
+        sdo.download(VALUE, 0, b"\1\0\0\0", permitted=slowly)
+
+    futures = [machine.worker.submit(write) for _ in range(3)]
+    errors = [future.exception(WAIT_S) for future in futures]
+    stops[0].join()
+    machine.worker.submit(lambda _: None).result(WAIT_S)
+    assert machine.server.asked() == [VALUE, CONTROLWORD]
+    assert [isinstance(error, NotPermitted) for error in errors[1:]] == [True, True]
+
+
+def test_whenever_a_stop_comes_no_write_follows_it(machine: Machine) -> None:
+    for _ in range(50):
+        machine.stopped = False
+        before = len(machine.server.asked())
+        writes = [machine.worker.submit(machine.write) for _ in range(4)]
+        stopping = threading.Thread(target=machine.stop)
+        stopping.start()
+        for write in writes:
+            write.exception(WAIT_S)
+        stopping.join()
+        machine.worker.submit(lambda _: None).result(WAIT_S)
+        assert machine.server.asked()[before:][-1] == CONTROLWORD
+
+
+def test_it_is_asked_once_a_write_and_not_for_its_segments(machine: Machine) -> None:
+    """What has begun is finished, or ended by the stop itself."""
+    asked: list[int] = []
+
+    def permitted() -> str | None:
+        asked.append(len(machine.server.requests))
+        return None
+
+    def write(sdo: SdoChannel) -> None:
+        sdo.download(VALUE, 0, bytes(20), permitted=permitted)
+
+    machine.worker.submit(write).result(WAIT_S)
+    assert asked == [0]
+    assert len(machine.server.requests) == 4
+
+
+def test_a_stop_is_sent_whoever_answers() -> None:
+    server = LateServer()
+    channel = SdoChannel("node 1", server.hear, WAIT_S, lambda: "two devices answer")
+    server.channel = channel
+    worker = SdoWorker(channel)
+    worker.start()
+    with pytest.raises(NotPermitted, match="two devices answer"):
+        worker.submit(lambda sdo: sdo.download(CONTROLWORD, 0, b"\x0f\x00")).result(WAIT_S)
+    worker.submit(lambda sdo: sdo.download(CONTROLWORD, 0, b"\x02\x00"), urgent=True, ahead=STOP).result(
+        WAIT_S
+    )
+    worker.submit(lambda sdo: sdo.download(CONTROLWORD, 0, b"\x02\x00"), urgent=True).result(WAIT_S)
+    worker.stop()
+    assert server.requests == [STOP, STOP]
