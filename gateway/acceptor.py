@@ -2,12 +2,11 @@
 
 import errno
 import logging
-import selectors
 import socket
 from collections.abc import Callable
 from typing import Any
 
-from gateway.loop import Loop
+from gateway.loop import READ, Loop
 
 log = logging.getLogger(__name__)
 
@@ -24,17 +23,20 @@ class Acceptor:
         self._loop = loop
         self._listener = listener
         self._opened = opened
-        self._ended = False
+        self._listening = False
         listener.setblocking(False)
 
     def start(self) -> None:
-        if not self._ended:
-            self._loop.watch(self._listener, selectors.EVENT_READ, lambda _events: self._accept())
+        self._listening = True
+        self._watch()
 
     def end(self) -> None:
-        """Accept nobody more; the listening socket stays open."""
-        self._ended = True
-        self._loop.watch(self._listener, 0, lambda _events: None)
+        """Accept nobody more, until `start`; the listening socket stays open."""
+        self._listening = False
+        self._watch()
+
+    def _watch(self) -> None:
+        self._loop.watch(self._listener, READ * self._listening, lambda _events: self._accept())
 
     def _accept(self) -> None:
         try:
@@ -45,7 +47,7 @@ class Acceptor:
             log.warning("a client could not be accepted: %s", error)
             if error.errno in _FULL:
                 self._loop.watch(self._listener, 0, lambda _events: None)
-                self._loop.call_later(REST_S, self.start)
+                self._loop.call_later(REST_S, self._watch)
             return
         try:
             self._opened(connection, address)

@@ -7,7 +7,6 @@ exchange, `null` where it is forgotten or was the first.
 """
 
 import logging
-import selectors
 import socket
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -16,9 +15,9 @@ from typing import Any
 import msgspec
 
 from gateway.acceptor import Acceptor
-from gateway.futures import then
-from gateway.loop import Loop, Timer
-from gateway.messages import ResourceSnapshotParams
+from gateway.futures import done, then
+from gateway.loop import READ, WRITE, Loop, Timer
+from gateway.messages import ResourceSnapshot, ResourceSnapshotParams
 from gateway.registry import Registry
 
 log = logging.getLogger(__name__)
@@ -49,14 +48,17 @@ class _Exchange:
         self._meter: Any = None
         self._rest = b""
 
-    def next_piece(self, resource: Any) -> bytes:
+    def next_piece(self, resource: Any) -> "Future[bytes]":
         """The next bytes of the list; where none are left, a new list's length."""
         if self._rest:
             piece, self._rest = self._rest[:PIECE_BYTES], self._rest[PIECE_BYTES:]
-            return piece
+            return done(piece)
         if self._meter is None:
             self._meter = resource.meter()
-        rows = self._meter.snapshot(_EVERYTHING).processes
+        return then(resource.look(self._meter, _EVERYTHING), self._begin)
+
+    def _begin(self, snapshot: ResourceSnapshot) -> bytes:
+        rows = snapshot.processes or []
         self._rest = msgspec.json.encode(
             [Entry(row.name, row.pid, row.cpu_percent, row.memory_bytes) for row in rows]
         )
@@ -139,7 +141,7 @@ class _Call:
         self._output = b""
         connection.setblocking(False)
         self._late = loop.call_later(CALL_S, self.close)
-        loop.watch(connection, selectors.EVENT_READ, self._on_ready)
+        loop.watch(connection, READ, self._on_ready)
 
     def close(self) -> None:
         if self._closed:
@@ -172,12 +174,12 @@ class _Call:
             self.close()
         elif not self._closed:
             self._output = piece.result()
-            self._on_ready(selectors.EVENT_WRITE)
+            self._on_ready(WRITE)
 
     def _send(self) -> None:
         """What the socket takes; after the last byte the client is told so, and its own end is awaited."""
         self._output = self._output[self._socket.send(self._output) :]
         if not self._output:
             self._socket.shutdown(socket.SHUT_WR)
-        waits_for = selectors.EVENT_WRITE if self._output else selectors.EVENT_READ
+        waits_for = WRITE if self._output else READ
         self._loop.watch(self._socket, waits_for, self._on_ready)

@@ -1,4 +1,4 @@
-"""The on-demand TCP server: accepts clients and serves them in one loop until it is told to end, or idle."""
+"""The on-demand TCP server: serves its clients in one loop until it is told to end, or idle."""
 
 import contextlib
 import logging
@@ -6,21 +6,19 @@ import signal
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
-from typing import Any
 
 from gateway import wire
-from gateway.acceptor import Acceptor
 from gateway.classic import ClassicPort
 from gateway.config import RobotConfig
+from gateway.intake import Inlet, Intake
 from gateway.loop import Loop, Timer
+from gateway.places import Places
 from gateway.registry import MODULES, Spec
 from gateway.resting import ENDING
 from gateway.service import Service
 from gateway.session import Session
 
 log = logging.getLogger(__name__)
-
-MAX_SESSIONS = 64
 
 
 class Daemon:
@@ -44,12 +42,12 @@ class Daemon:
         self._loop = Loop()
         self._service = Service(config, self._loop, specs)
         self._service.registry.when_off = self._look_whether_idle
-        self._sessions: set[Session] = set()
+        self._places = Places()
         self._ending = False
         self._told = False
         self._ends_idle = ends_idle
         self._idle: Timer | None = None
-        self._acceptor = Acceptor(self._loop, listener, self._open)
+        self._intake = Intake(self._loop, listener, self._open, lambda: self._service.registry.stop_now)
         self._classic: ClassicPort | None = None
         if classic is not None:
             self._classic = ClassicPort(self._loop, classic, self._service.registry, self._left)
@@ -75,13 +73,14 @@ class Daemon:
 
         Where it has ended because it was idle, the sockets stay open: somebody may just be coming.
         """
-        self._acceptor.start()
+        self._intake.start()
         self._loop.post(self._service.resume)
         self._loop.post(ready)
         self._loop.post(self._left)
         try:
             self._loop.run()
         finally:
+            self._intake.end()
             if self._told:
                 self._listener.close()
             if self._classic is not None:
@@ -109,21 +108,17 @@ class Daemon:
         """While inside, SIGINT and SIGTERM end the daemon. For the main thread only."""
         return _signals(self._loop.wake_writer, self.end)
 
-    def _open(self, connection: socket.socket, address: Any) -> None:
-        peer, stuck_s = f"{address[0]}:{address[1]}", self._config.gateway.stuck_s
-        session = Session(self._loop, connection, peer, self._service.handle, stuck_s)
-        if len(self._sessions) >= MAX_SESSIONS:
-            message = f"{MAX_SESSIONS} clients are connected, which is the most; end one of them"
-            session.send(wire.encode_error(None, wire.refuse(wire.Kind.UNAVAILABLE, message)))
-            session.close()
+    def _open(self, inlet: Inlet) -> None:
+        if self._ending:
+            inlet.close()
             return
-        self._sessions.add(session)
-        session.on_close(lambda: self._gone(session))
-        self._service.opened(session)
 
-    def _gone(self, session: Session) -> None:
-        self._sessions.discard(session)
-        self._left()
+        def session(refusal: wire.RpcError | None) -> Session:
+            return Session(self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, refusal)
+
+        opened = self._places.admit(session)
+        opened.on_close(self._left)
+        self._service.opened(opened)
 
     def _left(self) -> None:
         """Somebody has gone, or nobody has come yet: `linger_s` from now it may be idle."""
@@ -136,12 +131,23 @@ class Daemon:
         self._idle = None
         self._look_whether_idle()
 
+    @property
+    def _is_idle(self) -> bool:
+        """Nobody is there, nothing runs, and nothing is left that must."""
+        if not self._ends_idle or self._ending or self._idle is not None or self._places.taken:
+            return False
+        return not self._service.needed and not (self._classic is not None and self._classic.busy)
+
     def _look_whether_idle(self) -> None:
-        """End where nobody is there, nothing runs, and nothing is left that must."""
-        if not self._ends_idle or self._ending or self._idle is not None or self._sessions:
-            return
-        if not self._service.needed and not (self._classic is not None and self._classic.busy):
+        """End where it is idle; before that nobody more is accepted, because whoever was is to be served."""
+        if self._is_idle:
+            self._intake.listen(on=False, then=self._end_idle)
+
+    def _end_idle(self) -> None:
+        if self._is_idle:
             self._loop.stop()
+        elif not self._ending:
+            self._intake.listen(on=True)
 
     def _end(self) -> None:
         if self._ending:
@@ -151,8 +157,8 @@ class Daemon:
             log.error("%s", objection)
             return
         self._ending = True
-        self._acceptor.end()
-        for session in tuple(self._sessions):
+        self._intake.listen(on=False)
+        for session in self._places.taken:
             session.close()
         self._service.registry.close(self._loop.stop)
 

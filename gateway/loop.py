@@ -1,11 +1,11 @@
-"""The daemon's one loop: sockets, timers, callbacks from other threads. Idle, it sleeps in one call."""
+"""A loop: sockets, timers, callbacks from other threads. Idle, it sleeps in one call."""
 
 import contextlib
 import heapq
 import itertools
 import logging
 import os
-import selectors
+import select
 import threading
 import time
 from collections import deque
@@ -13,6 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 log = logging.getLogger(__name__)
+
+# What a file can be watched for; that its peer is gone is told in any case.
+READ, WRITE, HANGUP = select.POLLIN, select.POLLOUT, select.POLLHUP | select.POLLERR
 
 Callback = Callable[[], object]
 
@@ -29,6 +32,24 @@ class Timer:
         self.callback = None
 
 
+class Poll:
+    """What `select.epoll` is, on systems that have none."""
+
+    def __init__(self) -> None:
+        poll = select.poll()
+        self.register, self.modify, self.unregister = poll.register, poll.modify, poll.unregister
+        self._poll = poll.poll
+
+    def poll(self, timeout: float | None = None) -> list[tuple[int, int]]:
+        return self._poll(None if timeout is None else timeout * 1000)
+
+    def close(self) -> None:
+        """It holds nothing."""
+
+
+_POLL: Callable[[], Any] = getattr(select, "epoll", Poll)
+
+
 class Loop:
     """Waits in one system call for sockets, timers and callbacks from other threads.
 
@@ -37,27 +58,33 @@ class Loop:
     """
 
     def __init__(self) -> None:
-        self._selector = selectors.DefaultSelector()
+        self._poll = _POLL()
+        self._watched: dict[int, tuple[int, Callable[[int], object]]] = {}
         self._ready: deque[Callback] = deque()
         self._timers: list[tuple[int, int, Timer]] = []
         self._order = itertools.count()
+        self.turns = 0  # so far
         self._stopping = False
         self._woken = False
         self._thread: int | None = None
         self._wake_reader, self.wake_writer = os.pipe()
         os.set_blocking(self._wake_reader, False)
         os.set_blocking(self.wake_writer, False)
-        self._selector.register(self._wake_reader, selectors.EVENT_READ, lambda _events: self._drain())
+        self.watch(self._wake_reader, READ, lambda _events: self._drain())
 
     def watch(self, file: Any, events: int, callback: Callable[[int], object]) -> None:
         """Call `callback(events)` when `file` is ready for one of `events`; no events ends it."""
-        if file not in self._selector.get_map():
-            if events:
-                self._selector.register(file, events, callback)
-        elif events:
-            self._selector.modify(file, events, callback)
-        else:
-            self._selector.unregister(file)
+        descriptor = file if isinstance(file, int) else file.fileno()
+        before = self._watched.get(descriptor)
+        if not events:
+            if self._watched.pop(descriptor, None) is not None:
+                self._poll.unregister(descriptor)
+            return
+        self._watched[descriptor] = events, callback
+        if before is None:
+            self._poll.register(descriptor, events)
+        elif before[0] != events:
+            self._poll.modify(descriptor, events)
 
     def post(self, callback: Callback) -> None:
         """Run `callback` in the loop's next turn; may be called from any thread."""
@@ -93,13 +120,16 @@ class Loop:
 
     def close(self) -> None:
         """Give the descriptors back."""
-        self._selector.close()
+        self._poll.close()
         os.close(self._wake_reader)
         os.close(self.wake_writer)
 
     def _turn(self) -> None:
-        for key, events in self._selector.select(self._patience_s()):
-            self._call(lambda key=key, events=events: key.data(events))  # type: ignore[misc]
+        self.turns += 1
+        for descriptor, found in self._poll.poll(self._patience_s()):
+            watched = self._watched.get(descriptor)
+            if watched is not None:
+                self._call(watched[1], found)
         now_ns = time.monotonic_ns()
         while self._timers and self._timers[0][0] <= now_ns:
             callback = heapq.heappop(self._timers)[2].callback
@@ -125,15 +155,14 @@ class Loop:
 
     def _drain(self) -> None:
         with contextlib.suppress(BlockingIOError):
-            while os.read(self._wake_reader, 4096):
-                pass
+            os.read(self._wake_reader, 4096)  # what is left wakes it again
         # Only now: a flag cleared before reading could stay set for a byte that was read with the others,
         # and nobody would wake the loop again.
         self._woken = False
 
     @staticmethod
-    def _call(callback: Callback) -> None:
+    def _call(callback: Callable[..., object], *args: object) -> None:
         try:
-            callback()
+            callback(*args)
         except Exception:  # the loop outlives every callback's error
             log.exception("a callback of the gateway failed")

@@ -619,18 +619,17 @@ class JournalEntries(Struct, frozen=True):
 
 
 class Method(Struct, frozen=True):
-    """What a method takes and gives. An urgent one overtakes everything its connection has queued."""
+    """What a method takes and gives."""
 
     params: type[Struct]
     result: type[Struct]
-    urgent: bool = False
 
 
 METHODS: Final[dict[str, Method]] = {
     "hello": Method(HelloParams, Hello),
     "clock.read": Method(Params, Clock),
     "robot.describe": Method(Params, Description),
-    "robot.stop": Method(StopParams, Stopped, urgent=True),
+    "robot.stop": Method(StopParams, Stopped),
     "gateway.cost": Method(Params, GatewayCost),
     "resource.snapshot": Method(ResourceSnapshotParams, ResourceSnapshot),
     "resource.overruns": Method(Params, Overruns),

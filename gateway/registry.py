@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
+# Carries out a stop for whom, and why; may be called from any thread.
+StopNow = Callable[[str, str], "Future[Any]"]
+
+
 class Module(Protocol):
     """What a module is to the daemon. `start` and `stop` may take their time; all else runs in the loop."""
 
@@ -39,12 +43,18 @@ class Module(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a module is given. `keep(True)` keeps it running without any client until `keep(False)`."""
+    """What a module is given. `keep(True)` keeps it running without any client until `keep(False)`.
+
+    Who carries out stops says how: `stops_by(stop_now)`, from any thread. From then until `stops_by(None)`
+    every stop of a client is `stop_now(who, reason)`, called in the thread that reads the clients, past the
+    loop; what it returns is answered. Where it raises, the handler of `robot.stop` gets it, in the loop.
+    """
 
     config: RobotConfig
     loop: Loop
     needs: Mapping[str, Module]
     keep: Callable[[bool], None]
+    stops_by: Callable[[StopNow | None], None] = lambda _stop_now: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +108,7 @@ class Registry:
         self._linger: Timer | None = None
         self._closing: Callable[[], None] | None = None
         self.when_off: Callable[[], None] = lambda: None  # called when the last module has stopped
+        self.stop_now: StopNow | None = None  # how a stop is carried out from any thread, while somebody can
 
     @property
     def off(self) -> bool:
@@ -150,6 +161,9 @@ class Registry:
             self._give_up(name, wire.refuse(wire.Kind.UNAVAILABLE, "the gateway is ending"))
         self._settle()
 
+    def _stops_by(self, stop_now: StopNow | None) -> None:
+        self.stop_now = stop_now
+
     def _linger_from_now_ns(self) -> int:
         return time.monotonic_ns() + round(self._config.gateway.linger_s * 1e9)
 
@@ -201,7 +215,8 @@ class Registry:
             else:
                 self.leave(slot)
 
-        context = Context(self._config, self._loop, {k: v for k, v in needs.items() if v is not None}, keep)
+        there = {k: v for k, v in needs.items() if v is not None}
+        context = Context(self._config, self._loop, there, keep, self._stops_by)
 
         def work() -> None:
             try:

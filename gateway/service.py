@@ -17,6 +17,7 @@ from gateway.records.folder import RecordsFolder
 from gateway.registry import MODULES, Module, Registry, Spec
 from gateway.session import Answer, Session
 from gateway.sources import channel_info, check_globs, merge, narrow
+from gateway.standing import Standing
 from gateway.streams import Streams
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-AGAIN_S = 5.0  # how soon what could not begin is tried again
 CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are configured
 
 # Which module answers what; the rest is the service's own.
@@ -75,23 +75,17 @@ class Service:
     def resume(self) -> None:
         """Begin what needs no client: a configured guard, and what the last gateway left unfinished."""
         if self._config.guard is not None:
-            self.registry.use("guard", "guard").add_done_callback(self._guard_began)
+            self._stand("guard", "guard", self._guard_failed)
         if RecordsFolder(self._config.records).unfinished:
-            self.registry.use("control", None).add_done_callback(self._control_began)
+            # It keeps itself as long as a stop is held, or a write is to be taken back.
+            self._stand("control", None, _control_failed)
 
-    def _control_began(self, control: "Future[Module]") -> None:
-        """It keeps itself as long as a stop is held, or a write is to be taken back."""
-        error = control.exception()
-        if error is not None and not self.registry.ending:
-            log.critical("what the last gateway left, a held stop or a write on trial, waits: %s", error)
-            self._loop.call_later(AGAIN_S, self.resume)
+    def _stand(self, name: str, user: str | None, failed: Callable[[str], object]) -> None:
+        Standing(self.registry, self._loop, name, user, failed).begin()
 
-    def _guard_began(self, guard: "Future[Module]") -> None:
-        error = guard.exception()
-        if error is not None and not self.registry.ending:
-            self._guard_problem = str(error)
-            log.critical("the guard does not run: %s", error)
-            self._loop.call_later(AGAIN_S, self.resume)
+    def _guard_failed(self, why: str) -> None:
+        self._guard_problem = why
+        log.critical("the guard does not run: %s", why)
 
     def objection(self) -> str | None:
         """Why the gateway must not end now, in words; `None` where it may."""
@@ -226,3 +220,7 @@ class Service:
                 f"this connection has no stream {params.stream}; it may have ended before",
             )
         return messages.Done()
+
+
+def _control_failed(why: str) -> None:
+    log.critical("what the last gateway left, a held stop or a write on trial, waits: %s", why)

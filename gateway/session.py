@@ -1,35 +1,36 @@
-"""One client's connection: lines in, answers and streams out, everything bounded.
+"""One client's requests and what it is answered: answers and streams out, everything bounded.
 
-Where a client is slow, it is the client that loses: its requests wait, its streams drop rows, and one that
-takes nothing for `stuck_s` is closed. Nobody else waits for it.
+What the client says comes from its inlet (`gateway.intake`). Where a client is slow, it is the client that
+loses: its requests wait, its streams drop rows, and one that takes nothing for `stuck_s` is closed. Nobody
+else waits for it.
 """
 
 import functools
 import logging
-import selectors
-import socket
 import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Concatenate, ParamSpec, Protocol
 
-from msgspec import UNSET
+import msgspec
+from msgspec import UNSET, UnsetType
 
-from gateway import messages, wire
+from gateway import wire
 from gateway.futures import outcome
-from gateway.loop import Loop, Timer
+from gateway.intake import Heard, Inlet, Stopping
+from gateway.loop import WRITE, Loop, Timer
+from gateway.stop_lines import STOP
 
 log = logging.getLogger(__name__)
 
-RECEIVE_BYTES = 64 * 1024
-QUEUED_LINES = 256  # requests waiting to be handled before reading pauses
 PENDING = 64  # requests waiting for a device before the next is handled
 OUTPUT_BYTES = 1024 * 1024  # answers not yet taken before the next request is handled
 STREAM_BYTES = 64 * 1024  # output not yet taken before streams hold back
+LAST_ANSWERS_S = 10.0  # how long a client that will say nothing more is waited for
 
-# Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
-_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
+MOST_STOPS = 1024  # whose answer is waited for
+SILENCE_S = 5.0  # how long one that may only stop may say nothing
 
 Answer = object | Future[object]
 P = ParamSpec("P")
@@ -61,47 +62,75 @@ def _spends(work: "Callable[Concatenate[Session, P], None]") -> "Callable[Concat
 
 
 class Session:
-    """A connection from accept to close. It belongs to the loop's thread."""
+    """A connection from accept to close. It belongs to the loop's thread.
+
+    Where `refusal` is given, everything but a stop is answered with it, and ends the connection.
+    """
 
     def __init__(
         self,
         loop: Loop,
-        connection: socket.socket,
-        peer: str,
+        inlet: Inlet,
         handle: "Callable[[Session, wire.Request], Answer]",
         stuck_s: float,
+        refusal: wire.RpcError | None = None,
     ) -> None:
-        self.peer = peer
-        self.who = peer  # how the journal calls it
-        self.cpu_ns = 0  # that the loop has worked for it
-        self.requests = self.received_bytes = self.sent_bytes = 0
+        self.peer = inlet.peer
+        self.cpu_ns = 0  # that was worked for it
+        self.requests = self.sent_bytes = 0
         self.outlets: dict[int, Outlet] = {}
         self.closed = False
+        self.spoke = False  # whether it has said anything yet
+        self.heard_ns = time.monotonic_ns()  # when it did last, or came
+        self.spending = False  # whether what is worked now is put down already
         self._loop = loop
-        self._socket = connection
+        self._inlet = inlet
+        self._socket = inlet.socket
         self._handle = handle
         self._stuck_s = stuck_s
-        self.spending = False  # whether what is worked now is put down already
-        self._splitter = wire.LineSplitter()
-        self._queue: deque[wire.Request | wire.BadLine] = deque()
+        self._refusal = refusal
+        self._queue: deque[bytes | wire.BadLine] = deque()
         self._scheduled = False
+        self._ran_in = 0  # the loop's turn
         self._pending = 0
         self._output: deque[memoryview] = deque()
         self._output_bytes = 0
+        self._waiting = False  # for room, because the socket takes no more
+        self._unanswered = 0
         self._input_ended = False
         self._stuck: Timer | None = None
+        self._end: Timer | None = None
         self._moved_ns = 0
         self._farewells: list[Callable[[], None]] = []
-        _prepare(connection)
-        self._watch()
+        inlet.receiver = self.hear
+        if refusal is not None:
+            self._end = loop.call_later(SILENCE_S, self._check_silence)
+
+    @property
+    def who(self) -> str:
+        """How the journal calls it."""
+        return self._inlet.who
+
+    @who.setter
+    def who(self, name: str) -> None:
+        self._inlet.who = name
+
+    @property
+    def received_bytes(self) -> int:
+        return self._inlet.received_bytes
 
     @property
     def waiting_bytes(self) -> int:
         """Of answers and streams that the client has not taken."""
         return self._output_bytes
 
+    @property
+    def waits(self) -> bool:
+        """Whether it is still to be told something that it has asked for."""
+        return bool(self._queue or self._pending or self._output)
+
     def on_close(self, farewell: Callable[[], None]) -> None:
-        """Call `farewell` when the connection has ended."""
+        """Call `farewell` when the connection has ended; what was asked for last goes first."""
         self._farewells.append(farewell)
 
     def send(self, line: bytes) -> None:
@@ -113,7 +142,7 @@ class Session:
     @_spends
     def pump(self) -> None:
         """Send what the streams have, as far as the client keeps up."""
-        if self.closed:
+        if self.closed or self._input_ended:
             return
         progress = True
         while progress and self._output_bytes < STREAM_BYTES:
@@ -125,121 +154,172 @@ class Session:
                     progress = True
         self._flush()
 
-    def close(self) -> None:
-        """End the connection and tell everybody who serves it; idempotent."""
+    def close(self, why: wire.RpcError | None = None) -> None:
+        """End the connection, telling why, and tell everybody who serves it; idempotent."""
+        if why is not None:
+            self.send(wire.encode_error(None, why))
         if self.closed:
             return
         self.closed = True
-        self._loop.watch(self._socket, 0, self._on_ready)
-        self._socket.close()
-        if self._stuck is not None:
-            self._stuck.cancel()
+        self._loop.watch(self._socket, 0, self._on_room)
+        self._inlet.close()
+        for timer in (self._stuck, self._end):
+            if timer is not None:
+                timer.cancel()
+        unanswered = self._unanswered + self._inlet.unanswered
+        if unanswered:
+            log.warning("%s sent more than it took: %d of its requests were dropped", self.who, unanswered)
         self._queue.clear()
         self._output.clear()
         self.outlets.clear()
-        for farewell in self._farewells:
-            farewell()
+        for farewell in reversed(self._farewells):  # a lease ends before the module that knows it
+            try:
+                farewell()
+            except Exception:  # the others are still to be told
+                log.exception("%s has gone, and not everything has ended with it", self.who)
 
-    # Reading
+    # What the client says
 
     @_spends
-    def _on_ready(self, events: int) -> None:
-        if events & selectors.EVENT_WRITE:
-            self._flush()
-            self.pump()
-        if events & selectors.EVENT_READ and not self.closed:
-            self._receive()
-
-    def _receive(self) -> None:
-        try:
-            data = self._socket.recv(RECEIVE_BYTES)
-        except BlockingIOError:
+    def hear(self, heard: Heard) -> None:
+        """Take what one read has brought; stops first, and also of a client that has gone."""
+        self.cpu_ns += heard.cpu_ns
+        for stopping in heard.stops:
+            self._stop(stopping)
+        self._inlet.done(len(heard.stops) + len(heard.refusals))
+        if self.closed:
             return
-        except OSError as error:
-            log.info("%s: %s", self.peer, error)
+        self.spoke, self.heard_ns = True, heard.stamp_ns
+        if heard.refusals:
+            self._send_if_room(heard.refusals)
+        if heard.lost is not None:
+            log.info("%s: %s", self.peer, heard.lost)
             self.close()
             return
-        self.received_bytes += len(data)
-        self._input_ended = not data
-        for line in self._splitter.feed(data) if data else self._splitter.end():
-            self._take(line)
-        self._schedule()
-        self._watch()
-        self._finish_if_done()
+        if self._refusal is None:
+            self._queue.extend(heard.lines)
+        elif heard.lines:
+            self._end_refused(heard.lines, self._refusal)
+        if heard.ended:
+            self._end_input()
+        if not self._scheduled:
+            self._run_next()
 
-    def _take(self, line: bytes | wire.BadLine) -> None:
-        request: wire.Request | wire.BadLine
-        try:
-            request = wire.decode_request(line) if isinstance(line, bytes) else line
-        except wire.BadLine as error:
-            request = error
-        method = messages.METHODS.get(request.method) if isinstance(request, wire.Request) else None
-        if method is not None and method.urgent:
-            self._run(request)
+    def _end_refused(self, lines: list[bytes | wire.BadLine], refusal: wire.RpcError) -> None:
+        self._inlet.done(len(lines), sum(map(wire.size, lines)))
+        self._send_if_room([wire.encode_refusal(line, refusal) for line in lines])
+        self._end_input()
+
+    def _end_input(self) -> None:
+        """Nothing more is asked: what was asked is answered, as far as that can be soon."""
+        self._input_ended = True
+        if self._end is not None:
+            self._end.cancel()
+        self._end = self._loop.call_later(LAST_ANSWERS_S, self.close)
+
+    def _check_silence(self) -> None:
+        silent_s = (time.monotonic_ns() - self.heard_ns) / 1e9
+        if silent_s >= SILENCE_S and not self.waits:
+            self.close()
         else:
-            self._queue.append(request)
+            self._end = self._loop.call_later(max(SILENCE_S - silent_s, 0.1), self._check_silence)
 
     # Answering
 
+    def _stop(self, stopping: Stopping) -> None:
+        """Answer a stop that has acted; where nobody could act yet, let it be done now, ahead of all else."""
+        self.requests += 1
+        answer: Answer = stopping.answer
+        if answer is None:
+            params = msgspec.Raw(msgspec.json.encode({"reason": stopping.request.reason}))
+            answer = self._handled(wire.Request("2.0", STOP, params))
+        if self._pending < MOST_STOPS:
+            self._follow(stopping.request.id, STOP, answer)
+        else:
+            self._unanswered += 1
+
+    @property
+    def _may_run(self) -> bool:
+        """Whether there is a request whose answer there is room for."""
+        return bool(self._queue) and self._pending < PENDING and self._output_bytes < OUTPUT_BYTES
+
     def _schedule(self) -> None:
         """One request a turn of the loop, so that a client that sends a thousand does not keep the others."""
-        if (
-            self._queue
-            and not self._scheduled
-            and self._pending < PENDING
-            and self._output_bytes < OUTPUT_BYTES
-        ):
+        if not self._scheduled and self._may_run:
             self._scheduled = True
             self._loop.post(self._run_next)
 
     @_spends
     def _run_next(self) -> None:
         self._scheduled = False
-        if not self.closed and self._queue:
+        if not self.closed and self._may_run and self._ran_in != self._loop.turns:
+            self._ran_in = self._loop.turns
             self._run(self._queue.popleft())
-            self._schedule()
-            self._watch()
-            self._finish_if_done()
-
-    def _run(self, request: wire.Request | wire.BadLine) -> None:
-        if isinstance(request, wire.BadLine):
-            self.send(wire.encode_error(request.id, request))
-            return
-        self.requests += 1
-        try:
-            answer = self._handle(self, request)
-        except Exception as error:  # noqa: BLE001 - whatever it is, this client is told and the others never notice
-            answer = error
-        if isinstance(answer, Future):
-            self._pending += 1
-            answer.add_done_callback(lambda future: self._loop.call(lambda: self._complete(request, future)))
-        else:
-            self._answer(request, answer)
-
-    @_spends
-    def _complete(self, request: wire.Request, future: Future[object]) -> None:
-        self._pending -= 1
-        self._answer(request, outcome(future))
         self._schedule()
         self._finish_if_done()
 
-    def _answer(self, request: wire.Request, answer: object) -> None:
+    def _run(self, line: bytes | wire.BadLine) -> None:
+        self._inlet.done(1, wire.size(line))
+        try:
+            if isinstance(line, wire.BadLine):
+                raise line
+            request = wire.decode_request(line)
+        except wire.BadLine as error:
+            self.send(wire.encode_error(error.id, error))
+            return
+        self.requests += 1
+        self._follow(request.id, request.method, self._handled(request))
+
+    def _handled(self, request: wire.Request) -> Answer:
+        try:
+            return self._handle(self, request)
+        except Exception as error:  # noqa: BLE001 - whatever it is, this client is told and the others never notice
+            return error
+
+    def _follow(self, id_: wire.Id | float | UnsetType, method: str, answer: Answer) -> None:
+        if isinstance(answer, Future):
+            self._pending += 1
+            answer.add_done_callback(
+                lambda future: self._loop.call(lambda: self._complete(id_, method, future))
+            )
+        else:
+            self._answer(id_, method, answer)
+
+    @_spends
+    def _complete(self, id_: wire.Id | float | UnsetType, method: str, future: Future[object]) -> None:
+        self._pending -= 1
+        self._answer(id_, method, outcome(future))
+        self._schedule()
+        self._finish_if_done()
+
+    def _answer(self, id_: wire.Id | float | UnsetType, method: str, answer: object) -> None:
         if isinstance(answer, Exception) and not isinstance(answer, wire.RpcError):
-            log.error("%s from %s failed", request.method, self.peer, exc_info=answer)
-            answer = wire.internal_error(request.method, answer)
-        if request.id is UNSET:
+            log.error("%s from %s failed", method, self.peer, exc_info=answer)
+            answer = wire.internal_error(method, answer)
+        if id_ is UNSET:
             return
         if isinstance(answer, wire.RpcError):
-            self.send(wire.encode_error(request.id, answer))
+            line = wire.encode_error(id_, answer)
         else:
-            self.send(wire.encode_result(request.id, answer))
+            line = wire.encode_result(id_, answer)
+        if method == STOP:
+            self._send_if_room([line])
+        else:
+            self.send(line)
 
     def _finish_if_done(self) -> None:
-        """A client that has half-closed gets its answers and the streams it asked for, then the end."""
-        if self._input_ended and not (self._queue or self._pending or self._output or self.outlets):
+        """A client that says nothing more gets its answers, then the end, streams or not."""
+        if self._input_ended and not self.waits:
             self.close()
 
     # Writing
+
+    def _send_if_room(self, lines: list[bytes]) -> None:
+        """What nothing holds back while the client takes nothing."""
+        if self._output_bytes < OUTPUT_BYTES:
+            self.send(b"".join(lines))
+        else:
+            self._unanswered += len(lines)
 
     def _enqueue(self, line: bytes) -> None:
         self._output.append(memoryview(line))
@@ -269,9 +349,16 @@ class Session:
         if self._output and self._stuck is None:
             self._moved_ns = time.monotonic_ns()
             self._stuck = self._loop.call_later(self._stuck_s, self._check_stuck)
+        if self._waiting != bool(self._output):
+            self._waiting = not self._waiting
+            self._loop.watch(self._socket, WRITE * self._waiting, self._on_room)
         self._schedule()
-        self._watch()
         self._finish_if_done()
+
+    @_spends
+    def _on_room(self, _events: int) -> None:
+        self._flush()
+        self.pump()
 
     def _check_stuck(self) -> None:
         self._stuck = None
@@ -283,22 +370,3 @@ class Session:
         else:
             log.warning("%s takes nothing for %g s; closed", self.peer, self._stuck_s)
             self.close()
-
-    def _watch(self) -> None:
-        if self.closed:
-            return
-        reading = not self._input_ended and len(self._queue) < QUEUED_LINES
-        events = selectors.EVENT_READ * reading | selectors.EVENT_WRITE * bool(self._output)
-        self._loop.watch(self._socket, events, self._on_ready)
-
-
-def _prepare(connection: socket.socket) -> None:
-    connection.setblocking(False)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    # What waits in the kernel is old when it arrives: keep it short.
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 256 * 1024)
-    for name, value in _KEEPALIVE.items():
-        option = getattr(socket, name, None)  # not every system has every one
-        if option is not None:
-            connection.setsockopt(socket.IPPROTO_TCP, option, value)

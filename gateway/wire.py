@@ -125,6 +125,21 @@ class BadLine(RpcError):
         self.id = id
 
 
+class StopRequest(Struct, frozen=True):
+    """A `robot.stop`, whatever its form was; `id` is unset where nobody waits for an answer."""
+
+    reason: str = ""
+    id: Id | float | UnsetType = None
+
+
+Line = bytes | BadLine | StopRequest
+
+
+def size(line: Line) -> int:
+    """How many bytes of it are kept."""
+    return len(line) if isinstance(line, bytes) else 0
+
+
 class LineSplitter:
     """Cuts a byte stream into lines and never holds more than `limit` bytes of one.
 
@@ -136,43 +151,63 @@ class LineSplitter:
         self.limit = limit
         self.too_long = 0  # lines dropped for their length
         self._rest = bytearray()
-        self._skipping = False
+        self.dropping = False  # the rest of a line that is too long
 
-    def feed(self, data: bytes) -> list[bytes | BadLine]:
+    def feed(self, data: bytes) -> list[Line]:
         """The lines that `data` completes, in order."""
-        lines: list[bytes | BadLine] = []
+        lines: list[Line] = []
         *ended, rest = data.split(b"\n")
         for piece in ended:
-            self._add(piece, lines)
-            self._end_line(lines)
-        self._add(rest, lines)
+            if self._rest or self.dropping or len(piece) > self.limit:
+                self._add(piece, lines)
+                self._end_line(lines)
+            elif line := piece.removesuffix(b"\r"):  # whole, as nearly all are
+                self._take(line, lines)
+        if rest:
+            self._add(rest, lines)
         return lines
 
-    def end(self) -> list[bytes | BadLine]:
+    def end(self) -> list[Line]:
         """The last line, where the stream ended without a newline."""
-        lines: list[bytes | BadLine] = []
+        lines: list[Line] = []
         self._end_line(lines)
         return lines
 
-    def _add(self, piece: bytes, lines: list[bytes | BadLine]) -> None:
-        if self._skipping:
+    def _add(self, piece: bytes, lines: list[Line]) -> None:
+        if self.dropping:
+            self._drop(piece, lines)
             return
         self._rest += piece
         # The one byte more is room for a carriage return.
         if len(self._rest) > self.limit + self._rest.endswith(b"\r"):
-            self._rest.clear()
-            self._skipping = True
+            self.dropping = True
             self.too_long += 1
-            lines.append(
-                BadLine(f"a line may be {self.limit} bytes long; this one is longer and was dropped")
-            )
+            self._begin_dropping(lines)
+            self._drop(bytes(self._rest), lines)
+            self._rest.clear()
 
-    def _end_line(self, lines: list[bytes | BadLine]) -> None:
+    def _end_line(self, lines: list[Line]) -> None:
         line = bytes(self._rest).removesuffix(b"\r")
         self._rest.clear()
-        self._skipping = False
-        if line:
-            lines.append(line)
+        if self.dropping:
+            self.dropping = False
+            self._end_dropping(lines)
+        elif line:
+            self._take(line, lines)
+
+    # What is made of a line, and of one that is too long
+
+    def _take(self, line: bytes, lines: list[Line]) -> None:
+        lines.append(line)
+
+    def _begin_dropping(self, lines: list[Line]) -> None:
+        lines.append(BadLine(f"a line may be {self.limit} bytes long; this one is longer and was dropped"))
+
+    def _drop(self, piece: bytes, lines: list[Line]) -> None:
+        """Nothing is kept of it."""
+
+    def _end_dropping(self, lines: list[Line]) -> None:
+        """It has been reported."""
 
 
 class Request(Struct, frozen=True, forbid_unknown_fields=True):
@@ -202,7 +237,7 @@ class Notification(Struct, frozen=True):
 
 
 class _Outgoing(Struct, frozen=True):
-    id: Id | UnsetType = UNSET
+    id: Id | float | UnsetType = UNSET
     method: str | UnsetType = UNSET
     params: Any = UNSET
     result: Any = UNSET
@@ -223,12 +258,12 @@ def encode_request(id: Id, method: str, params: object = UNSET) -> bytes:  # noq
     return _line(_Outgoing(id=id, method=method, params=params))
 
 
-def encode_result(id: Id, result: object) -> bytes:  # noqa: A002
+def encode_result(id: Id | float, result: object) -> bytes:  # noqa: A002
     """One successful answer as a line."""
     return _line(_Outgoing(id=id, result=result))
 
 
-def encode_error(id: Id, error: RpcError) -> bytes:  # noqa: A002
+def encode_error(id: Id | float, error: RpcError) -> bytes:  # noqa: A002
     """One error as a line."""
     return _line(_Outgoing(id=id, error=error.body))
 
@@ -251,6 +286,17 @@ def decode_request(line: bytes) -> Request:
         return _request_decoder.decode(line)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise _explain(line, error) from error
+
+
+def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
+    """What a line is answered with that is not served; nothing where it asks for no answer."""
+    try:
+        if isinstance(line, BadLine):
+            raise line
+        id_ = decode_request(line).id
+    except BadLine as error:
+        return encode_error(error.id, error)
+    return b"" if isinstance(id_, UnsetType) else encode_error(id_, refusal)
 
 
 def _explain(line: bytes, error: Exception) -> BadLine:

@@ -146,9 +146,13 @@ class CanBus:
             kept = tuple(known for known in self._subscribers.get(can_id, ()) if known != handler)
             self._set_handlers(can_id, kept)
 
-    def send(self, can_id: int, data: bytes, wanted: Callable[[], bool] = always) -> None:
+    def send(self, can_id: int, data: bytes) -> None:
         """Put a frame on the bus; raises `Unavailable`. See `Sender.send`."""
-        self._sender.send(can_id, data, wanted)
+        self._sender.send(can_id, data)
+
+    def offer(self, can_id: int, data: bytes, wanted: Callable[[], bool] = always) -> Callable[[], bool]:
+        """Put a frame on the bus, or into its queue, without waiting; see `Sender.offer`."""
+        return self._sender.offer(can_id, data, wanted)
 
     def send_urgent(self, can_id: int, data: bytes) -> bool:
         """Put a frame on the bus ahead of all that waits, without ever blocking. See `Sender.send_urgent`."""
@@ -165,9 +169,9 @@ class CanBus:
     def stop_node(self, node_id: int) -> None:
         """Stop a node (NMT), in either role: only ever to stop a drive. It answers no SDO then.
 
-        Raises `Unavailable`.
+        It goes ahead of all that waits, and nobody waits for it.
         """
-        self.send(NMT_COMMAND, bytes([NMT_STOP, node_id]))
+        self.send_urgent(NMT_COMMAND, bytes([NMT_STOP, node_id]))
 
     def _set_handlers(self, can_id: int, handlers: tuple[FrameHandler, ...]) -> None:
         self._subscribers[can_id] = handlers

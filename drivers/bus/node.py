@@ -9,10 +9,11 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.frames import REMOTE
+from drivers.bus.frames import REMOTE, wire_id
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.sdo_channel import Interrupted, SdoChannel
@@ -41,6 +42,20 @@ class NodeUser(Protocol):
         """What was read and received is no longer true: the node rebooted or its bus is gone."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Requests:
+    """The outlet of one node's SDO channel."""
+
+    bus: CanBus
+    can_id: int
+
+    def offer(self, data: bytes, wanted: Callable[[], bool]) -> Callable[[], bool]:
+        return self.bus.offer(self.can_id, data, wanted)
+
+    def send_urgent(self, data: bytes) -> bool:
+        return self.bus.send_urgent(self.can_id, data)
+
+
 class Node(BusUser):
     """A node id on a bus. Alive while at least one user is attached."""
 
@@ -65,9 +80,13 @@ class Node(BusUser):
         self._booting: Future[None] | None = None
         self._retry_s = FIRST_RETRY_S
         self._retry_ns = 0
-        self._request_id, response_id = times.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
+        sdo_ids = times.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
+        self._request_id, response_id = map(wire_id, sdo_ids)
         self.channel = SdoChannel(
-            f"node {node_id} on {bus.name}", self._send_request, times.sdo_timeout_s, lambda: self.distrust
+            f"node {node_id} on {bus.name}",
+            _Requests(bus, self._request_id),
+            times.sdo_timeout_s,
+            lambda: self.distrust,
         )
         self.worker = SdoWorker(self.channel)
         self._emcy_id = EMCY + node_id
@@ -345,9 +364,6 @@ class Node(BusUser):
         self._users = users
         names = "+".join(name for _, name in users) or "unused"
         self.channel.label = f"{names} (node {self.node_id} on {self.bus.name})"
-
-    def _send_request(self, data: bytes) -> None:
-        self.bus.send(self._request_id, data)
 
     def _subscribe(self) -> None:
         for can_id, handler in self._handlers.items():

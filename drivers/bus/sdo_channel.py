@@ -12,12 +12,13 @@ import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from drivers.bus import sdo
 from drivers.bus.aborts import abort_text
 from drivers.bus.doubles import Doubles
 from drivers.bus.outstanding import Outstanding, Request
+from drivers.bus.sender import StillLeaving
 from drivers.bus.written import Written
 from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
 
@@ -31,6 +32,14 @@ _UNKNOWN = "whether the device took it is not known, read it back"
 
 class Interrupted(Exception):
     """An urgent job wants the channel: the running one ends here and, as far as it only read, runs again."""
+
+
+class Outlet(Protocol):
+    """How a channel's requests reach the bus; see `CanBus.offer` and `CanBus.send_urgent`."""
+
+    def offer(self, data: bytes, wanted: Callable[[], bool]) -> Callable[[], bool]: ...
+
+    def send_urgent(self, data: bytes) -> bool: ...
 
 
 class SdoProtocolBroken(DeviceTimeout):
@@ -96,15 +105,15 @@ class SdoChannel:
     def __init__(
         self,
         label: str,
-        send: Callable[[bytes], None],
+        outlet: Outlet,
         timeout_s: float,
         distrust: Callable[[], str | None] = _nothing,
     ) -> None:
-        """`send` puts a request on the bus, or raises `Unavailable`; `distrust` says why not to write."""
+        """`distrust` says why not to write."""
         self.label = label
         self.timeout_s = timeout_s
         self.counters = SdoCounters()
-        self._send = send
+        self._outlet = outlet
         self._distrust = distrust
         self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._interrupted = threading.Event()
@@ -170,8 +179,9 @@ class SdoChannel:
             self._in_flight = None
             if ahead is not None:
                 self._written.doubt((int.from_bytes(ahead[1:3], "little"), ahead[3]))
-                with contextlib.suppress(Unavailable):  # whoever waits for an answer is told
-                    self._ahead = self._put(ahead[1:4], ahead)
+                request = self._outstanding.add(ahead[1:4], ahead)  # before it can be answered
+                self._outlet.send_urgent(ahead)
+                self._ahead = request
 
     def wake(self) -> None:
         """Let a job that waits for an answer look whether it was interrupted."""
@@ -247,7 +257,7 @@ class SdoChannel:
             if not write.write_begun:
                 raise
             raise DeviceTimeout(f"{what}: interrupted by an urgent request; {_UNKNOWN}") from error
-        except DeviceTimeout as error:
+        except (DeviceTimeout, StillLeaving) as error:
             if not write.write_begun:
                 raise
             raise DeviceTimeout(f"{error}; {_UNKNOWN}") from error
@@ -372,40 +382,71 @@ class SdoChannel:
     # What goes out.
 
     def _hand_over(self, transfer: _Transfer[Any], frame: bytes) -> Request:
+        """Send a request, and return when the bus has it; nobody waits for that with the lock."""
+        begins = transfer.data is not None and transfer.request is None
         with self._sending:
             self._check_interrupted()
             ahead, self._ahead = self._ahead, None
-            if ahead is None or ahead.frame != frame:
+            is_sent = ahead is not None and ahead.frame == frame
+            if begins and not is_sent:
                 self._check_permitted(transfer)
-                ahead = None
-            begins = transfer.data is not None and transfer.request is None
             if begins:
                 self._written.begin((transfer.index, transfer.subindex))
-            try:
-                transfer.request = ahead or self._put(transfer.about, frame)
-            except Unavailable:
-                if begins:
-                    self._written.withdraw()
-                raise
+            if ahead is not None and is_sent:
+                request, sent = ahead, _always
+            else:
+                request, sent = self._offer(transfer, frame, begins=begins)
             self._in_flight = (transfer.index, transfer.subindex)
-            return transfer.request
+        self._await_sent(transfer, request, sent, begins=begins)
+        transfer.request = request
+        return request
+
+    def _offer(
+        self, transfer: _Transfer[Any], frame: bytes, *, begins: bool
+    ) -> tuple[Request, Callable[[], bool]]:
+        """Where it has to wait for its turn, it is asked again then whether it may go."""
+
+        def wanted() -> bool:
+            return not self._interrupted.is_set() and not (begins and self._objection(transfer))
+
+        request = self._outstanding.add(transfer.about, frame)  # before it can be answered
+        try:
+            return request, self._outlet.offer(frame, wanted)
+        except Unavailable:
+            self._forget_unsent(request, begins=begins)
+            raise
+
+    def _await_sent(
+        self, transfer: _Transfer[Any], request: Request, sent: Callable[[], bool], *, begins: bool
+    ) -> None:
+        try:
+            if sent():
+                return
+        except StillLeaving:
+            transfer.request = request  # nobody knows: it may yet be answered
+            raise
+        except Unavailable:
+            self._forget_unsent(request, begins=begins)
+            raise
+        self._forget_unsent(request, begins=begins)
+        self._check_interrupted()
+        if begins:
+            self._check_permitted(transfer)
+        raise Unavailable(f"{transfer.what}: it was not sent")
+
+    def _forget_unsent(self, request: Request, *, begins: bool) -> None:
+        self._outstanding.drop(request)
+        if begins:
+            self._written.withdraw()
 
     def _check_permitted(self, transfer: _Transfer[Any]) -> None:
         """Raise `NotPermitted` where a write that is about to begin must not."""
-        if transfer.data is None or transfer.request is not None:
-            return
-        why = transfer.permitted() or (None if self._urgent else self._distrust())
+        why = self._objection(transfer)
         if why is not None:
             raise NotPermitted(f"{transfer.what}: not sent: {why}")
 
-    def _put(self, about: bytes, frame: bytes) -> Request:
-        request = self._outstanding.add(about, frame)  # before it can be answered
-        try:
-            self._send(frame)
-        except Unavailable:
-            self._outstanding.drop(request)
-            raise
-        return request
+    def _objection(self, transfer: _Transfer[Any]) -> str | None:
+        return transfer.permitted() or (None if self._urgent else self._distrust())
 
     def _abort(self, transfer: _Transfer[Any], abort_code: int) -> None:
         with self._sending:
@@ -414,8 +455,7 @@ class SdoChannel:
 
     def _end_transfer(self, index: int, subindex: int, abort_code: int) -> None:
         """Tell the device, which answers nothing to that."""
-        with contextlib.suppress(Unavailable):
-            self._send(sdo.abort_request(index, subindex, abort_code))
+        self._outlet.send_urgent(sdo.abort_request(index, subindex, abort_code))
 
     def _check_interrupted(self) -> None:
         if self._interrupted.is_set():

@@ -25,9 +25,17 @@ _SDO_HEAD = 4  # command, index and subindex: what an SDO request is about
 Key = tuple[int, bytes]
 
 
+class StillLeaving(Unavailable):
+    """The bus takes nothing, and the frame is in its interface's hands: nobody knows whether it leaves."""
+
+
 def always() -> bool:
-    """A frame that nothing overtakes."""
+    """A frame that nothing overtakes; one that was sent."""
     return True
+
+
+def _not_sent() -> bool:
+    return False
 
 
 @dataclass(slots=True, eq=False)
@@ -36,7 +44,7 @@ class _Frame:
     data: bytes
     until: float = float("inf")
     wanted: Callable[[], bool] = always
-    taken: Future[None] = field(default_factory=Future)
+    taken: Future[bool] = field(default_factory=Future)
 
     @property
     def key(self) -> Key:
@@ -86,20 +94,28 @@ class Sender:
             self._thread.join()
             self._thread = None
 
-    def send(self, can_id: int, data: bytes, wanted: Callable[[], bool] = always) -> None:
-        """Return when the frame was taken; raises `Unavailable`, after `SEND_TIMEOUT_S` at most.
+    def offer(self, can_id: int, data: bytes, wanted: Callable[[], bool] = always) -> Callable[[], bool]:
+        """Send it now, or let it wait its turn, without waiting for that; raises `Unavailable`.
 
-        `wanted` is asked under a lock when the frame's turn has come. Where it says no, nothing is sent.
+        `wanted` is asked under a lock when the frame's turn has come; where it says no, nothing is sent. What
+        is returned waits, `SEND_TIMEOUT_S` at most, and says whether the frame was sent; it raises
+        `Unavailable` where the bus takes nothing, `StillLeaving` where the frame can no longer be kept back.
         """
         with self._changed:
             transport = self._transport
             if transport is None:
                 raise Unavailable(self._why_closed())
             waits = transport.blocks or self._normal or self._urgent
-            if not waits and (not wanted() or self._hand_over(transport, can_id, data)):
-                return
+            if not waits and not wanted():
+                return _not_sent
+            if not waits and self._hand_over(transport, can_id, data):
+                return always
             frame = self._queue(_Frame(can_id, data, wanted=wanted))
-        self._await(frame, transport.full)
+        return lambda: self._await(frame, transport.full)
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Return when the frame was taken; raises `Unavailable`, after `SEND_TIMEOUT_S` at most."""
+        self.offer(can_id, data)()
 
     def send_urgent(self, can_id: int, data: bytes) -> bool:
         """Whether the frame was taken at once. Else it goes ahead of all others, for `URGENT_S`.
@@ -116,13 +132,13 @@ class Sender:
             self._queue_urgent(_Frame(can_id, data, until=time.monotonic() + URGENT_S))
         return False
 
-    def _await(self, frame: _Frame, full: str) -> None:
+    def _await(self, frame: _Frame, full: str) -> bool:
         with contextlib.suppress(TimeoutError):
             return frame.taken.result(SEND_TIMEOUT_S)
         with self._changed:
             if not frame.taken.done():
                 if frame not in self._normal:
-                    raise Unavailable(f"{full} It may still leave")
+                    raise StillLeaving(f"{full} It may still leave")
                 self._normal.remove(frame)
                 raise Unavailable(full)
         return frame.taken.result()
@@ -156,7 +172,7 @@ class Sender:
             except Unavailable as error:
                 frame.taken.set_exception(error)
             else:
-                frame.taken.set_result(None)
+                frame.taken.set_result(True)
 
     # What follows is for who has the lock.
 
@@ -196,7 +212,7 @@ class Sender:
             except Unavailable as error:
                 frame.taken.set_exception(error)
             else:
-                frame.taken.set_result(None)
+                frame.taken.set_result(True)
             self._remove(frame)
         return _is_flushed(transport)
 
@@ -206,7 +222,7 @@ class Sender:
             if frame.wanted() and time.monotonic() < frame.until:
                 return frame
             self._remove(frame)
-            frame.taken.set_result(None)
+            frame.taken.set_result(False)
         return None
 
     def _remove(self, frame: _Frame) -> None:

@@ -63,9 +63,9 @@ class PowerDrive:
         return self._stop(Controlword.DISABLE_VOLTAGE, _LIMP_STATES)
 
     def nmt_stop(self) -> None:
-        """Stop the whole node (NMT). It answers no SDO then: nothing confirms what its 6007h makes of that.
+        """Stop the whole node (NMT).
 
-        Raises `Unavailable`.
+        It answers no SDO then: nothing confirms what its 6007h makes of that.
         """
         self.node.bus.stop_node(self.node.node_id)
 

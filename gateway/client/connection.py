@@ -147,8 +147,8 @@ class Connection(asyncio.Protocol):
 
     # --- matching
 
-    def _take(self, line: bytes | wire.BadLine) -> None:
-        if isinstance(line, wire.BadLine):
+    def _take(self, line: wire.Line) -> None:
+        if not isinstance(line, bytes):
             raise ProtocolError(f"{self.address} does not speak as a gateway does: {line}")
         try:
             message = self._decode(line)

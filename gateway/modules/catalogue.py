@@ -1,5 +1,6 @@
 """Every parameter of a robot by its name: those that its file describes, and those that an EDS offers."""
 
+import fnmatch
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from eds import Description
@@ -8,7 +9,7 @@ from gateway.coding import NUMBERS, Number, scaled
 from gateway.config import STORE, ParameterSettings, RobotConfig
 from gateway.modules.offer import offered
 from gateway.modules.parameters import Parameter, contradiction
-from gateway.sources import check_globs, matches
+from gateway.sources import check_globs
 
 
 class Catalogue(Mapping[str, Parameter]):
@@ -38,10 +39,12 @@ class Catalogue(Mapping[str, Parameter]):
         """
         if names is None:
             return [one for one in self._by_name.values() if one.lock is None]
-        exact = {self._by_address.get(name, name) for name in names} & self._by_name.keys()
+        meant = {self._by_address.get(name, name) for name in names} & self._by_name.keys()
         globs = [name for name in names if name not in self]
         check_globs("parameter", self._by_name, globs)
-        return [one for name, one in self._by_name.items() if name in exact or matches(name, globs)]
+        for glob in globs:
+            meant.update(fnmatch.filter(self._by_name, glob))
+        return [one for name, one in self._by_name.items() if name in meant]
 
 
 def resolve(

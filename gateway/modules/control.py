@@ -70,8 +70,10 @@ class ControlModule:
         left = self._tuning.load()
         self._stop.start()
         loop.post(lambda: self._tuning.resume(left))
+        self._context.stops_by(self.stop_robot)
 
     def stop(self) -> None:
+        self._context.stops_by(None)
         self._stop.close()
         self._tuning.close()
         self._records.close()

@@ -1,13 +1,19 @@
 """The resource module: the computer's own CPU, memory and processes, measured only when somebody asks.
 
-Percentages are over the time since the same connection asked last; what cannot be known yet is `None`.
+Percentages are over the time since the same connection asked last; what cannot be known yet is `None`. Looks
+are taken in a thread of their own, one after the other: a table with command lines takes many milliseconds.
 """
 
+import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
+from gateway.futures import back, then
 from gateway.messages import ResourceSnapshot, ResourceSnapshotParams
 from gateway.sources import Selection, whole
 from gateway.wire import Kind, refuse
@@ -17,6 +23,9 @@ if TYPE_CHECKING:
     from gateway.modules.host import Host, Meter
     from gateway.registry import Context
     from gateway.session import Answer, Session
+
+T = TypeVar("T")
+Look = Callable[["Meter", ResourceSnapshotParams], "Future[ResourceSnapshot]"]
 
 NAME = "resource"
 SAMPLE_PERIOD_S = 1.0  # of the streamed columns
@@ -32,6 +41,8 @@ _UNITS = {
 }
 RESOURCE_CHANNELS = tuple(Channel(f"{NAME}.{name}", NAME, name, unit) for name, unit in _UNITS.items())
 _ALL = tuple(range(len(RESOURCE_CHANNELS)))
+_NO_PROCESSES = ResourceSnapshotParams(processes=False)
+_encoder = msgspec.json.Encoder()
 
 
 def columns(snapshot: ResourceSnapshot) -> tuple[float | None, ...]:
@@ -54,10 +65,11 @@ class HostSource:
     name = NAME
     channels = RESOURCE_CHANNELS
 
-    def __init__(self, context: "Context", host: "Host") -> None:
+    def __init__(self, context: "Context", host: "Host", look: Look) -> None:
         self.latest = Latest(NAME, RESOURCE_CHANNELS, stale_after_s=3 * SAMPLE_PERIOD_S)
         self._loop = context.loop
         self._host = host
+        self._look = look
         self._meter: Meter | None = None
         self._listening = 0
         self._timer: Timer | None = None
@@ -80,15 +92,18 @@ class HostSource:
     def close(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-            self._timer = None
+            self._timer = self._meter = None
         self.latest.clear()
 
     def _measure(self) -> None:
-        if self._meter is None:
-            return
-        snapshot = self._meter.snapshot(ResourceSnapshotParams(processes=False))
-        self.latest.update(snapshot.stamp_ns, _ALL, columns(snapshot))
-        self._timer = self._loop.call_later(SAMPLE_PERIOD_S, self._measure)
+        meter = self._meter
+        if meter is not None:
+            self._timer = self._loop.call_later(SAMPLE_PERIOD_S, self._measure)
+            then(self._look(meter, _NO_PROCESSES), lambda snapshot: self._measured(meter, snapshot))
+
+    def _measured(self, meter: "Meter", snapshot: ResourceSnapshot) -> None:
+        if meter is self._meter:  # somebody still listens
+            self.latest.update(snapshot.stamp_ns, _ALL, columns(snapshot))
 
 
 class ResourceModule:
@@ -107,10 +122,12 @@ class ResourceModule:
         from gateway.modules.host import Host  # how it measures is loaded with the first question
 
         self._host = Host(self._control)
-        self._source = HostSource(self._context, self._host)
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix=NAME)
+        self._source = HostSource(self._context, self._host, self.look)
 
     def stop(self) -> None:
         self._source.close()
+        self._worker.shutdown(wait=True)
         self._host.close()
 
     def meter(self) -> "Meter":
@@ -124,18 +141,41 @@ class ResourceModule:
     def selections(self) -> list[Selection]:
         return [whole(self._source)]
 
-    def measure(self, session: "Session", method: str, params: ResourceSnapshotParams) -> ResourceSnapshot:
-        """A snapshot whose percentages are since this connection last called `method`."""
+    def look(self, meter: "Meter", params: ResourceSnapshotParams) -> "Future[ResourceSnapshot]":
+        """A snapshot of one asker's, given in the loop."""
+        return back(self._context.loop, self._worker.submit(meter.snapshot, params))
+
+    def measure(self, session: "Session", method: str) -> "Future[ResourceSnapshot]":
+        """A snapshot without processes whose percentages are since this connection last called `method`."""
+        meter = self._meter_of(session, method)
+        return self._for(session, lambda: meter.snapshot(_NO_PROCESSES))
+
+    def _meter_of(self, session: "Session", method: str) -> "Meter":
         meter = self._meters.get((session, method))
         if meter is None:
             meter = self._meters[session, method] = self.meter()
             session.on_close(lambda: self._forget(session, method))
-        return meter.snapshot(params)
+        return meter
 
     def _forget(self, session: "Session", method: str) -> None:
         self._meters.pop((session, method), None)
 
-    def _snapshot(self, session: "Session", params: ResourceSnapshotParams) -> ResourceSnapshot:
+    def _snapshot(self, session: "Session", params: ResourceSnapshotParams) -> "Future[msgspec.Raw]":
+        """As it goes on the wire."""
         if "control" in params.include and not self._control:
             raise refuse(Kind.BAD_PARAMS, "control: the robot's file names no processes in [control_loop]")
-        return self.measure(session, "resource.snapshot", params)
+        meter = self._meter_of(session, "resource.snapshot")
+        return self._for(session, lambda: msgspec.Raw(_encoder.encode(meter.snapshot(params))))
+
+    def _for(self, session: "Session", work: Callable[[], T]) -> "Future[T]":
+        """Done by the worker, and put down on the session's account."""
+
+        def metered() -> tuple[T, int]:
+            began_ns = time.thread_time_ns()
+            return work(), time.thread_time_ns() - began_ns
+
+        def give(done: tuple[T, int]) -> T:
+            session.cpu_ns += done[1]
+            return done[0]
+
+        return then(back(self._context.loop, self._worker.submit(metered)), give)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 from gateway.futures import then
-from gateway.messages import Params, ResourceSnapshotParams, Snapshot
+from gateway.messages import Params, ResourceSnapshot, Snapshot
 from gateway.modules.resource import RESOURCE_CHANNELS, ResourceModule, columns
 from gateway.sources import Selection, narrow
 
@@ -54,13 +54,13 @@ class StatusModule:
     def _snapshot(self, session: "Session", _params: Params) -> "Answer":
         chosen = self._components()
         ready = self._component.when_known(chosen)
-        return then(ready, lambda _none: self._answer(session, chosen))
+        measured = then(ready, lambda _none: self._resource.measure(session, "status.snapshot"))
+        return then(measured, lambda host: self._answer(chosen, host))
 
-    def _answer(self, session: "Session", chosen: list[Selection]) -> Snapshot:
+    def _answer(self, chosen: list[Selection], host: ResourceSnapshot) -> Snapshot:
         snapshot = self._component.read(chosen)
         for name in self._component.absent:
             snapshot.quality[name] = self._component.quality(name, snapshot.stamp_ns)
-        host = self._resource.measure(session, "status.snapshot", ResourceSnapshotParams(processes=False))
         for channel, value in zip(RESOURCE_CHANNELS, columns(host), strict=True):
             if channel.name in RESOURCE_GLOBS:
                 snapshot.values[channel.name] = value

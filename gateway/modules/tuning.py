@@ -79,6 +79,7 @@ class Tuning:
         self._records = records
         self._authority = authority
         self._parameters = resolve(config, component.robot.descriptions, component.absent)
+        self._infos = [one.info for one in self._parameters.values()]
         self._joints = tuple(config.joint)
         self._rules = Rules(config, component, self._parameters)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
@@ -130,18 +131,19 @@ class Tuning:
         return None if name is None else f"{name}, which enabled drives do not allow, {names[name]}"
 
     def infos(self) -> list[ParameterInfo]:
-        return [one.info for one in self._parameters.values()]
+        return self._infos
 
     def listed(self, names: list[str] | None) -> ParameterValues:
         """What is known without asking: the last value read, as long as its device is there."""
-        return ParameterValues({one.name: self._last(one) for one in self._parameters.chosen(names)})
+        chosen = self._parameters.chosen(names)
+        lost = self._lost(chosen)
+        return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
     def read(self, names: list[str] | None) -> "Future[ParameterValues]":
         """What the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
-        uploads = then(ready, lambda _none: gather({one.name: self._upload(one) for one in chosen}))
-        return then(uploads, self._values)
+        return then(then(ready, lambda _none: self._uploads(chosen)), self._values)
 
     def write(
         self, values: Mapping[str, float], session: "Session", trial_s: float | None
@@ -174,27 +176,26 @@ class Tuning:
         for name in names:
             self._known.pop(name, None)
 
-    def _problem(self, parameter: Parameter) -> str | None:
-        """Why the device cannot be asked at all."""
-        if parameter.problem is not None:
-            return parameter.problem
-        silence = self._rules.silence(parameter.component)
-        return None if silence is None else f"{parameter.component} is not there: {silence}"
+    def _lost(self, parameters: Iterable[Parameter]) -> dict[str, str]:
+        """Why what was read last may hold no longer; of each device that has one of these parameters."""
+        now_ns, lost = time.monotonic_ns(), {}
+        for name in {one.component for one in parameters if one.problem is None}:
+            quality = self._component.quality(name, now_ns)
+            if quality["state"] == State.LOST:
+                lost[name] = f"{name} is not there: {quality['problem'] or 'it is silent'}"
+        return lost
 
-    def _last(self, parameter: Parameter) -> ParameterValue:
-        problem = self._problem(parameter) or self._lost(parameter)
+    def _last(self, parameter: Parameter, lost: Mapping[str, str]) -> ParameterValue:
+        problem = parameter.problem or lost.get(parameter.component)
         stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
         return _value(parameter, value, stamp_ns, problem)
 
-    def _lost(self, parameter: Parameter) -> str | None:
-        """Why what was read last may hold no longer."""
-        quality = self._component.quality(parameter.component, time.monotonic_ns())
-        if quality["state"] != State.LOST:
-            return None
-        return f"{parameter.component} is not there: {quality['problem'] or 'it is silent'}"
+    def _uploads(self, parameters: list[Parameter]) -> "Future[dict[str, bytes | Exception]]":
+        silent = {name: self._rules.silence(name) for name in {one.component for one in parameters}}
+        return gather({one.name: self._upload(one, silent[one.component]) for one in parameters})
 
-    def _upload(self, parameter: Parameter) -> "Future[bytes]":
-        problem = self._problem(parameter)
+    def _upload(self, parameter: Parameter, silence: str | None) -> "Future[bytes]":
+        problem = parameter.problem or (silence and f"{parameter.component} is not there: {silence}")
         if problem is not None:
             return failed(parameter.refusal(Kind.UNAVAILABLE, problem))
         try:

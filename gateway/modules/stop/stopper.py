@@ -5,7 +5,6 @@ from concurrent.futures import Future
 from dataclasses import replace
 
 from drivers.bus.arming import ACTING
-from drivers.errors import Unavailable
 from drivers.joint.quick_stop import StopOutcome
 from gateway.futures import done, then
 from gateway.modules.stop.drive import Drive, quick_stop
@@ -74,10 +73,7 @@ def _stop_node(axes: list[Drive]) -> str:
     if not all(option in ACTING for option in options):
         said = ", ".join("unknown" if option is None else str(option) for option in options)
         return f"NMT stop was not sent: its 6007h is {said}, so it might only fall silent"
-    try:
-        axes[0].nmt_stop()
-    except Unavailable as error:
-        return f"NMT stop could not be sent: {error}"
+    axes[0].nmt_stop()
     return (
         "NMT stop was sent, which nothing confirms; it answers nothing until a master starts its node again"
     )

@@ -9,11 +9,16 @@ import threading
 import time
 from collections.abc import Callable
 
+from drivers.bus.urgency import make_urgent
 from gateway.modules.stop.memory import MemoryLock
 
 log = logging.getLogger(__name__)
 
 Work = Callable[[], object]
+
+
+class Ended(Exception):
+    """What was asked for came too late: the module that carries out stops is ending."""
 
 
 class StopThread:
@@ -25,6 +30,8 @@ class StopThread:
         self._period_s = period_s
         self._due: float | None = None  # when to look next; `None` while there is nothing to watch
         self._work: queue.SimpleQueue[Work | None] = queue.SimpleQueue()
+        self._closed = False
+        self._closing = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="stop", daemon=True)
 
     def start(self) -> None:
@@ -33,15 +40,26 @@ class StopThread:
 
     def close(self) -> None:
         """Do what was given, and end."""
-        self._work.put(None)
+        with self._closing:
+            self._closed = True
+            self._work.put(None)
         self._thread.join()
         MemoryLock.end()
 
     def put(self, work: Work) -> None:
-        """Do it as soon as can be; from any thread, never waits."""
-        self._work.put(work)
+        """Do it as soon as can be; from any thread, never waits.
+
+        Raises:
+            Ended: the thread is closed, and nothing was done.
+
+        """
+        with self._closing:
+            if self._closed:
+                raise Ended("the stop's thread has ended; ask again")
+            self._work.put(work)
 
     def _run(self) -> None:
+        make_urgent()
         while (work := self._next()) is not None:
             try:
                 work()

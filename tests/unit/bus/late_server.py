@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import repeat
 
 from drivers.bus.sdo_channel import SdoChannel
+from tests.unit.bus.direct import Direct
 
 CLOCK, VALUE, LONG, ABSENT = 0x2000, 0x2001, 0x2002, 0x2003
 
@@ -34,7 +35,7 @@ class LateServer:
         self.value = bytes(4)  # of VALUE
         self.taken_at = 0  # when it was written
         self.on_request: Callable[[bytes], None] = lambda request: None
-        self.channel = SdoChannel("node 1", self.hear, timeout_s)
+        self.channel = SdoChannel("node 1", Direct(self.hear), timeout_s)
         self._answers: deque[tuple[int, bytes]] = deque()
         self._left = b""  # of a segmented upload
 

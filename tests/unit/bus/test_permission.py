@@ -1,5 +1,6 @@
 """A write is permitted at the last moment, so that none follows the stop that forbids it."""
 
+import itertools
 import threading
 from collections.abc import Iterator
 
@@ -8,6 +9,7 @@ import pytest
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
 from drivers.errors import DriverError, NotPermitted
+from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import VALUE, LateServer
 from tests.unit.bus.waiting import WAIT_S
 
@@ -62,12 +64,13 @@ def test_a_write_that_is_not_is_not_sent_and_says_why(machine: Machine) -> None:
 def test_a_stop_during_the_decision_goes_out_behind_the_write_and_nothing_behind_the_stop(
     machine: Machine,
 ) -> None:
-    """Between the permission and the frame there is no room for a stop."""
+    """Between the last permission and the frame there is no room for a stop."""
     stops: list[threading.Thread] = []
+    decisions = itertools.count(1)
 
     def slowly() -> str | None:
         may = machine.permitted()
-        if not stops:
+        if next(decisions) == 2:  # it is asked before it is offered to the bus, and when its turn has come
             stops.append(threading.Thread(target=machine.stop))
             stops[0].start()
             stops[0].join(0.05)  # as long as it might need, if nothing held it
@@ -110,13 +113,13 @@ def test_it_is_asked_once_a_write_and_not_for_its_segments(machine: Machine) -> 
         sdo.download(VALUE, 0, bytes(20), permitted=permitted)
 
     machine.worker.submit(write).result(WAIT_S)
-    assert asked == [0]
+    assert asked == [0, 0]
     assert len(machine.server.requests) == 4
 
 
 def test_a_stop_is_sent_whoever_answers() -> None:
     server = LateServer()
-    channel = SdoChannel("node 1", server.hear, WAIT_S, lambda: "two devices answer")
+    channel = SdoChannel("node 1", Direct(server.hear), WAIT_S, lambda: "two devices answer")
     server.channel = channel
     worker = SdoWorker(channel)
     worker.start()

@@ -9,6 +9,7 @@ import pytest
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
+from tests.unit.bus.direct import Direct
 from tests.unit.bus.waiting import WAIT_S, until
 
 
@@ -19,7 +20,7 @@ class Device:
         self.requests: list[bytes] = []
         self.deaf_to: dict[int, int] = {}  # index: how many requests stay unanswered
         self.asked = threading.Event()
-        self.channel = SdoChannel("node 1", self.hear, timeout_s=0.2)
+        self.channel = SdoChannel("node 1", Direct(self.hear), timeout_s=0.2)
 
     def hear(self, request: bytes) -> None:
         self.requests.append(request)
@@ -107,7 +108,7 @@ def test_an_abort_is_told_in_words_with_object_and_value(worker: SdoWorker, devi
     def refuse(request: bytes) -> None:
         device.channel.on_response(0, b"\x80" + request[1:4] + (0x06090031).to_bytes(4, "little"))
 
-    device.channel._send = refuse
+    device.channel._outlet = Direct(refuse)
     future = worker.submit(lambda sdo: sdo.download(0x6065, 1, (5000).to_bytes(2, "little")))
     with pytest.raises(
         DeviceAbort, match=r"writing 5000 \(88 13\) to 0x6065:01: refused, the value is too high"
@@ -349,13 +350,13 @@ def test_a_stop_that_a_broken_interface_does_not_send_is_tried_by_its_job(
     worker: SdoWorker, device: Device
 ) -> None:
     worker.submit(lambda _: None).result(WAIT_S)
-    hear = device.channel._send
+    outlet = device.channel._outlet
 
     def broken(_request: bytes) -> None:
-        device.channel._send = hear
+        device.channel._outlet = outlet
         raise OSError("the interface is broken")
 
-    device.channel._send = broken
+    device.channel._outlet = Direct(broken)
     with pytest.raises(OSError, match="broken"):
         stop(worker)
     worker.submit(lambda _: None).result(WAIT_S)

@@ -57,13 +57,13 @@ def sender(narrow: NarrowTransport) -> Iterator[Sender]:
 
 
 @pytest.fixture
-def later(sender: Sender) -> Iterator[Callable[..., Future[None]]]:
+def later(sender: Sender) -> Iterator[Callable[..., Future[bool]]]:
     """Sends in a thread of its own, and returns when the frame waits there."""
     with ThreadPoolExecutor(16) as threads:
 
-        def send(can_id: int, data: bytes, wanted: Callable[[], bool] = lambda: True) -> Future[None]:
+        def send(can_id: int, data: bytes, wanted: Callable[[], bool] = lambda: True) -> Future[bool]:
             waiting = len(sender._normal)
-            sent = threads.submit(sender.send, can_id, data, wanted)
+            sent = threads.submit(lambda: sender.offer(can_id, data, wanted)())
             until(lambda: len(sender._normal) > waiting)
             return sent
 
@@ -91,7 +91,7 @@ def test_a_frame_that_nobody_takes_is_taken_back_and_its_caller_told(
 
 
 def test_what_waits_leaves_as_soon_as_there_is_room_in_the_order_in_which_it_came(
-    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[None]], patient: None
+    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[bool]], patient: None
 ) -> None:
     waiting = [later(REQUEST, bytes([number])) for number in range(8)]
     assert not any(one.done() for one in waiting)
@@ -102,7 +102,7 @@ def test_what_waits_leaves_as_soon_as_there_is_room_in_the_order_in_which_it_cam
 
 
 def test_an_urgent_frame_never_waits_and_leaves_before_all_that_does(
-    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[None]], patient: None
+    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[bool]], patient: None
 ) -> None:
     normal = later(REQUEST, b"normal")
     assert not sender.send_urgent(REQUEST, ABORT)
@@ -113,7 +113,7 @@ def test_an_urgent_frame_never_waits_and_leaves_before_all_that_does(
 
 
 def test_an_urgent_frame_is_taken_at_once_though_others_wait(
-    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[None]], patient: None
+    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[bool]], patient: None
 ) -> None:
     later(REQUEST, b"normal")
     until(lambda: narrow.awaited)
@@ -155,15 +155,15 @@ def test_an_urgent_frame_that_is_too_late_is_not_sent(
 
 
 def test_what_was_overtaken_while_it_waited_is_not_sent(
-    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[None]], patient: None
+    narrow: NarrowTransport, sender: Sender, later: Callable[..., Future[bool]], patient: None
 ) -> None:
     wanted = True
     enabling = later(REQUEST, b"enable operation", lambda: wanted)
     wanted = False
     sender.send_urgent(REQUEST, QUICK_STOP)
     narrow.open()
-    enabling.result(WAIT_S)
-    sender.send(REQUEST, b"enable operation", lambda: wanted)
+    assert enabling.result(WAIT_S) is False
+    assert sender.offer(REQUEST, b"enable operation", lambda: wanted)() is False
     assert narrow.sent == [(REQUEST, QUICK_STOP)]
 
 
@@ -182,7 +182,7 @@ def test_a_request_that_waits_urgently_is_not_sent_twice(
 
 
 def test_who_waits_when_the_bus_closes_is_told(
-    sender: Sender, later: Callable[..., Future[None]], patient: None
+    sender: Sender, later: Callable[..., Future[bool]], patient: None
 ) -> None:
     waiting = later(0x601, b"")
     sender.stop()

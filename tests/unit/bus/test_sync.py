@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from drivers.bus.sdo_channel import INBOX, OUT_OF_SYNC, SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, Unavailable
+from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import ABSENT, AT_ONCE, CLOCK, LONG, VALUE, Fate, LateServer
 
 LOST, UNHEARD = Fate(answered=False), Fate(taken=False)
@@ -30,6 +31,7 @@ fates = st.builds(
     lag=st.sampled_from((0, 0, 0, 0, 1, 2, 3, 7)),
     copies=st.sampled_from((1, 1, 1, 2)),
 )
+
 steps = st.lists(st.sampled_from(("clock", "long", "write", "value", "absent")), min_size=1, max_size=12)
 
 
@@ -418,7 +420,7 @@ def test_a_write_without_an_answer_is_unknown_also_where_the_bus_has_gone_meanwh
         if request[0] == 0x80:
             raise Unavailable("bus main is not open")
 
-    server.channel._send = hear
+    server.channel._outlet = Direct(hear)
     with pytest.raises(DriverError, match="not known"):
         server.channel.download(VALUE, 0, NEW)
     assert [request[0] for request in sent] == [0x23, 0x80]

@@ -3,6 +3,7 @@
 import json
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -16,10 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway import daemon, wire
+from gateway import session, wire
 from gateway.listeners import listen
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Bench, Client, config, serving, until
+from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
 
 Connect = Callable[[], Client]
 CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
@@ -107,10 +108,50 @@ def test_a_client_that_half_closes_gets_its_answers_first(client: Client, bench:
     assert all("result" in message for message in answers.values())
 
 
-def test_a_half_closed_client_keeps_the_stream_it_asked_for(client: Client) -> None:
-    client.request("stream.start", modules=["component"], rate_hz=50)
+def test_a_client_that_half_closes_is_ended_though_it_streams(connect: Connect, bench: Bench) -> None:
+    """A killed one looks the same: its trial and its lease end with it."""
+    gone, other = connect(), connect()
+    gone.call("stream.start", modules=["component"], rate_hz=0)  # nothing comes of it that could fail
+    gone.call("control.acquire", ttl_s=300)
+    gone.call("parameter.write", changes={"gait.step_length": 0.45}, trial_s=300)
+    gone.socket.shutdown(socket.SHUT_WR)
+    until(lambda: bench.gait.node.objects[0x2001, 0] == (400).to_bytes(2, "little"), "it is taken back")
+    assert other.call("control.acquire", ttl_s=10)
+    assert all("method" in message for message in iter(gone.line, None))
+
+
+def test_a_device_that_never_answers_does_not_keep_who_has_gone(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "LAST_ANSWERS_S", 0.1)
+    bench.left.hanging = Future()
+    client.request("robot.stop")
+    client.request("clock.read")
     client.socket.shutdown(socket.SHUT_WR)
-    assert [client.data()["seq"] for _ in range(5)] == [0, 1, 2, 3, 4]
+    answers = list(iter(client.line, None))
+    assert [one["id"] for one in answers] == [2]
+
+
+def test_who_vanishes_while_its_last_answer_is_awaited_is_gone_at_once(
+    connect: Connect, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone, other = connect(), connect()
+    gone.call("control.acquire", ttl_s=300)
+    monkeypatch.setattr(bench.gait.node, "upload", lambda _index, _subindex: Future())
+    gone.request("parameter.read", names=["gait.step_length"])
+    gone.socket.shutdown(socket.SHUT_WR)
+    gone.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    gone.close()
+    began = time.monotonic()
+    until(lambda: _has_lease(other), "its lease has ended")
+    assert time.monotonic() - began < session.LAST_ANSWERS_S / 2
+
+
+def _has_lease(client: Client) -> bool:
+    try:
+        return bool(client.call("control.acquire", ttl_s=10))
+    except Answered:
+        return False
 
 
 def test_a_client_that_never_reads_is_bounded_and_nobody_notices(bench: Bench, tmp_path: Path) -> None:
@@ -132,21 +173,6 @@ def test_a_client_that_never_reads_is_bounded_and_nobody_notices(bench: Bench, t
         assert other.call("clock.read")
 
 
-def test_a_client_that_sends_without_reading_does_not_starve_others(connect: Connect) -> None:
-    flood, other = connect(), connect()
-    flood.socket.settimeout(0.2)
-    line = b'{"jsonrpc":"2.0","id":1,"method":"robot.describe"}\n'
-
-    def blocked() -> bool:
-        try:
-            return flood.socket.send(line * 1000) == 0
-        except TimeoutError:
-            return True
-
-    until(blocked, "the flood is not read any more")
-    assert other.call("clock.read")
-
-
 def test_a_stop_overtakes_what_its_own_connection_has_queued(
     client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -166,27 +192,6 @@ def test_a_stop_overtakes_what_its_own_connection_has_queued(
     answered_ns = [one["result"]["stamp_ns"] for one in answers if one["id"] != "stop"]
     assert len(answered_ns) == 100
     assert len([stamp_ns for stamp_ns in answered_ns if stamp_ns < told_ns[0]]) < 50
-
-
-def test_one_client_too_many_is_told(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(daemon, "MAX_SESSIONS", 2)
-    first, second = connect(), connect()
-    assert first.call("clock.read")
-    assert second.call("clock.read")
-    third = connect()
-    message = third.line()
-    assert message is not None
-    assert message["error"]["data"]["kind"] == "unavailable"
-    assert third.line() is None
-    second.close()
-    until(lambda: _answers(connect), "a place is free again")
-
-
-def _answers(connect: Connect) -> bool:
-    client = connect()
-    client.send(CLOCK % 1)
-    message = client.line()
-    return message is not None and "result" in message
 
 
 def test_connections_that_come_and_go_leave_nothing(connect: Connect) -> None:
@@ -249,12 +254,14 @@ class TestProcess:
         assert process.stderr is not None
         assert process.stderr.read() == ""
 
-    def test_a_resource_only_client_starts_no_thread(self, process: "subprocess.Popen[str]") -> None:
+    def test_a_resource_only_client_is_read_and_looked_for_in_a_thread_each(
+        self, process: "subprocess.Popen[str]"
+    ) -> None:
         with Client(processes.address(process)) as client:
             client.call("hello", client="test")
             client.call("resource.snapshot")
             threads = list(Path(f"/proc/{process.pid}/task").iterdir())
-        assert len(threads) == 1
+        assert len(threads) == 3  # with the loop
 
 
 def test_what_a_resource_only_gateway_imports() -> None:

@@ -1,6 +1,7 @@
 """Parameters that an EDS offers: their names, what locks them, what releases them, and every number type."""
 
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import eds
+from drivers.samples import Quality
 from eds.datatypes import DATA_TYPES
 from eds.naming import identifier
 from gateway.coding import EXACT_COUNTS, Coding, CodingError, Number
 from gateway.config import ConfigError, DeviceTable, JointTable
+from gateway.messages import ParameterInfo
 from gateway.modules.catalogue import Catalogue, resolve
-from gateway.modules.parameters import Lock
+from gateway.modules.parameters import Lock, Parameter
 from gateway.wire import RpcError
 from tests.unit.gateway.harness import DISABLED, HEAD, ROBOT, Bench, Client, config, serving
 
@@ -458,3 +461,37 @@ def test_sixty_four_bits_go_over_the_wire_unharmed(bench: Bench, tmp_path: Path)
         after = client.call("parameter.write", changes={"gait.serial": 2**64 - 1})["after"]
         assert after == {"gait.serial": 2**64 - 1}
         assert client.refused("parameter.write", changes={"gait.serial": 2.0**60}).kind == "out_of_limit"
+
+
+def test_hundreds_of_parameters_are_told_for_one_look_at_each_device(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a client lists must not hold up what another one asks for."""
+    looks: list[int] = []
+    built: list[str] = []
+    quality = bench.left.quality
+    info: Callable[[Parameter], ParameterInfo] = vars(Parameter)["info"].fget
+
+    def counted(now_ns: int) -> Quality:
+        looks.append(now_ns)
+        return quality(now_ns)
+
+    def build(parameter: Parameter) -> ParameterInfo:
+        built.append(parameter.name)
+        return info(parameter)
+
+    monkeypatch.setattr(Parameter, "info", property(build))
+    offering = ROBOT.replace("node_id = 2\n", 'node_id = 2\nparameters = "eds"\nrelease = ["*"]\n', 1)
+    with serving(config(tmp_path, offering)) as address, Client(address) as client:
+        assert len(client.call("robot.describe")["parameters"]) > 100
+        monkeypatch.setattr(bench.left, "quality", counted)
+        for method, params in (
+            ("parameter.list", {"names": ["*"]}),
+            ("parameter.read", {"names": ["left_*"]}),
+        ):
+            looks.clear()
+            assert len(client.call(method, **params)["values"]) > 100
+            assert len(looks) <= 2  # waiting for its device is one of them
+        built.clear()
+        assert len(client.call("robot.describe")["parameters"]) > 100
+        assert built == []

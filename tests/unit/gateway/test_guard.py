@@ -382,7 +382,7 @@ class TestOpen:
     def test_a_guard_that_cannot_start_is_told_and_tried_again(
         self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("gateway.service.AGAIN_S", 0.2)
+        monkeypatch.setattr("gateway.standing.AGAIN_S", 0.2)
         works = False
 
         def start(_armings: Armings) -> None:

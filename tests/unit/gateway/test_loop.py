@@ -1,18 +1,23 @@
 """The loop: timers in order, callbacks from other threads never lost, errors that do not end it."""
 
 import os
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 
 import pytest
 
-from gateway.loop import Loop
+from gateway import loop as loops
+from gateway.loop import HANGUP, READ, WRITE, Loop
 from tests.unit.gateway.harness import until
 
 
-@pytest.fixture
-def loop() -> Iterator[Loop]:
+@pytest.fixture(params=["epoll", "poll"])
+def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Loop]:
+    """As it is here, and as it is where there is no epoll."""
+    if request.param == "poll":
+        monkeypatch.setattr(loops, "_POLL", loops.Poll)
     loop = Loop()
     yield loop
     loop.close()
@@ -106,3 +111,26 @@ def test_call_runs_at_once_in_the_loops_own_thread(running: Loop) -> None:
     running.call(inside)
     until(done.is_set, "it has run")
     assert order == ["called", "after"]
+
+
+def test_a_file_is_watched_for_what_is_asked_and_its_end_is_told_in_any_case(loop: Loop) -> None:
+    ours, other = socket.socketpair()
+    told: list[int] = []
+    with ours:
+        loop.call_later(1000.0, lambda: None)  # it waits for no time to pass
+        loop.watch(ours, READ, told.append)
+        other.send(b"x")
+        loop._turn()
+        loop.watch(ours, READ | WRITE, told.append)
+        loop._turn()
+        loop.watch(ours, HANGUP, told.append)
+        loop.post(lambda: None)
+        loop._turn()
+        assert told == [READ, READ | WRITE]
+        other.close()
+        loop._turn()
+        assert told[2] & HANGUP
+        loop.watch(ours, 0, told.append)
+        loop.post(lambda: None)
+        loop._turn()
+        assert len(told) == 3

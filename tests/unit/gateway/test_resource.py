@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -11,12 +12,12 @@ from typing import Any
 import psutil
 import pytest
 
-from gateway.messages import MemoryUse, ProcessUse, ResourceSnapshotParams
+from gateway.messages import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
 from gateway.modules import extras, host
 from gateway.modules.counters import CoreTimes, ProcessTimes
 from gateway.modules.host import Meter
 from gateway.modules.redact import redact
-from tests.unit.gateway.harness import Client
+from tests.unit.gateway.harness import DEADLINE_S, Client
 
 MB = 1 << 20
 
@@ -258,3 +259,32 @@ def test_kernel_and_clock_facts(tmp_path: Path) -> None:
     facts = extras.kernel(tmp_path)
     assert (facts.preempt_rt, facts.clocksource) == (True, "tsc")
     assert facts.utc_synchronised in (True, False)
+
+
+def test_nobody_waits_while_somebody_s_table_is_made(
+    connect: Callable[[], Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asker, other = connect(), connect()
+    looking, seen = threading.Event(), threading.Event()
+    look = Meter.snapshot
+
+    def slow(meter: Meter, params: ResourceSnapshotParams) -> ResourceSnapshot:
+        looking.set()
+        assert seen.wait(DEADLINE_S)
+        return look(meter, params)
+
+    monkeypatch.setattr(Meter, "snapshot", slow)
+    for method in ("resource.snapshot", "status.snapshot"):
+        asked = asker.request(method)
+        assert looking.wait(DEADLINE_S)
+        assert other.call("clock.read")
+        seen.set()
+        assert asker.answer(asked)
+        looking.clear()
+        seen.clear()
+
+
+def test_one_asker_s_looks_are_taken_one_after_the_other(client: Client) -> None:
+    asked = [client.request("resource.snapshot", processes=False) for _ in range(50)]
+    stamps = [client.answer(one)["stamp_ns"] for one in asked]
+    assert stamps == sorted(stamps)

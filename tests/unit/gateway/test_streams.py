@@ -337,5 +337,5 @@ def test_the_loop_has_no_timer_and_nothing_to_do_when_idle() -> None:
     assert (loop._patience_s() or 0) > 50
     timer.cancel()
     assert loop._patience_s() is None
-    assert len(loop._selector.get_map()) == 1
+    assert len(loop._watched) == 1
     loop.close()

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from gateway import messages, wire
 
 
-def split(data: bytes, at: list[int], limit: int = 16) -> list[bytes | wire.BadLine]:
+def split(data: bytes, at: list[int], limit: int = 16) -> list[wire.Line]:
     splitter = wire.LineSplitter(limit)
-    found: list[bytes | wire.BadLine] = []
+    found: list[wire.Line] = []
     for start, end in zip([0, *at], [*at, len(data)], strict=True):
         found += splitter.feed(data[start:end])
     return found + splitter.end()
 
 
-def plain(lines: list[bytes | wire.BadLine]) -> list[bytes | str]:
+def plain(lines: list[wire.Line]) -> list[wire.Line | str]:
     return [str(line) if isinstance(line, wire.BadLine) else line for line in lines]
 
 

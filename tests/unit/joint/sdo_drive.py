@@ -5,6 +5,7 @@ from collections.abc import Callable
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
+from tests.unit.bus.direct import Direct
 from tests.unit.joint.standard import after, statusword
 
 NO_OBJECT = 0x0602_0000
@@ -30,7 +31,7 @@ class SdoDrive:
             (0x6071, 0): (5).to_bytes(2, "little"),
         }
         self.written: list[tuple[int, int, bytes]] = []
-        self.channel = SdoChannel("left_knee", self._hear, timeout_s=0.02)
+        self.channel = SdoChannel("left_knee", Direct(self._hear), timeout_s=0.02)
 
     @property
     def axis(self) -> Axis:

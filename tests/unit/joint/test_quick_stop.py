@@ -11,6 +11,7 @@ from drivers.errors import Unavailable
 from drivers.joint.axis import Axis
 from drivers.joint.commands import CONTROLWORD, STATUSWORD, STOPPED_STATES, Controlword
 from drivers.joint.quick_stop import StopOutcome, Stopping
+from tests.unit.bus.direct import Direct
 
 TIMEOUT_S = 0.3
 
@@ -47,7 +48,7 @@ class Drive:
         self.refuses = self.mute = self.gone = False
         self.deaf_requests = 0
         self.master_enables = False  # another master sends 000Fh between any two of our requests
-        self.channel = SdoChannel("left_knee", self.hear, timeout_s=0.02)
+        self.channel = SdoChannel("left_knee", Direct(self.hear), timeout_s=0.02)
 
     def hear(self, request: bytes) -> None:
         if self.gone:

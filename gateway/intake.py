@@ -1,0 +1,277 @@
+"""Where clients' bytes come in: a thread that accepts and receives, and acts on a stop before all else.
+
+Whatever the main loop is doing, hung or busy, a stop goes from here to the drives; every other line goes to
+the loop. Reading never ends because requests wait: beyond what may wait they are refused, and stops act.
+"""
+
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from gateway import wire
+from gateway.acceptor import Acceptor
+from gateway.loop import HANGUP, READ, Loop
+from gateway.registry import StopNow
+from gateway.stop_lines import StopSplitter
+
+log = logging.getLogger(__name__)
+
+RECEIVE_BYTES = 64 * 1024
+QUEUED_LINES = 4096  # requests of one client that may wait to be handled …
+QUEUED_BYTES = 1024 * 1024  # … and their bytes; what comes beyond is refused
+ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
+PACE_S = 0.005  # how long a client that sends more than that is left alone after each read
+LAST_READS = 16  # of a connection that ends: a stop may still be in it
+
+_TOO_MANY = wire.refuse(
+    wire.Kind.UNAVAILABLE,
+    "too many requests wait; this one is not done: ask again when some have been answered",
+)
+
+# Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
+_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
+
+
+@dataclass(frozen=True, slots=True)
+class Stopping:
+    """A stop that came in: what will answer it, or `None` where nobody could act on it yet."""
+
+    request: wire.StopRequest
+    answer: Future[Any] | None
+
+
+class Heard:
+    """What one read has brought, on its way to the loop."""
+
+    __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stops")
+
+    def __init__(self) -> None:
+        self.stamp_ns = time.monotonic_ns()
+        self.stops: list[Stopping] = []
+        self.lines: list[bytes | wire.BadLine] = []
+        self.refusals: list[bytes] = []  # of what was too much, ready to be sent
+        self.ended = False  # the client will say nothing more
+        self.lost: str | None = None  # why there is nobody any more
+        self.cpu_ns = 0
+
+
+class Inlet:
+    """One client's incoming bytes, in the intake's thread; `receiver`, `done` and `close` are the loop's."""
+
+    def __init__(
+        self,
+        front: Loop,
+        loop: Loop,
+        connection: socket.socket,
+        peer: str,
+        stop_now: Callable[[], StopNow | None],
+        spent: Callable[[], int],
+        finished: "Callable[[Inlet], None]",
+    ) -> None:
+        self.socket = connection
+        self.peer = peer
+        self.who = peer  # how the journal calls it
+        self.received_bytes = self.unanswered = 0
+        self.receiver: Callable[[Heard], object] = bool  # in the loop; set before anything is heard
+        self._front = front
+        self._loop = loop
+        self._stop_now = stop_now
+        self._spent = spent
+        self._finished = finished
+        self._splitter = StopSplitter()
+        self._ended = self._closed = False
+        # Each is counted by one thread: by the intake what was handed over, by the loop what it has done.
+        self._handed = self._handed_bytes = self._done = self._done_bytes = 0
+        self._cpu_ns = 0
+        _prepare(connection)
+        front.watch(connection, READ, self._on_ready)
+
+    # In the loop's thread.
+
+    def done(self, count: int, size: int = 0) -> None:
+        """So much of what was handed over does not wait any more."""
+        self._done += count
+        self._done_bytes += size
+
+    def close(self) -> None:
+        """End the connection; a stop that has arrived already still acts."""
+        self._front.post(self.finish)
+
+    # In the intake's thread.
+
+    def finish(self) -> None:
+        """Read what is there, for the stops in it, and close; idempotent."""
+        if self._closed:
+            return
+        for _ in range(LAST_READS):
+            if self._ended or not self._receive():
+                break
+        self._closed = True
+        self._front.watch(self.socket, 0, self._on_ready)
+        self.socket.close()
+        self._finished(self)
+
+    def _on_ready(self, events: int) -> None:
+        if not self._ended:
+            self._receive()
+        elif events & HANGUP:
+            self._end("it has gone", Heard())
+
+    def _receive(self) -> bool:
+        """Read once; false where there was nothing."""
+        try:
+            data = self.socket.recv(RECEIVE_BYTES)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            self._end(str(error), self._sorted(self._splitter.end()))
+            return True
+        if not data:
+            self._end(None, self._sorted(self._splitter.end()))
+            return True
+        self.received_bytes += len(data)
+        lines = self._splitter.feed(data)
+        heard = self._sorted(lines)
+        if self._is_full or self._splitter.dropping:
+            self._front.watch(self.socket, HANGUP, self._on_ready)
+            self._front.call_later(PACE_S, self._go_on)
+        self._cpu_ns += self._spent()
+        if lines:
+            self._hand_over(heard)
+        return True
+
+    def _end(self, lost: str | None, heard: Heard) -> None:
+        """The end of what the client says, or of the client: `lost` says why."""
+        self._ended = heard.ended = True
+        heard.lost = lost
+        self._front.watch(self.socket, HANGUP if lost is None else 0, self._on_ready)
+        self._hand_over(heard)
+
+    def _go_on(self) -> None:
+        if not (self._ended or self._closed):
+            self._front.watch(self.socket, READ, self._on_ready)
+
+    def _hand_over(self, heard: Heard) -> None:
+        heard.cpu_ns, self._cpu_ns = self._cpu_ns, 0
+        self._loop.post(lambda: self.receiver(heard))
+
+    # What becomes of the lines
+
+    @property
+    def _is_full(self) -> bool:
+        lines, size = self._handed - self._done, self._handed_bytes - self._done_bytes
+        return lines >= QUEUED_LINES or size >= QUEUED_BYTES
+
+    @property
+    def _has_room(self) -> bool:
+        """Whether the loop keeps up, so that it can be given what is no request."""
+        return self._handed - self._done < QUEUED_LINES + ON_THE_WAY
+
+    def _sorted(self, lines: list[wire.Line]) -> Heard:
+        heard = Heard()
+        for line in lines:
+            if isinstance(line, wire.StopRequest):
+                answer = self._stop(line)
+                if self._has_room:
+                    heard.stops.append(Stopping(line, answer))
+                    self._handed += 1
+                else:  # it acts; only its answer is lost
+                    self.unanswered += 1
+            elif not self._is_full:
+                heard.lines.append(line)
+                self._handed += 1
+                self._handed_bytes += wire.size(line)
+            elif self._has_room:
+                heard.refusals.append(wire.encode_refusal(line, _TOO_MANY))
+                self._handed += 1
+            else:
+                self.unanswered += 1
+        return heard
+
+    def _stop(self, request: wire.StopRequest) -> Future[Any] | None:
+        """Act at once, where somebody can."""
+        stop_now = self._stop_now()
+        if stop_now is None:
+            return None
+        try:
+            return stop_now(self.who, request.reason)
+        except Exception:  # whatever it is, the loop tries the long way
+            log.exception("a stop could not be carried out at once")
+            return None
+
+
+class Intake:
+    """The thread, and the listening socket. `opened` is called in the loop with each client that comes."""
+
+    def __init__(
+        self,
+        loop: Loop,
+        listener: socket.socket,
+        opened: Callable[[Inlet], None],
+        stop_now: Callable[[], StopNow | None],
+    ) -> None:
+        """`stop_now` gives what carries out a stop at once, from any thread, where there is something."""
+        self._loop = loop
+        self._front = Loop()
+        self._opened = opened
+        self._stop_now = stop_now
+        self._inlets: set[Inlet] = set()
+        self._spent_ns = 0
+        self._acceptor = Acceptor(self._front, listener, self._accepted)
+        self._thread = threading.Thread(target=self._front.run, name="intake")
+
+    def start(self) -> None:
+        """Begin to accept."""
+        self._acceptor.start()
+        self._thread.start()
+
+    def listen(self, *, on: bool, then: Callable[[], object] = lambda: None) -> None:
+        """Accept, or accept nobody more; `then` runs in the loop once everybody accepted so far is there."""
+
+        def change() -> None:
+            (self._acceptor.start if on else self._acceptor.end)()
+            self._loop.post(then)
+
+        self._front.post(change)
+
+    def end(self) -> None:
+        """Close every connection, and join the thread; the listening socket stays open."""
+        self._front.post(self._finish)
+        self._thread.join()
+        self._front.close()
+
+    def _finish(self) -> None:
+        self._acceptor.end()
+        for inlet in tuple(self._inlets):
+            inlet.finish()
+        self._front.stop()
+
+    def _spent(self) -> int:
+        """What the thread has worked since the last call: for the client it has worked for, in ns."""
+        before_ns, self._spent_ns = self._spent_ns, time.thread_time_ns()
+        return self._spent_ns - before_ns
+
+    def _accepted(self, connection: socket.socket, address: Any) -> None:
+        peer = f"{address[0]}:{address[1]}"
+        finished = self._inlets.discard
+        inlet = Inlet(self._front, self._loop, connection, peer, self._stop_now, self._spent, finished)
+        self._inlets.add(inlet)
+        self._loop.post(lambda: self._opened(inlet))
+
+
+def _prepare(connection: socket.socket) -> None:
+    connection.setblocking(False)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    # What waits in the kernel is old when it arrives: keep it short.
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 256 * 1024)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 128 * 1024)
+    for name, value in _KEEPALIVE.items():
+        option = getattr(socket, name, None)  # not every system has every one
+        if option is not None:
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)

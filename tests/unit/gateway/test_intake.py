@@ -1,0 +1,402 @@
+"""The intake: stops act past the loop, whatever it does and however much waits; no bytes are another's."""
+
+import contextlib
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from gateway import intake, wire
+from gateway.daemon import Daemon
+from gateway.intake import Heard, Inlet
+from gateway.listeners import listen
+from gateway.loop import Loop
+from gateway.messages import Stopped
+from gateway.registry import Context, Spec
+from gateway.session import Session
+from tests.unit.gateway import processes
+from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config, until
+
+STOP = b'{"jsonrpc":"2.0","id":"stop","method":"robot.stop","params":{"reason":"%s"}}\n'
+CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
+RESET = struct.pack("ii", 1, 0)  # SO_LINGER: closing resets the connection
+
+
+class Stops:
+    """A module that stops what there is, and tells; it stands in the place of `control`."""
+
+    def __init__(self, context: Context) -> None:
+        self.handlers = {"robot.stop": lambda session, params: self._late(session, params)}
+        self.asked: list[tuple[str, str]] = []
+        self.late: list[tuple[str, str]] = []  # what came by the loop
+        self.answer: Future[Stopped] = Future()
+        self.broken = False
+        self._context = context
+        self.answer.set_result(Stopped({}, held=True))
+
+    def start(self) -> None:
+        self._context.stops_by(self._stop)
+
+    def stop(self) -> None:
+        self._context.stops_by(None)
+
+    def describe(self) -> Any:
+        return self.answer
+
+    def _stop(self, who: str, reason: str) -> "Future[Stopped]":
+        if self.broken:
+            raise RuntimeError("nothing works")
+        self.asked.append((who, reason))
+        return self.answer
+
+    def _late(self, session: Any, params: Any) -> "Future[Stopped]":
+        self.late.append((session.who, params.reason))
+        return self.answer
+
+
+class Serving:
+    """A daemon whose loop a test can hold."""
+
+    def __init__(self, daemon: Daemon, stops: Stops) -> None:
+        self.daemon = daemon
+        self.stops = stops
+        self._clients = contextlib.ExitStack()
+
+    def connect(self) -> Client:
+        return self._clients.enter_context(Client(self.daemon.address))
+
+    def close(self) -> None:
+        self._clients.close()
+
+    @contextlib.contextmanager
+    def hung(self) -> Iterator[None]:
+        """While inside, the loop is in a callback that does not return."""
+        there, over = threading.Event(), threading.Event()
+
+        def hang() -> None:
+            there.set()
+            over.wait(DEADLINE_S)
+
+        self.daemon._loop.post(hang)
+        assert there.wait(DEADLINE_S)
+        try:
+            yield
+        finally:
+            over.set()
+
+    def session_of(self, client: Client) -> Session:
+        port = client.socket.getsockname()[1]
+        return next(one for one in self.daemon._places.taken if one.peer.endswith(f":{port}"))
+
+    def wait_for_stop(self, reason: str) -> tuple[str, str]:
+        until(lambda: any(one[1] == reason for one in self.stops.asked), f"the stop {reason!r} acts")
+        return next(one for one in self.stops.asked if one[1] == reason)
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Serving]:
+    specs = {"control": Spec("tests.unit.gateway.test_intake:Stops")}
+    robot = config(tmp_path, HEAD.replace("0.05", "1000"))
+    daemon = Daemon(robot, listen("127.0.0.1", 0), specs)
+    thread = threading.Thread(target=daemon.run, name="daemon")
+    thread.start()
+    with Client(daemon.address) as first:
+        first.call("robot.stop", reason="cold")  # by the loop: the module comes up with it
+    stops = cast("Stops", daemon._service.registry.running("control"))
+    assert stops.late == [(stops.late[0][0], "cold")]
+    made = Serving(daemon, stops)
+    yield made
+    made.close()
+    daemon.end()
+    thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+    assert stops._context.stops_by is not None
+    assert daemon._service.registry.stop_now is None
+
+
+# A loop that stands still
+
+
+def test_a_stop_acts_while_the_loop_hangs_and_is_answered_afterwards(serving: Serving) -> None:
+    client = serving.connect()
+    client.call("hello", client="test")
+    with serving.hung():
+        client.send(CLOCK % 1 + STOP % b"now")
+        who, _ = serving.wait_for_stop("now")
+        assert who == f"test (127.0.0.1:{client.socket.getsockname()[1]})"
+    assert client.answer("stop")["held"] is True
+    assert client.answer(1)
+
+
+def test_who_comes_while_the_loop_hangs_can_stop_too(serving: Serving) -> None:
+    with serving.hung():
+        late = serving.connect()
+        late.send(STOP % b"from nobody yet")
+        who, _ = serving.wait_for_stop("from nobody yet")
+        assert who.startswith("127.0.0.1:")
+    assert late.answer("stop")["held"] is True
+
+
+def test_a_stop_that_fails_at_once_is_tried_by_the_loop(serving: Serving) -> None:
+    client = serving.connect()
+    serving.stops.broken = True
+    assert client.call("robot.stop", reason="again")["held"] is True
+    assert serving.stops.late[-1][1] == "again"
+    assert serving.stops.asked == []
+
+
+def test_a_stop_of_who_has_gone_before_anybody_could_act_is_done_all_the_same(serving: Serving) -> None:
+    client = serving.connect()
+    client.call("hello", client="test")
+    serving.stops.broken = True
+    with serving.hung():
+        client.send(STOP % b"last")
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+        client.close()
+    until(lambda: serving.stops.late[-1][1] == "last", "it is done")
+
+
+# However it is written
+
+
+@pytest.mark.parametrize("by_the_loop", [False, True])
+@pytest.mark.parametrize(
+    ("line", "id_"),
+    [
+        (b'{"method":"robot.stop"}\n', None),
+        (b'{"jsonrpc":"2.0","id":1.5,"method":"robot.stop","params":[1,2]}\n', 1.5),
+        (b'{"jsonrpc":"2.0","id":{},"method":"robot.stop","more":1}\n', None),
+        (b'[{"jsonrpc":"2.0","id":3,"method":"robot.stop"}]\n', 3),
+        (b'{"jsonrpc":"2.0","id":3,"method":"robot.stop","params":{"reason":"\xe9\x01"}}\n', 3),
+        (b'{"id":"a","method":"robot.stop","params":{"reason":"' + b"x" * 70_000 + b'"}}\n', "a"),
+        (b'{"id":4,"method":"robot.stop"', 4),
+    ],
+)
+def test_a_stop_is_never_refused_for_its_form(
+    serving: Serving, line: bytes, id_: Any, by_the_loop: bool
+) -> None:
+    serving.stops.broken = by_the_loop
+    client = serving.connect()
+    client.send(line)
+    client.socket.shutdown(socket.SHUT_WR)
+    message = client.line()
+    assert message is not None
+    assert (message["id"], message["result"]["held"]) == (id_, True)
+    assert client.line() is None
+    assert len(serving.stops.asked) + len(serving.stops.late) == 2
+
+
+def test_a_stop_in_the_parameters_of_something_else_is_none(serving: Serving) -> None:
+    client = serving.connect()
+    client.send(b'{"jsonrpc":"2.0","id":1,"method":"hello","params":{"client":"x","method":"robot.stop"}}\n')
+    message = client.line()
+    assert message is not None
+    assert "unknown field" in message["error"]["message"]
+    assert serving.stops.asked == []
+
+
+def test_a_stop_without_an_id_acts_and_is_not_answered(serving: Serving) -> None:
+    client = serving.connect()
+    client.send(b'{"jsonrpc":"2.0","method":"robot.stop","params":{"reason":"told"}}\n' + CLOCK % 1)
+    serving.wait_for_stop("told")
+    message = client.line()
+    assert message is not None
+    assert message["id"] == 1
+
+
+# However much waits
+
+
+def test_a_thousand_requests_at_once_are_answered_in_order(serving: Serving) -> None:
+    client = serving.connect()
+    client.send(b"".join(CLOCK % number for number in range(1000)))
+    assert [(client.line() or {})["id"] for _ in range(1000)] == list(range(1000))
+
+
+def test_a_stop_behind_more_than_may_wait_acts_and_what_is_too_much_is_refused(serving: Serving) -> None:
+    client = serving.connect()
+    most, more = intake.QUEUED_LINES, 500
+    with serving.hung():
+        client.send(b"".join(CLOCK % number for number in range(most + more)) + STOP % b"behind")
+        serving.wait_for_stop("behind")
+    answers = {}
+    for _ in range(most + more + 1):
+        message = client.line()
+        assert message is not None
+        answers[message["id"]] = message
+    assert "result" in answers["stop"]
+    served = [number for number in range(most + more) if "result" in answers[number]]
+    assert served == list(range(most))
+    assert {answers[number]["error"]["data"]["kind"] for number in range(most, most + more)} == {
+        "unavailable"
+    }
+
+
+def test_who_sends_without_end_and_takes_nothing_is_bounded_and_can_still_stop(serving: Serving) -> None:
+    flood, other = serving.connect(), serving.connect()
+    flood.call("clock.read")
+    lines = CLOCK % 1 * 20_000
+
+    def too_much() -> bool:
+        flood.send(lines)
+        session = serving.session_of(flood)
+        assert sum(map(wire.size, session._queue)) <= intake.QUEUED_BYTES
+        assert len(session._queue) <= intake.QUEUED_LINES
+        assert session.waiting_bytes < 3 * 1024 * 1024
+        return session._unanswered + session._inlet.unanswered > 0
+
+    until(too_much, "more is sent than is answered")
+    assert other.call("clock.read")
+    flood.send(STOP % b"behind all that")
+    serving.wait_for_stop("behind all that")
+
+
+def test_what_waits_for_a_loop_that_hangs_is_bounded_too(serving: Serving) -> None:
+    client = serving.connect()
+    client.call("clock.read")
+    with serving.hung():
+        client.send((CLOCK % 1 + STOP % b"many") * (intake.QUEUED_LINES + intake.ON_THE_WAY))
+        client.send(STOP % b"last")
+        serving.wait_for_stop("last")
+        inlet = serving.session_of(client)._inlet
+        assert inlet._handed - inlet._done <= intake.QUEUED_LINES + intake.ON_THE_WAY
+        assert inlet.unanswered > 0
+    assert client.answer("stop")["held"] is True
+
+
+# Connections that come and go
+
+
+def test_nobody_ever_gets_another_s_answer_however_connections_end(serving: Serving) -> None:
+    wrong: list[object] = []
+
+    def come_and_go(base: int) -> None:
+        for number in range(base, base + 60):
+            with Client(serving.daemon.address) as client:
+                client.send(CLOCK % number)
+                if number % 3 == 0:
+                    client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+                elif number % 3 == 1:
+                    client.socket.shutdown(socket.SHUT_WR)
+                    wrong.extend(one for one in iter(client.line, None) if one["id"] != number)
+                else:
+                    message = client.line()
+                    wrong.extend([message] if message is None or message["id"] != number else [])
+
+    threads = [threading.Thread(target=come_and_go, args=(base,)) for base in range(1000, 7000, 1000)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(DEADLINE_S)
+    assert wrong == []
+    until(lambda: not serving.daemon._places.taken, "all have gone")
+    until(lambda: not serving.daemon._intake._inlets, "their sockets are closed")
+    assert serving.connect().call("clock.read")
+
+
+@pytest.fixture
+def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
+    with listen("127.0.0.1", 0) as listener, socket.create_connection(listener.getsockname()) as client:
+        accepted, _ = listener.accept()
+        with accepted:
+            yield client, accepted
+
+
+def inlet_of(connection: socket.socket, asked: list[str]) -> tuple[Inlet, Loop, Loop]:
+    """An inlet whose two loops a test turns by hand."""
+    front, loop = Loop(), Loop()
+    answer: Future[Any] = Future()
+
+    def stop_now(_who: str, reason: str) -> "Future[Any]":
+        asked.append(reason)
+        return answer
+
+    return Inlet(front, loop, connection, "x", lambda: stop_now, lambda: 0, lambda _inlet: None), front, loop
+
+
+def test_a_stop_that_has_arrived_acts_though_the_loop_has_closed_its_client(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    client, accepted = pair
+    asked: list[str] = []
+    inlet, front, loop = inlet_of(accepted, asked)
+    client.sendall(CLOCK % 1 * 2000 + STOP % b"unread")
+    inlet.finish()
+    assert asked == ["unread"]
+    assert accepted.fileno() == -1
+    assert len(front._watched) == 1
+    inlet.finish()
+    for one in (front, loop):
+        one.close()
+
+
+def test_what_ends_with_a_client_ends_though_something_else_cannot(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    """What came last goes first: a lease is given back before the module that knows it stops."""
+    inlet, front, loop = inlet_of(pair[1], [])
+    ended: list[str] = []
+    session = Session(loop, inlet, lambda _session, _request: None, 30.0)
+    session.on_close(lambda: ended.append("module"))
+    session.on_close(lambda: ended.remove("nothing"))
+    session.on_close(lambda: ended.append("lease"))
+    session.close()
+    session.close()
+    assert ended == ["lease", "module"]
+    inlet.finish()
+    for one in (front, loop):
+        one.close()
+
+
+def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    client, accepted = pair
+    asked: list[str] = []
+    inlet, front, loop = inlet_of(accepted, asked)
+    heard: list[Heard] = []
+    inlet.receiver = heard.append
+    client.setblocking(False)
+    rest = CLOCK % 1 * 2 * intake.QUEUED_LINES + STOP % b"paced"
+
+    def paced() -> bool:
+        nonlocal rest
+        with contextlib.suppress(BlockingIOError):
+            rest = rest[client.send(rest) :] if rest else rest
+        front._turn()
+        return bool(asked)
+
+    front.call_later(DEADLINE_S, lambda: None)
+    until(paced, "the stop is read")
+    while (patience_s := loop._patience_s()) == 0.0:
+        loop._turn()
+    assert patience_s is None
+    assert sum(len(one.lines) for one in heard) == intake.QUEUED_LINES
+    assert sum(len(one.refusals) for one in heard) == intake.ON_THE_WAY
+    inlet.done(
+        intake.QUEUED_LINES + intake.ON_THE_WAY, sum(wire.size(line) for one in heard for line in one.lines)
+    )
+    assert not inlet._is_full
+    inlet.finish()
+    for one in (front, loop):
+        one.close()
+
+
+def test_a_client_that_says_nothing_wakes_nobody(tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(processes.RESTS_SOON, encoding="utf-8")
+    with (
+        processes.process(*processes.GATEWAY, str(file)) as running,
+        Client(processes.address(running)) as client,
+    ):
+        client.call("clock.read")
+        slept = threading.Event()
+        slept.wait(0.3)  # what it does at once is over
+        before = processes.kernel_saw(running.pid)
+        slept.wait(1.0)
+        assert processes.kernel_saw(running.pid) == before

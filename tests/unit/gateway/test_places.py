@@ -1,0 +1,112 @@
+"""Who may be connected: a stop always finds a place, and those who say nothing make room."""
+
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from gateway import places, session
+from tests.unit.gateway.harness import Bench, Client, config, serving, until
+
+Connect = Callable[[], Client]
+
+
+@pytest.fixture
+def connect(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Connect]:
+    """Of a gateway with two places, and two more for who only stops."""
+    monkeypatch.setattr(places, "CLIENTS", 2)
+    monkeypatch.setattr(places, "STOPPERS", 2)
+    with serving(config(tmp_path)) as address, ExitStack() as clients:
+        yield lambda: clients.enter_context(Client(address))
+
+
+@pytest.fixture
+def full(connect: Connect) -> list[Client]:
+    """All places taken, by clients that have spoken."""
+    clients = [connect(), connect()]
+    for client in clients:
+        assert client.call("clock.read")
+    return clients
+
+
+def test_beyond_the_last_place_a_stop_acts_and_is_answered(connect: Connect, full: list[Client]) -> None:
+    late = connect()
+    assert late.call("robot.stop", reason="late")["drives"]["left_knee"] == "confirmed"
+    assert late.call("robot.stop", reason="again")["held"]
+
+
+def test_beyond_the_last_place_all_else_is_refused_and_ends_the_connection(
+    connect: Connect, full: list[Client]
+) -> None:
+    late = connect()
+    error = late.refused("clock.read")
+    assert error.kind == "unavailable"
+    assert "this connection takes robot.stop only" in str(error)
+    assert late.line() is None
+    full[0].close()
+    until(lambda: _is_served(connect), "a place is free again")
+
+
+def _is_served(connect: Connect) -> bool:
+    client = connect()
+    client.request("clock.read")
+    message = client.line()
+    return message is not None and "result" in message
+
+
+def test_who_may_only_stop_and_says_nothing_is_not_kept(
+    connect: Connect, full: list[Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "SILENCE_S", 0.1)
+    assert connect().line() is None
+
+
+def test_the_longest_silent_of_those_who_may_only_stop_makes_room(
+    connect: Connect, full: list[Client]
+) -> None:
+    silent = connect()
+    for _ in range(4):
+        late = connect()
+        assert late.call("robot.stop", reason="late")["held"]
+    message = silent.line()
+    assert message is not None
+    assert "others come" in message["error"]["message"]
+    assert silent.line() is None
+
+
+def test_who_has_never_said_anything_makes_room_for_who_comes(
+    connect: Connect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "SILENT_S", 0.0)
+    silent, talking = connect(), connect()
+    assert talking.call("clock.read")
+    assert connect().call("clock.read")
+    message = silent.line()
+    assert message is not None
+    assert "has said nothing" in message["error"]["message"]
+    assert silent.line() is None
+    assert talking.call("clock.read")
+
+
+def test_who_has_only_just_come_keeps_its_place(connect: Connect) -> None:
+    first, second, third = connect(), connect(), connect()
+    assert third.refused("clock.read").kind == "unavailable"
+    assert first.call("clock.read")
+    assert second.call("clock.read")
+
+
+def test_neither_silent_nor_killed_connections_keep_a_stop_out(bench: Bench, tmp_path: Path) -> None:
+    """As many of each as there are places, at a gateway as it is."""
+    with serving(config(tmp_path)) as address, ExitStack() as clients:
+        killed = [clients.enter_context(Client(address)) for _ in range(places.CLIENTS)]
+        for client in killed:
+            client.call("stream.start", modules=["component"], rate_hz=0)
+        silent = [clients.enter_context(Client(address)) for _ in range(places.CLIENTS)]
+        assert clients.enter_context(Client(address)).call("robot.stop", reason="all taken")["held"]
+        for client in killed:
+            client.socket.shutdown(socket.SHUT_WR)
+        assert all(all("method" in one for one in iter(client.line, None)) for client in killed)
+        silent += [clients.enter_context(Client(address)) for _ in range(places.CLIENTS)]
+        assert clients.enter_context(Client(address)).call("robot.stop", reason="silent ones")["held"]
