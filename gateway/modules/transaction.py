@@ -107,6 +107,7 @@ class Transaction:
             self._check_leave(change)
         self._before = self._current()
         for change in self._changes:
+            self._check_leave(change)  # reading may have shown that two devices answer
             self._rules.check_value(change.parameter, self._before[change.name], change.data)
             self._check_way_back(change)
         rules = {(one.parameter.component, allowed_states(one.parameter)): one for one in self._changes}

@@ -79,6 +79,11 @@ class TrialJobs:
         self._undos.leave(write, found.left)
         return found
 
+    def concerned(self) -> bool:
+        """Whether there is anything to claim. From any thread."""
+        changes = (change for undo in self._undos.all() for change in undo.changes)
+        return any(change.address in self._authority.locked for change in changes)
+
     def claim(self) -> list[int]:
         """What stops a controller is never taken back: a stop has set it. Returns the writes concerned."""
         claimed = {}

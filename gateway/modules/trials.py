@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from gateway.futures import back, outcome, then
+from gateway.futures import back, done, outcome, then
 from gateway.loop import Loop, Timer
 from gateway.messages import Confirmed, Reverted, TrialInfo
 from gateway.modules.taking_back import TakenBack
@@ -158,6 +158,8 @@ class Trials:
 
     def claim(self) -> "Future[None]":
         """A stop has set what stops the controllers: nothing of that is taken back. From any thread."""
+        if not self._jobs.concerned():
+            return done(None)
         claimed = self._writer.submit(self._jobs.claim, Turn.CLAIM)
         return then(claimed, lambda writes: self._loop.post(lambda: self._claimed(writes)))
 

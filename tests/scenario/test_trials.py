@@ -147,14 +147,27 @@ def test_a_node_lost_in_mid_roll_back_is_taken_back_when_it_returns(
 THREE = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")}
 
 
-def test_doubled_sdo_answers_change_nothing(robot: SimulatedRobot, writer: Client) -> None:
-    for joint in ("left_hip", "left_knee", "left_ankle"):
-        ask(robot.folder.path, {"fault": "sdo_duplicate", "on": joint})
-    for torque in (60.0, 61.0, 62.0, 63.0):
-        changes = dict.fromkeys(THREE, torque)
-        assert writer.call("parameter.write", changes=changes)["after"] == changes
-        values = writer.call("parameter.read", names=list(THREE))["values"]
-        assert {name: one["value"] for name, one in values.items()} == changes
+def test_a_joint_whose_sdo_answers_are_doubled_is_not_written_to(
+    robot: SimulatedRobot, writer: Client
+) -> None:
+    """Two devices may answer, and both would take it. The others can be written."""
+    before = read(writer)
+    ask(robot.folder.path, {"fault": "sdo_duplicate", "on": "left_knee"})
+    until(lambda: "two devices" in _findings(writer, "left_knee"), "it is seen")
+    error = writer.refused("parameter.write", changes=THREE)
+    assert (error.kind, error.data["component"]) == ("not_allowed", "left_knee")
+    assert read(writer) == before
+    others = {name: value for name, value in THREE.items() if "knee" not in name}
+    assert writer.call("parameter.write", changes=others)["after"] == others
+    ask(robot.folder.path, {"clear": "all"})
+    until(lambda: "two devices" not in _findings(writer, "left_knee"), "it is well again")
+    assert writer.call("parameter.write", changes=THREE)["after"] == THREE
+
+
+def _findings(client: Client, component: str) -> str:
+    """What is said of it, after it was read once more."""
+    read(client)
+    return str(client.call("component.snapshot")["quality"][component]["problem"])
 
 
 @pytest.mark.parametrize(

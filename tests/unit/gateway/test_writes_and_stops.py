@@ -109,6 +109,16 @@ def test_a_stop_claims_no_more_of_a_trial_than_it_sets(controlled: Tuned, bench:
     assert held(bench, STEP) == 420
 
 
+def test_a_stop_with_nothing_to_claim_waits_for_no_write(controlled: Tuned, bench: Bench) -> None:
+    gate = Gate(bench.gait.node, CYCLE[2])
+    write = controlled.ask(controlled.writing({CYCLE_TIME: 1.1}))
+    gate.wait()
+    controlled.stop()
+    assert controlled.tuning.claim().done()
+    gate.open()
+    write.exception(DEADLINE_S)
+
+
 def test_a_stop_that_comes_as_the_way_back_is_sent_wins(controlled: Tuned, bench: Bench) -> None:
     write = controlled.write({STEP_LENGTH: 0.42}, LONG_S)
     download = bench.gait.node.download
