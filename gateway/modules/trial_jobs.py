@@ -36,14 +36,14 @@ class TrialJobs:
         self._let_pass = partial(writer.let_pass, Turn.TRIAL)
 
     def confirm(self, write: int) -> dict[str, float] | None:
-        """Keep what the devices still hold; `None` where it is on trial no longer.
+        """Keep what the devices still hold; `None` where nothing of it is left.
 
         Raises:
             RpcError: it stays on trial.
 
         """
         undo = self._undos.get(write)
-        if undo is None or not undo.trial:
+        if undo is None:
             return None
         for change in undo.changes:
             self._check_held(change)

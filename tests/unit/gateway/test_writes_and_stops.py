@@ -66,6 +66,23 @@ def test_a_node_that_is_not_trusted_is_not_written_to(robot: Tuned, bench: Bench
     until(lambda: held(bench, CYCLE) == 1200, "taken back")
 
 
+def test_a_node_that_reading_shows_not_to_be_trusted_is_not_written_to(robot: Tuned, bench: Bench) -> None:
+    def find_two(_index: int) -> None:
+        bench.gait.node.distrust = "two devices answer as node 16"
+
+    bench.gait.node.before_upload = find_two
+    assert robot.refused(robot.writing({STEP_LENGTH: 0.42})).kind == "not_allowed"
+    assert robot.told("write") == []  # it was not even begun
+
+
+def test_a_node_that_has_not_come_up_is_not_written_to(robot: Tuned, bench: Bench) -> None:
+    bench.gait.node.ready = False
+    bench.gait.lost = "no frame of node 16"
+    error = robot.refused(robot.writing({STEP_LENGTH: 0.42}))
+    assert (error.kind, str(error)) == ("unavailable", "gait.step_length: no frame of node 16")
+    assert bench.gait.node.log == []
+
+
 def test_what_stops_a_controller_is_not_written_while_a_stop_is_held(controlled: Tuned, bench: Bench) -> None:
     controlled.stop()
     error = controlled.refused(controlled.writing({STEP_LENGTH: 0.42}))
