@@ -62,9 +62,12 @@ class ControlModule:
     def start(self) -> None:
         self._records = Records(self._context.config.records)
         config, loop = self._context.config, self._context.loop
-        self._tuning = Tuning(config, self._component, loop, self._records, self._trials_changed)
-        left = self._tuning.load()
         self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
+        self._tuning = Tuning(
+            config, self._component, loop, self._records, self._stop.authority, self._trials_changed
+        )
+        self._stop.claim = self._tuning.claim
+        left = self._tuning.load()
         self._stop.start()
         loop.post(lambda: self._tuning.resume(left))
         self._context.stops_by(self.stop_robot)
@@ -121,14 +124,7 @@ class ControlModule:
 
     def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Future[messages.Written]":
         self._leases.require(session)
-        written = self._tuning.write(params.changes, session, params.trial_s)
-        return then(written, lambda answer: self._still_held(session, answer))
-
-    def _still_held(self, session: "Session", written: messages.Written) -> messages.Written:
-        """A lease that ended while its trial was being written did not take it back."""
-        if written.trial_s is not None and not self._leases.held_by(session):
-            self._tuning.trials.revert_of(session, "the lease ended while it was written")
-        return written
+        return self._tuning.write(params.changes, session, params.trial_s)
 
     def _confirm(
         self, session: "Session", params: messages.WriteNumberParams
@@ -142,7 +138,7 @@ class ControlModule:
 
     def _store(self, command: Command, session: "Session", component: str) -> "Future[messages.Stored]":
         self._leases.require(session)
-        return self._tuning.storage.run(command, session.who, component)
+        return self._tuning.store(command, session.who, component)
 
     @property
     def drives(self) -> Mapping[str, Drive]:
@@ -160,14 +156,11 @@ class ControlModule:
 
     def stop_robot(self, who: str, reason: str) -> "Future[messages.Stopped]":
         """Quick stop on every drive, held until it is reset. From any thread."""
-        stopped = self._stop.stop(who, reason)
-        self._tuning.interrupt()
-        return stopped
+        return self._stop.stop(who, reason)
 
     def trip(self, who: str, reason: str) -> None:
         """The same for the guard, whose stop leaves one that is held already as it is. From any thread."""
         self._stop.trip(who, reason)
-        self._tuning.interrupt()
 
     def _reset(self, session: "Session") -> "Future[messages.Reset]":
         self._leases.require(session)

@@ -1,123 +1,144 @@
 """What is kept of one write beyond the process: its entry in the undo file, and what the journal says of it.
 
-Both are durable before the first download and before the answer. Runs in the control module's writer thread.
+The entry is durable first, and its end is told before it goes: whatever the journal says was begun has its
+end there, also where the gateway was killed in between; then the next one tells it. Both are durable before
+the first download and before the answer. Runs in the writer's thread.
 """
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 
 import msgspec
 
-from gateway.modules.transaction import Change
-from gateway.records.journal import Journal
-from gateway.records.undo import Undo, UndoChange, UndoFile
+from gateway.modules.objects import Change
+from gateway.modules.parameters import Parameter
+from gateway.modules.stop.authority import Address
+from gateway.records.records import Records
+from gateway.records.undo import Undo, UndoChange
 from gateway.wire import Kind, RpcError, refuse
 
 log = logging.getLogger(__name__)
 
-Place = Callable[[str], tuple[str, int]]  # component → bus, node id
-
-
-@dataclass(frozen=True, slots=True)
-class Keeping:
-    """Where all writes of a robot are kept."""
-
-    undo: UndoFile
-    journal: Journal
-    place: Place
-    unusable: str | None = None  # why nothing can be kept
-
 
 class WriteLedger:
-    """One write's. `kept` is what stays to be taken back: a trial, or what a failed roll-back has left."""
+    """One write's; on trial where `trial_s` is given."""
 
     def __init__(
-        self, keeping: Keeping, number: int, who: str, changes: list[Change], trial_s: float | None
+        self,
+        records: Records,
+        address: Callable[[Parameter], Address],
+        number: int,
+        who: str,
+        trial_s: float | None,
     ) -> None:
         self.number = number
         self.trial_s = trial_s
-        self.kept: Undo | None = None
         self.problem: str | None = None  # why it could not be rolled back
-        self.replaced: tuple[Undo, ...] = ()  # trials that this one takes over
-        self._keeping = keeping
+        self.changes: tuple[UndoChange, ...] = ()  # what is to be taken back where it fails
+        self.taken_over: tuple[int, ...] = ()  # trials
+        self.undos = records.undo
+        self._journal = records.journal
+        self._address = address
         self._who = who
-        self._changes = changes
-        self._undo: Undo | None = None
 
-    def begin(self, before: Mapping[str, bytes]) -> None:
-        undo = self._undo = Undo(
-            self.number,
-            self._who,
-            time.time_ns(),
-            self.trial_s is not None,
-            tuple(self._entry(change, before[change.parameter.name]) for change in self._changes),
-        )
-        self.replaced = tuple(self._overlapping())
-        with self._or_refuse("nothing was written"):
-            self._say("write", before=undo.before(), after=undo.values(), trial_s=self.trial_s)
-            self._keeping.undo.change(put=[undo])
+    @property
+    def kept(self) -> Undo | None:
+        """What is in the undo file: on trial, or what a failed roll-back has left."""
+        return self.undos.get(self.number)
 
-    def done(self) -> None:
-        undo = self._undo
-        if undo is None:
-            raise RuntimeError("begin() comes before done()")
-        trial = self.trial_s is not None
-        with self._or_refuse("this write is taken back"):
-            self._say("trial begun" if trial else "write done", after=undo.values())
-            if not trial:
-                self._keeping.undo.change(drop=[self.number])
-                return
-            self.kept = _merged(undo, self.replaced)
-            self._keeping.undo.change(put=[self.kept], drop=[one.write for one in self.replaced])
+    def replaced(self, changes: Sequence[Change]) -> tuple[Undo, ...]:
+        """The trials on the same parameters, which only another trial takes over.
 
-    def taken_back(self, error: RpcError) -> None:
-        self.kept = None
-        with suppress(OSError):  # it was logged; a write that is found again will be found unchanged
-            self._keeping.undo.change(drop=[self.number])
-            self._say("write taken back", result=str(error), outcome=error.data.outcome)
+        Raises:
+            RpcError: trial_pending; it is none, or they are being taken back.
 
-    def left(self, error: RpcError) -> None:
-        self.kept = None if self._undo is None else msgspec.structs.replace(self._undo, trial=False)
-        self.problem = str(error)
-        log.critical("A ROLL-BACK FAILED: %s", error)
-        with suppress(OSError):  # it was logged
-            if self.kept is not None:
-                self._keeping.undo.change(put=[self.kept])
-            self._say("ROLL-BACK FAILED", result=str(error), outcome=error.data.outcome)
-
-    def refused(self, error: RpcError) -> None:
-        """Nothing was sent; nobody waits for the journal."""
-        what = {change.parameter.name: change.parameter.decode(change.data) for change in self._changes}
-        self._keeping.journal.append(self._who, "write refused", after=what, result=str(error))
-
-    def _say(self, what: str, **details: object) -> None:
-        self._keeping.journal.append(self._who, what, write=self.number, **details).result()
-
-    def _overlapping(self) -> Iterator[Undo]:
-        """Trials on the same parameters; only another trial may take them over."""
-        names = {change.parameter.name: change.parameter for change in self._changes}
-        for other in self._keeping.undo.all():
+        """
+        names = {change.name: change.parameter for change in changes}
+        found = []
+        for other in self.undos.all():
             shared = [names[name] for name in other.values() if name in names]
-            if shared and not other.trial:
+            if not shared or other.write == self.number:
+                continue
+            if not other.trial:
                 text = f"write {other.write} of {other.who} is still being taken back; wait for that"
                 raise shared[0].refusal(Kind.TRIAL_PENDING, text)
-            if shared and self.trial_s is None:
+            if self.trial_s is None:
                 text = f"it is on trial (write {other.write} of {other.who}); confirm or revert that first"
                 raise shared[0].refusal(Kind.TRIAL_PENDING, text)
-            if shared:
-                yield other
+            found.append(other)
+        return tuple(found)
+
+    def goal(self, change: Change, before: bytes) -> bytes | None:
+        """What the end of this trial would take a parameter back to."""
+        if self.trial_s is None:
+            return None
+        trials = self.replaced([change])
+        goals = {one.parameter: one.before for other in trials for one in other.changes}
+        return bytes.fromhex(goals.get(change.name, before.hex()))
+
+    def begin(self, changes: Sequence[Change], before: Mapping[str, bytes]) -> None:
+        """Before the first download; raises `RpcError` where it cannot be kept, and nothing is written."""
+        self.changes = tuple(self._entry(change, before[change.name]) for change in changes)
+        undo = Undo(self.number, self._who, time.time_ns(), self.trial_s is not None, self.changes)
+        with self._or_refuse("nothing was written"):
+            self.undos.change(put=[undo])
+            self._say("write", before=undo.before(), after=undo.values(), trial_s=self.trial_s)
+
+    def refused(self, changes: Sequence[Change], error: RpcError) -> None:
+        """Nothing was sent; nobody waits for the journal."""
+        self.undos.leave(self.number, ())
+        what = {change.name: change.parameter.decode(change.data) for change in changes}
+        self._journal.append(self._who, "write refused", after=what, result=str(error))
+
+    def made(self, name: str, data: bytes) -> None:
+        """The device has made something else of what was written, which is to be taken back all the same."""
+        self.changes = _made(self.changes, name, data)
+        if self.kept is not None:
+            kept = msgspec.structs.replace(self.kept, changes=_made(self.kept.changes, name, data))
+            self.undos.settle(put=[kept])
+
+    def done(self) -> None:
+        """Everything is written and verified; raises `RpcError` where that cannot be kept."""
+        after = {change.parameter: change.written_value for change in self.changes}
+        with self._or_refuse("this write is taken back"):
+            if self.trial_s is None:
+                self._say("write done", after=after)
+                self.undos.change(drop=[self.number])
+            else:
+                self._say("trial begun", after=after)
+                self._take_over()
+
+    def _take_over(self) -> None:
+        undo = self.kept
+        if undo is None:
+            return
+        names = set(undo.values())
+        replaced = [one for one in self.undos.all() if one is not undo and names & set(one.values())]
+        self.undos.change(put=[_merged(undo, replaced)], drop=[one.write for one in replaced])
+        self.taken_over = tuple(one.write for one in replaced)
+
+    def rolled_back(self, error: RpcError, left: tuple[UndoChange, ...]) -> None:
+        """It has failed, and these are still to be taken back."""
+        failed = error.kind is Kind.ROLLBACK_FAILED
+        if failed:
+            self.problem = str(error)
+            log.critical("A ROLL-BACK FAILED: %s", error)
+        with suppress(OSError):  # it was logged, and does not change what was done
+            what = "ROLL-BACK FAILED" if failed else "write taken back"
+            self._say(what, result=str(error), outcome=error.data.outcome)
+        self.undos.leave(self.number, left)
+
+    def _say(self, what: str, **details: object) -> None:
+        self._journal.append(self._who, what, write=self.number, **details).result()
 
     def _entry(self, change: Change, before: bytes) -> UndoChange:
         parameter = change.parameter
         return UndoChange(
             parameter.name,
             parameter.component,
-            *self._keeping.place(parameter.component),
-            parameter.index,
-            parameter.subindex,
+            *self._address(parameter),
             before.hex(),
             change.data.hex(),
             parameter.decode(before),
@@ -127,23 +148,29 @@ class WriteLedger:
     @contextmanager
     def _or_refuse(self, so: str) -> Iterator[None]:
         try:
-            if self._keeping.unusable is not None:
-                raise OSError(None, self._keeping.unusable)
             yield
         except OSError as error:
             text = f"what is written could not be recorded, {so}: {error.strerror or error}"
             raise refuse(Kind.UNAVAILABLE, text) from error
 
 
-def _merged(undo: Undo, replaced: tuple[Undo, ...]) -> Undo:
-    """A trial with those it takes over: all their parameters, each with its first value before."""
-    changes = {change.parameter: change for change in undo.changes}
-    for other in reversed(replaced):
-        for old in other.changes:
-            new = changes.get(old.parameter)
-            changes[old.parameter] = (
-                old
-                if new is None
-                else msgspec.structs.replace(new, before=old.before, before_value=old.before_value)
-            )
-    return msgspec.structs.replace(undo, changes=tuple(changes.values()))
+def _made(changes: Sequence[UndoChange], name: str, data: bytes) -> tuple[UndoChange, ...]:
+    return tuple(
+        msgspec.structs.replace(one, made=data.hex()) if one.parameter == name else one for one in changes
+    )
+
+
+def _merged(undo: Undo, replaced: Sequence[Undo]) -> Undo:
+    """A trial with those it takes over: all their parameters, each with its first value before.
+
+    In the order of their last downloads, so that the last one is taken back first.
+    """
+    first = {one.parameter: one for other in replaced for one in other.changes}
+    names = undo.values()
+    older = [one for name, one in first.items() if name not in names]
+    newer = [_from_first(one, first.get(one.parameter, one)) for one in undo.changes]
+    return msgspec.structs.replace(undo, changes=(*older, *newer))
+
+
+def _from_first(change: UndoChange, first: UndoChange) -> UndoChange:
+    return msgspec.structs.replace(change, before=first.before, before_value=first.before_value)

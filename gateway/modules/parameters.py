@@ -8,6 +8,7 @@ import operator
 from dataclasses import dataclass
 from enum import Enum
 
+from drivers.bus.values import size_of
 from eds.datatypes import DATA_TYPES
 from gateway.coding import Coding, CodingError, Number, text
 from gateway.config import ParameterSettings
@@ -155,6 +156,20 @@ class Parameter:
         would_hold = f"{text(held)} {unit}, which is what the device would hold of {text(value)},"
         self._check_limits(held, said if is_real else would_hold)
         return data
+
+    def accepts(self, data: bytes) -> Number:
+        """The value of bytes that may be written as they are: what a device held before.
+
+        Raises:
+            RpcError: read_only, not_allowed, mismatch or out_of_limit.
+
+        """
+        self.check_writable()
+        if len(data) != size_of(self.data_type):
+            raise self.refusal(Kind.MISMATCH, f"{data.hex(' ')} is no {self.coding.type.name}")
+        value = self.decode(data)
+        self._check_limits(value, f"{text(value)} {self.settings.unit}")
+        return value
 
     def decode(self, data: bytes) -> Number:
         """The value that the device's bytes mean; raises `RpcError` (mismatch) where they mean none."""

@@ -5,27 +5,28 @@ is on trial anywhere.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from drivers.bus.values import unsigned
-from drivers.errors import DeviceAbort, DriverError
-from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState
+from drivers.errors import DeviceAbort, DriverError, NotPermitted
+from drivers.joint.cia402 import ENERGISED, STATE_WORDS
 from gateway.coding import Number, text
 from gateway.config import RESTORE, STORE, DeviceTable, JointTable, RobotConfig
 from gateway.futures import then
 from gateway.messages import Stored
-from gateway.modules.ledger import Keeping
+from gateway.modules.objects import Node, download, read, result
 from gateway.modules.parameters import READABLE, Parameter
-from gateway.modules.transaction import ANSWER_S, read
+from gateway.modules.rules import Rules
+from gateway.modules.transaction import Leave
+from gateway.modules.writer import Turn, Writer
+from gateway.records.records import Records
 from gateway.wire import Kind, RpcError, refuse
 
 if TYPE_CHECKING:
     from gateway.modules.component import ComponentModule
-
-T = TypeVar("T")
 
 ALL = 1  # the sub-index of all parameters
 _ON_COMMAND, _BY_ITSELF = 0b01, 0b10  # bits of what it reads as: the device's capabilities
@@ -55,20 +56,6 @@ RESTORING = Command(
 )
 
 
-class Node(Protocol):
-    """A device's objects, as the drivers give them."""
-
-    def upload(self, index: int, subindex: int) -> "Future[bytes]": ...
-
-    def download(
-        self, index: int, subindex: int, data: bytes, timeout_s: float | None = None
-    ) -> "Future[None]": ...
-
-
-StateOf = Callable[[str], tuple[DriveState | None, str]]  # a drive's state, or why it is not known
-Submit = Callable[[Callable[[], Stored]], "Future[Stored]"]  # a job for the writer's thread
-
-
 class Storage:
     """What every device of a robot can store."""
 
@@ -77,20 +64,20 @@ class Storage:
         config: RobotConfig,
         component: "ComponentModule",
         parameters: Mapping[str, Parameter],
-        keeping: Keeping,
-        state_of: StateOf,
-        submit: Submit,
+        records: Records,
+        rules: Rules,
+        writer: Writer,
     ) -> None:
         self.config = config
         self.tables: dict[str, JointTable | DeviceTable] = {**config.joint, **config.device}
         self.parameters = parameters
-        self.keeping = keeping
-        self.state_of = state_of
+        self.records = records
+        self.rules = rules
         self._component = component
-        self._submit = submit
+        self._writer = writer
 
-    def run(self, command: Command, who: str, component: str) -> "Future[Stored]":
-        """Do it after every write that was asked for before.
+    def run(self, command: Command, who: str, component: str, leave: Leave) -> "Future[Stored]":
+        """Do it after every write that was asked for before, as long as there is leave.
 
         Raises:
             RpcError: at once, or as the future's error. device_timeout: nobody knows whether it was done.
@@ -100,36 +87,43 @@ class Storage:
             known = ", ".join(self.tables) or "none"
             raise refuse(Kind.UNKNOWN_NAME, f"{component!r} is no device that can store; here are: {known}")
         ready = self._component.when_ready({component, *self.config.drives_of(component)})
-        return then(ready, lambda _none: self._begin(command, who, component))
+        return then(ready, lambda _none: self._begin(command, who, component, leave))
 
-    def _begin(self, command: Command, who: str, component: str) -> "Future[Stored]":
+    def _begin(self, command: Command, who: str, component: str, leave: Leave) -> "Future[Stored]":
         found: Any = self._component.robot.components.get(component)
         if found is None:
             why = self._component.absent.get(component, "it is not there")
             raise refuse(Kind.UNAVAILABLE, f"{component}: {why}", component=component)
-        return self._submit(_Run(self, command, who, component, found.node).do)
+        return self._writer.submit(_Run(self, command, who, component, found.node, leave).do, Turn.WRITE)
 
 
 class _Run:
     """One command to one device, in the writer's thread."""
 
-    def __init__(self, storage: Storage, command: Command, who: str, component: str, node: Node) -> None:
+    def __init__(
+        self, storage: Storage, command: Command, who: str, component: str, node: Node, leave: Leave
+    ) -> None:
         self._storage = storage
         self._command = command
         self._who = who
         self._component = component
         self._node = node
+        self._leave = leave
         self._sharing = storage.config.sharing(component)
-        self._timeout_s = storage.tables[component].store_timeout_s
+        table = storage.tables[component]
+        self._address = (table.bus, table.node_id, command.index, ALL)
+        self._timeout_s = table.store_timeout_s
 
     def do(self) -> Stored:
         command = self._command
+        self._check_leave()
         self._check_trials()
         self._check_capability()
         before = self._values() if command is STORING else {}
         self._check_drives()
         self._record(command.name, "nothing was sent")
         try:
+            self._check_drives()  # recording took its time
             self._send()
             self._check_answers()
             self._check_unchanged(before)
@@ -141,9 +135,16 @@ class _Run:
 
     # Before
 
+    def _check_leave(self) -> None:
+        said = self._leave.objection(self._address)
+        if said is not None:
+            raise self._refusal(self._leave.kind(said), f"{said}; nothing was sent")
+        if self._node.distrust is not None:
+            raise self._refusal(Kind.NOT_ALLOWED, self._node.distrust)
+
     def _check_trials(self) -> None:
         """It would be made permanent; and taking it back must not wait for a device that stores."""
-        for undo in self._storage.keeping.undo.all():
+        for undo in self._storage.records.undo.all():
             how = "on trial; confirm or revert" if undo.trial else "still being taken back; wait for"
             names = ", ".join(change.parameter for change in undo.changes)
             said = f"{names}: {how} that first (write {undo.write} of {undo.who})"
@@ -157,8 +158,8 @@ class _Run:
             raise self._refusal(Kind.NOT_ALLOWED, said)
 
     def _check_drives(self) -> None:
-        for drive in self._storage.config.drives_of(self._component):
-            state, why = self._storage.state_of(drive)
+        drives = self._storage.config.drives_of(self._component)
+        for drive, (state, why) in self._storage.rules.states(drives).items():
             if state is None or state in ENERGISED:
                 said = f"unknown: {why}" if state is None else STATE_WORDS[state]
                 raise self._refusal(
@@ -171,14 +172,17 @@ class _Run:
 
     def _send(self) -> None:
         command = self._command
-        sent = self._node.download(command.index, ALL, command.signature, self._timeout_s)
         try:
-            self._result(sent, self._timeout_s)
-        except RpcError as error:
-            if error.kind is Kind.DEVICE_ABORT:
-                raise
-            said = f"{error}; NOBODY KNOWS whether it did: try again, or compare its values after a reset"
-            raise refuse(error.kind, said, component=self._component, object=command.object) from error
+            download(self._node, self._address, command.signature, self._leave.objection, self._timeout_s)
+        except NotPermitted as error:
+            self._check_leave()
+            raise self._refusal(Kind.NOT_ALLOWED, f"{error}; nothing was sent") from error
+        except DeviceAbort as error:
+            raise self._device_error(error) from error
+        except (DriverError, TimeoutError) as error:
+            known = self._device_error(error)
+            said = f"{known}; NOBODY KNOWS whether it did: try again, or compare its values after a reset"
+            raise refuse(known.kind, said, component=self._component, object=command.object) from error
 
     def _check_answers(self) -> None:
         """A device that is busy afterwards answers again, and still says that it can."""
@@ -192,7 +196,10 @@ class _Run:
                     raise refuse(error.kind, said, component=self._component) from error
 
     def _capability(self) -> int:
-        return unsigned(self._result(self._node.upload(self._command.index, ALL)))
+        try:
+            return unsigned(result(self._node.upload(self._command.index, ALL)))
+        except (DriverError, TimeoutError) as error:
+            raise self._device_error(error) from error
 
     # Afterwards
 
@@ -220,23 +227,17 @@ class _Run:
 
     def _record(self, what: str, so: str, **details: str) -> None:
         """Returns when it is durable; raises `RpcError` where it cannot be recorded, `so` says what then."""
-        keeping = self._storage.keeping
+        journal = self._storage.records.journal
         try:
-            if keeping.unusable is not None:
-                raise OSError(None, keeping.unusable)
-            keeping.journal.append(self._who, what, component=self._component, **details).result()
+            journal.append(self._who, what, component=self._component, **details).result()
         except OSError as error:
             said = f"it could not be recorded: {error.strerror or error}; {so}"
             raise self._refusal(Kind.UNAVAILABLE, said) from error
 
-    def _result(self, future: "Future[T]", timeout_s: float = 0.0) -> T:
-        try:
-            return future.result(ANSWER_S + timeout_s)
-        except (DriverError, TimeoutError) as error:
-            kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
-            kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
-            abort_code = getattr(error, "abort_code", None)
-            raise self._refusal(kind, str(error) or "no answer", abort_code) from error
+    def _device_error(self, error: Exception) -> RpcError:
+        kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
+        kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
+        return self._refusal(kind, str(error) or "no answer", getattr(error, "abort_code", None))
 
     def _refusal(self, kind: Kind, said: str, abort_code: int | None = None) -> RpcError:
         command = self._command

@@ -1,57 +1,43 @@
 """One write of several parameters: all or nothing, each verified by reading it back.
 
-Current values are read first; everything is checked before the first download; what is to be taken back is on
-disk, and in the journal, before it; whatever goes wrong afterwards takes back all that may have changed, in
-reverse order, verified. Runs in the control module's own thread.
+Current values are read first, and everything is checked before the first download; what may have become
+another since, a stop and the drives' states, again before each. What is to be taken back is on disk, and in
+the journal, before the first; whatever goes wrong afterwards takes back all that may have changed, in reverse
+order, verified. Runs in the writer's thread.
 """
 
-import threading
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
-from drivers.errors import DeviceAbort, DriverError
-from gateway.modules.parameters import Parameter
-from gateway.wire import Kind, RpcError, refuse
+from drivers.errors import DriverError, NotPermitted
+from gateway.modules.ledger import WriteLedger
+from gateway.modules.objects import Change, device_error, download, read
+from gateway.modules.rules import Rules, allowed_states
+from gateway.modules.stop.authority import Address, Permit
+from gateway.modules.taking_back import AS_IT_SHOULD_BE, TAKEN_BACK, Attempt
+from gateway.wire import Kind, RpcError, internal_error, refuse
 
-ANSWER_S = 30.0  # longer than any driver's own time-outs: only a driver's bug gets here
-
-
-class Node(Protocol):
-    """A device's objects, as the drivers give them."""
-
-    def upload(self, index: int, subindex: int) -> "Future[bytes]": ...
-
-    def download(self, index: int, subindex: int, data: bytes) -> "Future[None]": ...
+ENDING = "the gateway is ending"
+NOT_WRITTEN = "not written"
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
-    """One parameter and the bytes it shall hold."""
+class Leave:
+    """What one write may do: what it might when it was asked for, until a stop, or until nobody wants it."""
 
-    parameter: Parameter
-    node: Node
-    data: bytes
+    permit: Permit
+    overtaken: Callable[[], str | None]  # by what it has become pointless
 
+    def objection(self, address: Address) -> str | None:
+        """Why an object must not be written now, in words. From any thread."""
+        return self.overtaken() or self.permit.objection(address)
 
-class Ledger(Protocol):
-    """Where a write is kept beyond the process. Each call returns when that is durable."""
-
-    def begin(self, before: Mapping[str, bytes]) -> None:
-        """Before the first download; raises `RpcError` where it cannot be kept, and nothing is written."""
-
-    def done(self) -> None:
-        """Everything is written and verified."""
-
-    def refused(self, error: RpcError) -> None:
-        """Nothing was written, and nothing begun."""
-
-    def taken_back(self, error: RpcError) -> None:
-        """Nothing is written any more."""
-
-    def left(self, error: RpcError) -> None:
-        """Some of it could not be taken back."""
+    def kind(self, said: str) -> Kind:
+        """What an objection means."""
+        if said == ENDING:
+            return Kind.UNAVAILABLE
+        allowed = said not in (self.overtaken(), self.permit.authority.frozen())
+        return Kind.STOPPED if allowed else Kind.NOT_ALLOWED
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,48 +48,24 @@ class Outcome:
     after: dict[str, float]
 
 
-def device_error(parameter: Parameter, doing: str, error: Exception) -> RpcError:
-    """What a driver could not do, as an answer."""
-    kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
-    kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
-    return refuse(
-        kind,
-        f"{parameter.name}: {doing} {parameter.object}: {error}",
-        component=parameter.component,
-        object=parameter.object,
-        abort_code=getattr(error, "abort_code", None),
-    )
-
-
-def read(parameter: Parameter, node: Node) -> bytes:
-    """The device's bytes now.
-
-    Raises:
-        RpcError: the device does not tell.
-
-    """
-    try:
-        return node.upload(parameter.index, parameter.subindex).result(ANSWER_S)
-    except (DriverError, TimeoutError) as error:
-        raise device_error(parameter, "reading", error) from error
-
-
 class Transaction:
-    """One write. `check` is given each change with its current value and raises `RpcError` to refuse."""
+    """One write. `let_pass` is called between two changes: what is more urgent may take its turn there."""
 
     def __init__(
         self,
         changes: list[Change],
-        check: Callable[[Change, float], None],
-        stopped: threading.Event,
-        ledger: Ledger,
+        rules: Rules,
+        leave: Leave,
+        ledger: WriteLedger,
+        let_pass: Callable[[], None],
     ) -> None:
         self._changes = changes
-        self._check = check
-        self._stopped = stopped
+        self._rules = rules
+        self._leave = leave
         self._ledger = ledger
+        self._let_pass = let_pass
         self._before: dict[str, bytes] = {}
-        self._touched: list[Change] = []
+        self._touched: set[str] = set()
 
     def run(self) -> Outcome:
         """Do it.
@@ -116,18 +78,24 @@ class Transaction:
         try:
             self._prepare()
         except RpcError as error:
-            self._ledger.refused(error)
+            self._ledger.refused(self._changes, error)
             raise
         try:
             for change in self._changes:
                 self._apply(change)
+            for change in self._changes:
+                self._check_leave(change)  # a stop may have come with the last download
             self._ledger.done()
         except RpcError as error:
             raise self._roll_back(error) from error
+        except Exception as error:
+            raise self._roll_back(internal_error("parameter.write", error)) from error
         return Outcome(
-            {one.parameter.name: self._value_before(one) for one in self._changes},
-            {one.parameter.name: one.parameter.decode(one.data) for one in self._changes},
+            {one.name: self._value_before(one) for one in self._changes},
+            {one.name: one.parameter.decode(one.data) for one in self._changes},
         )
+
+    # Before
 
     def _prepare(self) -> None:
         """Read, check, and put into a safe order.
@@ -136,75 +104,109 @@ class Transaction:
         back goes the other way round.
         """
         for change in self._changes:
-            self._before[change.parameter.name] = read(change.parameter, change.node)
+            self._check_leave(change)
+        self._before = self._current()
         for change in self._changes:
-            self._check(change, self._value_before(change))
+            self._check_leave(change)  # reading may have shown that two devices answer
+            self._rules.check_value(change.parameter, self._before[change.name], change.data)
+            self._check_way_back(change)
+        rules = {(one.parameter.component, allowed_states(one.parameter)): one for one in self._changes}
+        for change in rules.values():
+            self._rules.check_states(change.parameter)
         self._changes.sort(key=lambda one: abs(one.parameter.decode(one.data)) > abs(self._value_before(one)))
-        self._ledger.begin(self._before)
+        self._ledger.begin(self._changes, self._before)
+
+    def _check_leave(self, change: Change) -> None:
+        said = self._leave.objection(self._rules.address(change.parameter))
+        if said is not None:
+            raise change.parameter.refusal(self._leave.kind(said), said)
+        silence = self._rules.silence(change.parameter.component)
+        if silence is not None:
+            raise change.parameter.refusal(Kind.UNAVAILABLE, silence)
+        if change.node.distrust is not None:
+            raise change.parameter.refusal(Kind.NOT_ALLOWED, change.node.distrust)
+
+    def _current(self) -> dict[str, bytes]:
+        """What the devices hold; read anew where a trial that this one takes over has ended meanwhile."""
+        while True:
+            replaced = self._ledger.replaced(self._changes)
+            found = {}
+            for change in self._changes:
+                self._let_pass()
+                found[change.name] = read(change.parameter, change.node)
+            if self._ledger.replaced(self._changes) == replaced:
+                return found
 
     def _value_before(self, change: Change) -> float:
-        return change.parameter.decode(self._before[change.parameter.name])
+        return change.parameter.decode(self._before[change.name])
+
+    def _check_way_back(self, change: Change) -> None:
+        """What could not be taken back is not tried."""
+        goal = self._ledger.goal(change, self._before[change.name])
+        if goal is None:
+            return
+        try:
+            self._rules.check_value(change.parameter, change.data, goal)
+        except RpcError as error:
+            text = f"it could not be taken back at the end of the trial: {error}"
+            raise change.parameter.refusal(error.kind, text, error.data.limit) from error
+
+    # The downloads
 
     def _apply(self, change: Change) -> None:
-        if self._stopped.is_set():
-            raise change.parameter.refusal(Kind.STOPPED, "the robot was stopped before this was written")
-        self._touched.append(change)
-        _write(change, change.data)
+        self._let_pass()
+        parameter, node = change.parameter, change.node
+        self._check_leave(change)
+        self._rules.check_states(parameter)
+        self._touched.add(change.name)
+        try:
+            download(node, self._rules.address(parameter), change.data, self._leave.objection)
+        except NotPermitted as error:
+            self._touched.remove(change.name)
+            self._check_leave(change)
+            raise parameter.refusal(Kind.NOT_ALLOWED, str(error)) from error
+        except (DriverError, TimeoutError) as error:
+            raise device_error(parameter, f"writing {parameter.decode(change.data):g} to", error) from error
+        self._verify(change, read(parameter, node))
+
+    def _verify(self, change: Change, found: bytes) -> None:
+        if found == change.data:
+            return
+        self._ledger.made(change.name, found)
+        parameter, value = change.parameter, change.parameter.decode(change.data)
+        text = f"{value:g} was written, the device holds {found.hex(' ')} ({parameter.object})"
+        raise parameter.refusal(Kind.MISMATCH, text)
+
+    # Afterwards
 
     def _roll_back(self, cause: RpcError) -> RpcError:
-        outcome = {change.parameter.name: "not written" for change in self._changes}
-        for change in reversed(self._touched):
-            outcome[change.parameter.name] = self._restore(change)
-        failed = [name for name, what in outcome.items() if what not in _HARMLESS]
-        taken_back = any(what == _TAKEN_BACK for what in outcome.values())
-        kind = Kind.ROLLBACK_FAILED if failed else Kind.ROLLED_BACK if taken_back else cause.kind
-        text = str(cause)
-        if failed:
-            text += f"; and could not be taken back: {', '.join(failed)}; read them before you go on"
-        elif taken_back:
-            text += "; everything was taken back"
-        data = cause.data
-        answer = refuse(
-            kind,
-            text,
-            component=data.component,
-            object=data.object,
-            abort_code=data.abort_code,
-            limit=data.limit,
-            outcome=outcome,
-        )
-        if failed:
-            self._ledger.left(answer)
-        else:
-            self._ledger.taken_back(answer)
+        written = [one for one in self._ledger.changes if one.parameter in self._touched]
+        authority, ledger = self._leave.permit.authority, self._ledger
+        attempt = Attempt(self._rules, authority, ledger.undos, ledger.number, self._let_pass)
+        found = attempt.take_back(written)
+        outcome = {one.name: NOT_WRITTEN for one in self._changes} | found.outcome
+        answer = _answer(cause, outcome)
+        self._ledger.rolled_back(answer, found.left)
         return answer
 
-    def _restore(self, change: Change) -> str:
-        """Bring one parameter back, and say what became of it."""
-        before = self._before[change.parameter.name]
-        try:
-            if read(change.parameter, change.node) == before:
-                return _UNCHANGED
-            _write(change, before)
-        except RpcError as error:
-            return f"unknown: {error}"
-        return _TAKEN_BACK
 
-
-_UNCHANGED = "unchanged"
-_TAKEN_BACK = "taken back"
-_HARMLESS = ("not written", _UNCHANGED, _TAKEN_BACK)
-
-
-def _write(change: Change, data: bytes) -> None:
-    parameter, node = change.parameter, change.node
-    try:
-        node.download(parameter.index, parameter.subindex, data).result(ANSWER_S)
-    except (DriverError, TimeoutError) as error:
-        raise device_error(parameter, f"writing {parameter.decode(data):g} to", error) from error
-    found = read(parameter, node)
-    if found != data:
-        text = (
-            f"{parameter.decode(data):g} was written, the device holds {found.hex(' ')} ({parameter.object})"
-        )
-        raise parameter.refusal(Kind.MISMATCH, text)
+def _answer(cause: RpcError, outcome: dict[str, str]) -> RpcError:
+    """Why a write has failed, and what became of each parameter."""
+    failed = [name for name, what in outcome.items() if what not in {NOT_WRITTEN, *AS_IT_SHOULD_BE}]
+    taken_back = TAKEN_BACK in outcome.values()
+    kind = Kind.ROLLBACK_FAILED if failed else Kind.ROLLED_BACK if taken_back else cause.kind
+    text = str(cause)
+    if failed:
+        text += f"; and could not be taken back: {', '.join(failed)}; read them before you go on"
+    elif taken_back:
+        text += "; everything was taken back"
+    data = cause.data
+    return refuse(
+        kind,
+        text,
+        component=data.component,
+        object=data.object,
+        abort_code=data.abort_code,
+        limit=data.limit,
+        outcome=outcome,
+    )

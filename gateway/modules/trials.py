@@ -1,26 +1,24 @@
 """Writes on trial: each ends by itself, confirmed or taken back, whatever becomes of client and gateway.
 
-What is true about a trial is decided in the writer's thread, one job after another, by the undo file: who
-comes first, the confirmation or the end of its time, wins. Here is only who waits for what.
+What is true about a trial is decided in the writer's thread (`TrialJobs`). Here is only who waits for what.
 """
 
 import logging
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
-from drivers.errors import DriverError
-from gateway.futures import back, outcome, then
+from gateway.futures import back, done, outcome, then
 from gateway.loop import Loop, Timer
 from gateway.messages import Confirmed, Reverted, TrialInfo
-from gateway.modules.ledger import Keeping
-from gateway.modules.taking_back import TAKEN_BACK, UNCHANGED, OutOfReach, Reach, TakenBack, take_back
-from gateway.modules.transaction import ANSWER_S
-from gateway.records.undo import Undo
+from gateway.modules.taking_back import TakenBack
+from gateway.modules.trial_jobs import TrialJobs
+from gateway.modules.writer import Turn, Writer
+from gateway.records.undo import Undo, UndoFile
 from gateway.wire import Kind, RpcError, refuse
 
 if TYPE_CHECKING:
@@ -30,8 +28,6 @@ log = logging.getLogger(__name__)
 
 FIRST_RETRY_S, LAST_RETRY_S = 0.5, 5.0  # between attempts to take back what could not be
 _REMEMBERED = 100  # ended trials whose end is still told
-
-Submit = Callable[[Callable[[], Any]], "Future[Any]"]  # a job for the writer's thread
 
 
 class _Trial:
@@ -43,10 +39,17 @@ class _Trial:
         self.ends_ns: int | None = None
         self.timer: Timer | None = None
         self.why: str | None = None
+        self.trying = False  # an attempt to take it back is under way
         self.problem: str | None = None
         self.outcome: dict[str, str] = {}
         self.retry_s = FIRST_RETRY_S
         self.waiting: list[Future[Reverted]] = []
+
+    @property
+    def info(self) -> TrialInfo:
+        left_s = None if self.ends_ns is None else max(0, self.ends_ns - time.monotonic_ns()) / 1e9
+        undo = self.undo
+        return TrialInfo(undo.write, undo.who, undo.values(), undo.before(), left_s, self.problem)
 
     def set_timer(self, timer: Timer | None) -> None:
         if self.timer is not None:
@@ -54,17 +57,35 @@ class _Trial:
         self.timer = timer
 
 
+class Coming:
+    """A trial that was asked for: who ends all trials, or those of its client, ends it before it begins."""
+
+    def __init__(self, session: "Session") -> None:
+        self.session = session
+        self.over: str | None = None  # why
+
+
 class Trials:
-    """All trials of a robot. It belongs to the loop's thread, but for the jobs it submits."""
+    """All trials of a robot. It belongs to the loop's thread, but for `claim` and `close`."""
 
     def __init__(
-        self, loop: Loop, submit: Submit, keeping: Keeping, reach: Reach, changed: Callable[[], None]
+        self,
+        loop: Loop,
+        writer: Writer,
+        jobs: TrialJobs,
+        undos: UndoFile,
+        changed: Callable[[], None],
+        wrote: Callable[[Iterable[str]], None],
     ) -> None:
+        """`changed` is told whenever `pending` may be another, `wrote` which parameters may be."""
         self._loop = loop
-        self._submit = submit
-        self._keeping = keeping
-        self._reach = reach
-        self._changed = changed  # told whenever `pending` may be another
+        self._writer = writer
+        self._jobs = jobs
+        self._undos = undos
+        self._changed = changed
+        self._wrote = wrote
+        self._closed = False
+        self._coming: set[Coming] = set()
         self._trials: dict[int, _Trial] = {}
         self._ended: OrderedDict[int, str] = OrderedDict()
 
@@ -74,37 +95,32 @@ class Trials:
         return bool(self._trials)
 
     def infos(self) -> list[TrialInfo]:
-        now_ns = time.monotonic_ns()
-        return [
-            TrialInfo(
-                trial.undo.write,
-                trial.undo.who,
-                trial.undo.values(),
-                trial.undo.before(),
-                None if trial.ends_ns is None else max(0, trial.ends_ns - now_ns) / 1e9,
-                trial.problem,
-            )
-            for trial in self._trials.values()
-        ]
+        return [trial.info for trial in self._trials.values()]
 
-    def under_trial(self, component: str) -> bool:
-        """Whether one of the component's parameters is on trial or still to be taken back."""
-        changes = (change for trial in self._trials.values() for change in trial.undo.changes)
-        return any(change.component == component for change in changes)
+    def expect(self, session: "Session") -> Coming:
+        """A trial was asked for; what has been expected is `dismissed` in any case."""
+        coming = Coming(session)
+        self._coming.add(coming)
+        return coming
 
-    def begin(self, undo: Undo, trial_s: float, session: "Session", replaced: tuple[Undo, ...]) -> None:
-        """A write has succeeded on trial; it takes over the trials that it `replaced`."""
-        for other in replaced:
-            self._forget(other.write, f"it was taken over by write {undo.write}")
-        trial = self._trials[undo.write] = _Trial(undo, session)
+    def dismiss(self, coming: Coming) -> None:
+        self._coming.discard(coming)
+
+    def begin(self, undo: Undo, trial_s: float, coming: Coming, taken_over: Iterable[int]) -> None:
+        """A write has succeeded on trial."""
+        for other in taken_over:
+            self._forget(other, f"it was taken over by write {undo.write}")
+        trial = self._trials[undo.write] = _Trial(undo, coming.session)
         trial.ends_ns = time.monotonic_ns() + round(trial_s * 1e9)
         trial.set_timer(self._loop.call_later(trial_s, lambda: self._take_back(trial, "its time was over")))
         self._changed()
+        if coming.over is not None:
+            self._take_back(trial, coming.over)
 
     def take_up(self, undo: Undo, why: str, ready: "Future[None]", problem: str | None = None) -> None:
         """Take back what a failed roll-back or an ended gateway has left, once its devices are `ready`."""
         trial = self._trials[undo.write] = _Trial(undo, None)
-        trial.problem = problem
+        trial.why, trial.problem = why, problem
         ready.add_done_callback(lambda _ready: self._loop.call(lambda: self._take_back(trial, why)))
         self._changed()
 
@@ -112,11 +128,14 @@ class Trials:
         """Keep what is on trial, if the devices still hold it.
 
         Raises:
-            RpcError: as the future's error. unknown_name: it has ended, and how; mismatch, device_timeout, …:
-                it stays on trial.
+            RpcError: at once, or as the future's error. unknown_name: it has ended, and how; mismatch,
+                device_timeout, …: it stays on trial.
 
         """
-        confirmed = self._submit(lambda: self._confirm_job(write))
+        trial = self._trials.get(write)
+        if trial is None or trial.why is not None:
+            raise self._not_on_trial(write)
+        confirmed = self._writer.submit(lambda: self._jobs.confirm(write), Turn.TRIAL)
         return then(back(self._loop, confirmed), lambda values: self._confirmed(write, values))
 
     def revert(self, write: int) -> "Future[Reverted]":
@@ -131,65 +150,98 @@ class Trials:
 
     def revert_of(self, session: "Session", why: str) -> None:
         """Take back every trial of one client."""
-        for trial in tuple(self._trials.values()):
-            if trial.session is session:
-                self._take_back(trial, why)
+        self._revert(lambda one: one.session is session, why)
 
     def revert_all(self, why: str) -> None:
         """Take back everything that is on trial."""
-        for trial in tuple(self._trials.values()):
-            self._take_back(trial, why)
+        self._revert(lambda _one: True, why)
+
+    def claim(self) -> "Future[None]":
+        """A stop has set what stops the controllers: nothing of that is taken back. From any thread."""
+        if not self._jobs.concerned():
+            return done(None)
+        claimed = self._writer.submit(self._jobs.claim, Turn.CLAIM)
+        return then(claimed, lambda writes: self._loop.post(lambda: self._claimed(writes)))
 
     def close(self) -> None:
-        """No more attempts; what is still to be taken back stays in the undo file for the next start."""
-        for trial in self._trials.values():
-            trial.set_timer(None)
-            for future in trial.waiting:
-                future.set_exception(refuse(Kind.UNAVAILABLE, "the gateway is ending"))
+        """No more attempts; what is still to be taken back stays in the undo file. From any thread."""
+        self._closed = True
+        self._loop.post(self._end)
 
     # In the loop's thread.
 
+    def _revert(self, chosen: "Callable[[_Trial | Coming], bool]", why: str) -> None:
+        for coming in filter(chosen, self._coming):
+            coming.over = coming.over or why
+        for trial in tuple(filter(chosen, self._trials.values())):
+            self._take_back(trial, why)
+
+    def _end(self) -> None:
+        for trial in self._trials.values():
+            trial.set_timer(None)
+            self._fail(trial, _ending())
+
     def _take_back(self, trial: _Trial, why: str) -> None:
-        if trial.why is not None and trial.timer is None:
-            return  # an attempt is under way
-        trial.why = trial.why or why
+        write = trial.undo.write
+        if self._closed:
+            self._fail(trial, _ending())
+        if self._closed or self._trials.get(write) is not trial:
+            return
+        if trial.trying:
+            return
+        trial.trying = True
+        trial.why = said = trial.why or why
         trial.ends_ns = None
         trial.set_timer(None)
-        attempt = self._submit(lambda: self._take_back_job(trial.undo.write, trial.why or why, trial.problem))
-        attempt.add_done_callback(lambda done: self._loop.post(lambda: self._attempted(trial, outcome(done))))
+        known = trial.problem
+        attempt = self._writer.submit(lambda: self._jobs.take_back(write, said, known), Turn.TRIAL)
+        attempt.add_done_callback(lambda ended: self._loop.post(lambda: self._attempted(trial, ended)))
 
-    def _attempted(self, trial: _Trial, found: "TakenBack | Exception | None") -> None:
-        if isinstance(found, TakenBack):
-            for name, what in found.outcome.items():
-                if what != UNCHANGED or trial.outcome.get(name) != TAKEN_BACK:
-                    trial.outcome[name] = what
-            trial.problem = found.problem
-        elif found is not None:
-            log.error("taking back write %d failed", trial.undo.write, exc_info=found)
-            trial.problem = str(found)
-        answer = self._answer(trial)
-        waiting, trial.waiting = trial.waiting, []
-        if trial.problem is None:
-            self._forget(trial.undo.write, f"it was taken back: {trial.why}")
+    def _attempted(self, trial: _Trial, ended: "Future[TakenBack | None]") -> None:
+        write, found = trial.undo.write, outcome(ended)
+        trial.trying = False
+        if found is None:  # it was confirmed, taken over or claimed before its turn came
+            self._forget(write, "nothing of it was left to be taken back")
             self._changed()
-        elif trial.undo.write in self._trials:
-            again = self._loop.call_later(trial.retry_s, lambda: self._take_back(trial, ""))
-            trial.set_timer(again)
-            trial.retry_s = min(2 * trial.retry_s, LAST_RETRY_S)
-        for future in waiting:
-            answer(future)
+        elif isinstance(found, TakenBack):
+            trial.outcome |= found.outcome
+            self._wrote(found.outcome)
+            self._follow(trial, found)
+        else:
+            log.error("taking back write %d failed", write, exc_info=found)
+            trial.problem = str(found)
+            self._try_again(trial)
 
-    @staticmethod
-    def _answer(trial: _Trial) -> "Callable[[Future[Reverted]], None]":
-        write, said, problem = trial.undo.write, dict(trial.outcome), trial.problem
-        if problem is None:
-            return lambda future: future.set_result(Reverted(write, said))
-        error = refuse(
-            Kind.ROLLBACK_FAILED,
-            f"write {write} could not be taken back yet: {problem}; the gateway keeps trying",
-            outcome=said,
+    def _follow(self, trial: _Trial, found: TakenBack) -> None:
+        write, waiting = trial.undo.write, trial.waiting
+        trial.problem = found.problem
+        if found.problem is not None:
+            trial.undo = msgspec.structs.replace(trial.undo, changes=found.left)
+            self._try_again(trial)
+            return
+        trial.waiting = []
+        self._forget(write, f"it was taken back: {trial.why}")
+        self._changed()
+        for future in waiting:
+            future.set_result(Reverted(write, dict(trial.outcome)))
+
+    def _try_again(self, trial: _Trial) -> None:
+        text = (
+            f"write {trial.undo.write} could not be taken back yet: {trial.problem}; the gateway keeps trying"
         )
-        return lambda future: future.set_exception(error)
+        self._fail(trial, refuse(Kind.ROLLBACK_FAILED, text, outcome=dict(trial.outcome)))
+        if not self._closed:
+            trial.set_timer(self._loop.call_later(trial.retry_s, lambda: self._take_back(trial, "")))
+            trial.retry_s = min(2 * trial.retry_s, LAST_RETRY_S)
+
+    def _claimed(self, writes: Iterable[int]) -> None:
+        for trial in [self._trials[write] for write in writes if write in self._trials]:
+            undo = self._undos.get(trial.undo.write)
+            if undo is None:
+                self._forget(trial.undo.write, "it was claimed by a stop")
+            else:
+                trial.undo = undo
+        self._changed()
 
     def _confirmed(self, write: int, values: dict[str, float] | None) -> Confirmed:
         if values is None:
@@ -200,11 +252,18 @@ class Trials:
 
     def _forget(self, write: int, how: str) -> None:
         trial = self._trials.pop(write, None)
-        if trial is not None:
-            trial.set_timer(None)
-        self._ended[write] = how
+        self._ended.setdefault(write, how)
         if len(self._ended) > _REMEMBERED:
             self._ended.popitem(last=False)
+        if trial is not None:
+            trial.set_timer(None)
+            self._fail(trial, self._not_on_trial(write))
+
+    @staticmethod
+    def _fail(trial: _Trial, error: RpcError) -> None:
+        waiting, trial.waiting = trial.waiting, []
+        for future in waiting:
+            future.set_exception(error)
 
     def _not_on_trial(self, write: int) -> RpcError:
         why = self._ended.get(write)
@@ -213,57 +272,6 @@ class Trials:
         said = why or "there is no such write, or it was not on trial"
         return refuse(Kind.UNKNOWN_NAME, f"write {write} is not on trial: {said}")
 
-    # In the writer's thread.
 
-    def _confirm_job(self, write: int) -> dict[str, float] | None:
-        undo = self._keeping.undo.get(write)
-        if undo is None or not undo.trial:
-            return None
-        for change in undo.changes:
-            try:
-                held = self._reach(change).upload(change.index, change.subindex).result(ANSWER_S)
-            except (OutOfReach, DriverError, TimeoutError) as error:
-                raise refuse(
-                    Kind.UNAVAILABLE,
-                    f"{change.parameter}: {error}; it stays on trial",
-                    component=change.component,
-                ) from error
-            if held != bytes.fromhex(change.written):
-                raise refuse(
-                    Kind.MISMATCH,
-                    f"{change.parameter} holds {held.hex(' ')} and not what was written; it stays on trial",
-                    component=change.component,
-                )
-        try:
-            self._keeping.journal.append(undo.who, "trial confirmed", write=write).result()
-            self._keeping.undo.change(drop=[write])
-        except OSError as error:
-            text = f"the confirmation could not be recorded, it stays on trial: {error.strerror or error}"
-            raise refuse(Kind.UNAVAILABLE, text) from error
-        return undo.values()
-
-    def _take_back_job(self, write: int, why: str, known: str | None) -> TakenBack | None:
-        """One attempt; `None` where there is nothing to take back any more."""
-        undo = self._keeping.undo.get(write)
-        if undo is None:
-            return None
-        found = take_back(undo, self._reach)
-        if found.problem is None or found.problem != known:
-            what = "taken back" if found.problem is None else "NOT TAKEN BACK yet"
-            log.warning("write %d of %s %s (%s): %s", write, undo.who, what, why, found.outcome)
-            entry = self._keeping.journal.append(
-                "gateway", what, write=write, reason=why, outcome=found.outcome
-            )
-            outcome(entry)  # a disk that fails was logged, and does not change what was done
-        self._keep(undo, found)
-        return found
-
-    def _keep(self, undo: Undo, found: TakenBack) -> None:
-        """On disk stays what is still to be taken back."""
-        try:
-            if found.problem is None:
-                self._keeping.undo.change(drop=[undo.write])
-            elif undo.trial:
-                self._keeping.undo.change(put=[msgspec.structs.replace(undo, trial=False)])
-        except OSError as error:
-            log.error("the undo file cannot be written: %s", error)
+def _ending() -> RpcError:
+    return refuse(Kind.UNAVAILABLE, "the gateway is ending")

@@ -1,40 +1,39 @@
 """Parameters as clients see them: listed, read from the device, and written all or nothing.
 
 Writes run one after another in a thread of their own, and so does what takes them back. A stop does not wait
-for them: it interrupts them.
+for them: what is not written by then is not written any more.
 """
 
 import itertools
 import logging
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
-from drivers.bus.settings import DeviceSettings
-from drivers.bus.values import unsigned
 from drivers.errors import DriverError
-from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
-from drivers.joint.commands import STATUSWORD
-from drivers.joint.quantities import AXIS_OFFSET
-from drivers.joint.settings import JointSettings
 from drivers.samples import State
-from gateway.coding import too_far
 from gateway.config import RobotConfig
 from gateway.futures import back, done, failed, gather, then
 from gateway.loop import Loop
-from gateway.messages import ParameterInfo, ParameterValue, ParameterValues, Written
+from gateway.messages import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
 from gateway.modules.catalogue import resolve
 from gateway.modules.component import ComponentModule
-from gateway.modules.ledger import Keeping, WriteLedger
+from gateway.modules.ledger import WriteLedger
+from gateway.modules.objects import Change, device_error
 from gateway.modules.parameters import Parameter
-from gateway.modules.storage import Storage
-from gateway.modules.taking_back import OutOfReach
-from gateway.modules.transaction import ANSWER_S, Change, Node, Outcome, Transaction, device_error
-from gateway.modules.trials import Trials
+from gateway.modules.rules import Rules
+from gateway.modules.stop.authority import Authority, Permit
+from gateway.modules.stop.machine import Phase
+from gateway.modules.storage import Command, Storage
+from gateway.modules.transaction import ENDING, Leave, Outcome, Transaction
+from gateway.modules.trial_jobs import TrialJobs
+from gateway.modules.trials import Coming, Trials
+from gateway.modules.writer import Turn, Writer
 from gateway.records.records import Records
-from gateway.records.undo import Undo, UndoChange, UndoFile
+from gateway.records.undo import Undo
 from gateway.wire import Kind, RpcError, refuse
 
 if TYPE_CHECKING:
@@ -45,55 +44,91 @@ log = logging.getLogger(__name__)
 Changed = Callable[[], None]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """One write, and what it may do."""
+
+    changes: list[Change]
+    who: str
+    trial_s: float | None
+    coming: Coming
+    permit: Permit
+
+    @property
+    def over(self) -> str | None:
+        """Why a trial is pointless by now."""
+        if self.trial_s is None or self.coming.over is None:
+            return None
+        return f"its trial is over already: {self.coming.over}"
+
+
 class Tuning:
-    """Every parameter of the robot. It belongs to the loop's thread, but for `_check`."""
+    """Every parameter of the robot. It belongs to the loop's thread, but for `claim` and `close`."""
 
     def __init__(
-        self, config: RobotConfig, component: ComponentModule, loop: Loop, records: Records, changed: Changed
+        self,
+        config: RobotConfig,
+        component: ComponentModule,
+        loop: Loop,
+        records: Records,
+        authority: Authority,
+        changed: Changed,
     ) -> None:
         self._component = component
         self._loop = loop
-        self._config = config
-        self._devices: dict[str, JointSettings | DeviceSettings] = {**config.joint, **config.device}
+        self._records = records
+        self._authority = authority
         self._parameters = resolve(config, component.robot.descriptions, component.absent)
         self._infos = [one.info for one in self._parameters.values()]
+        self._joints = tuple(config.joint)
+        self._rules = Rules(config, component, self._parameters)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
-        self._numbers = itertools.count(time.time_ns() // 1_000_000)  # unique also after a restart
-        self._interrupted = threading.Event()
-        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="write")
-        undo = UndoFile(records.folder.undo)
-        self._keeping = Keeping(undo, records.journal, self._place, records.unusable)
-        self.trials = Trials(loop, self._writer.submit, self._keeping, self._reach, changed)
-        self.storage = Storage(
-            config, component, self._parameters, self._keeping, self._state, self._writer.submit
-        )
+        self._asked: set[_Asked] = set()  # writes that have not been answered
+        self._ending: str | None = None
+        self._writer = Writer()
+        jobs = TrialJobs(self._rules, authority, records, self._writer)
+        self.trials = Trials(loop, self._writer, jobs, records.undo, changed, self._forget)
+        self._storage = Storage(config, component, self._parameters, records, self._rules, self._writer)
 
     def close(self) -> None:
         """Take back what is being written, and end the writer's thread."""
-        self.interrupt()
+        self._ending = ENDING
         self.trials.close()
-        self._writer.shutdown(wait=True)
+        self._writer.close()
 
     def load(self) -> list[Undo]:
         """What the last gateway left to be taken back. Before anything is written."""
-        if self._keeping.unusable is not None:
-            return []
-        undos, problem = self._keeping.undo.load()
+        undos, problem = self._records.undo.load()
         if problem is not None:
             log.critical("%s", problem)
-            self._keeping.journal.append("gateway", "undo file damaged", result=problem)
+            self._records.journal.append("gateway", "undo file damaged", result=problem)
+        newest = max((undo.write for undo in undos), default=0)
+        now = time.time_ns() // 1_000_000  # unique also after a restart, and where the clock was set back
+        self._numbers = itertools.count(max(now, newest + 1))
         return undos
 
-    def resume(self, undos: list[Undo]) -> None:
-        """Take that back, the newest first, as soon as its devices are there."""
-        ready = self._component.when_ready({one.component for undo in undos for one in undo.changes})
-        for undo in reversed(undos):
-            self.trials.take_up(undo, "the gateway ended before this write did", ready)
+    def resume(self, undos: Iterable[Undo]) -> None:
+        """Take that back, the newest first, as soon as its devices are there; but what a stop has claimed."""
+        left = [undo for one in undos if (undo := self._records.undo.get(one.write)) is not None]
+        ready = self._component.when_ready({one.component for undo in left for one in undo.changes})
+        for undo in reversed(left):
+            how = "while it was on trial" if undo.trial else "before it had answered it, or taken it back"
+            self.trials.take_up(undo, f"the gateway ended {how}", ready)
 
-    def interrupt(self) -> None:
-        """End every write that was asked for until now; what it had changed is taken back."""
-        self._interrupted.set()
-        self._interrupted = threading.Event()
+    def claim(self) -> "Future[None]":
+        """What stops the controllers is as a stop has set it now, and never taken back. From any thread."""
+        return self.trials.claim()
+
+    def enabling_objection(self, joints: Iterable[str]) -> str | None:
+        """Why these drives must not be enabled now: what is on trial could not be taken back then."""
+        names = {one.name: "is being written" for asked in self._asked for one in asked.changes}
+        for trial in self.trials.infos():
+            how = f"is on trial (write {trial.write} of {trial.who}); confirm or revert that first"
+            names |= dict.fromkeys(trial.values, how)
+        chosen = tuple(joints)
+        barred = (name for name in names if self._rules.bars(name, chosen))
+        name = next(barred, None)
+        return None if name is None else f"{name}, which enabled drives do not allow, {names[name]}"
 
     def infos(self) -> list[ParameterInfo]:
         return self._infos
@@ -101,8 +136,8 @@ class Tuning:
     def listed(self, names: list[str] | None) -> ParameterValues:
         """What is known without asking: the last value read, as long as its device is there."""
         chosen = self._parameters.chosen(names)
-        absent = self._absent(chosen)
-        return ParameterValues({one.name: self._last(one, absent) for one in chosen})
+        lost = self._lost(chosen)
+        return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
     def read(self, names: list[str] | None) -> "Future[ParameterValues]":
         """What the devices hold now; where one does not tell, `problem` says why."""
@@ -123,36 +158,49 @@ class Tuning:
         if len({change.parameter.name for change in changes}) != len(changes):
             raise refuse(Kind.BAD_PARAMS, "a parameter is written twice, by its name and by its address")
         ready = self._component.when_ready({one.parameter.component for one in changes})
-        interrupted = self._interrupted
-        return then(ready, lambda _none: self._begin(changes, interrupted, session, trial_s))
+        asked = _Asked(changes, session.who, trial_s, self.trials.expect(session), self._authority.permit())
+        self._asked.add(asked)
+        answer = then(ready, lambda _none: self._begin(asked))
+        answer.add_done_callback(lambda _answer: self._end(asked))
+        return answer
+
+    def store(self, command: Command, who: str, component: str) -> "Future[Stored]":
+        """Let a device keep its values, or forget them; see `Storage.run`."""
+        leave = Leave(self._authority.permit(), lambda: self._ending)
+        return self._storage.run(command, who, component, leave)
 
     # Reading
 
-    def _absent(self, parameters: Iterable[Parameter]) -> dict[str, str]:
-        """Why a device cannot be asked at all; of each that has one of these parameters."""
-        now_ns, absent = time.monotonic_ns(), {}
+    def _forget(self, names: Iterable[str]) -> None:
+        """What was read of these is known no longer."""
+        for name in names:
+            self._known.pop(name, None)
+
+    def _lost(self, parameters: Iterable[Parameter]) -> dict[str, str]:
+        """Why what was read last may hold no longer; of each device that has one of these parameters."""
+        now_ns, lost = time.monotonic_ns(), {}
         for name in {one.component for one in parameters if one.problem is None}:
             quality = self._component.quality(name, now_ns)
             if quality["state"] == State.LOST:
-                absent[name] = f"{name} is not there: {quality['problem'] or 'it is silent'}"
-        return absent
+                lost[name] = f"{name} is not there: {quality['problem'] or 'it is silent'}"
+        return lost
 
-    def _last(self, parameter: Parameter, absent: Mapping[str, str]) -> ParameterValue:
-        problem = parameter.problem or absent.get(parameter.component)
+    def _last(self, parameter: Parameter, lost: Mapping[str, str]) -> ParameterValue:
+        problem = parameter.problem or lost.get(parameter.component)
         stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
         return _value(parameter, value, stamp_ns, problem)
 
     def _uploads(self, parameters: list[Parameter]) -> "Future[dict[str, bytes | Exception]]":
-        absent = self._absent(parameters)
-        return gather({one.name: self._upload(one, absent) for one in parameters})
+        silent = {name: self._rules.silence(name) for name in {one.component for one in parameters}}
+        return gather({one.name: self._upload(one, silent[one.component]) for one in parameters})
 
-    def _upload(self, parameter: Parameter, absent: Mapping[str, str]) -> "Future[bytes]":
-        problem = parameter.problem or absent.get(parameter.component)
+    def _upload(self, parameter: Parameter, silence: str | None) -> "Future[bytes]":
+        problem = parameter.problem or (silence and f"{parameter.component} is not there: {silence}")
         if problem is not None:
             return failed(parameter.refusal(Kind.UNAVAILABLE, problem))
         try:
             parameter.check_readable()
-            return self._node(parameter).upload(parameter.index, parameter.subindex)
+            return self._rules.node(parameter).upload(parameter.index, parameter.subindex)
         except RpcError as error:
             return failed(error)
 
@@ -174,115 +222,57 @@ class Tuning:
         self._known[parameter.name] = (stamp_ns, value)
         return _value(parameter, value, stamp_ns)
 
-    def _node(self, parameter: Parameter) -> Node:
-        component: Any = self._component.robot.components.get(parameter.component)
-        if component is None:
-            raise parameter.refusal(Kind.UNAVAILABLE, parameter.problem or "its device is not there")
-        node: Node = component.node
-        return node
-
     # Writing
 
     def _change(self, name: str, value: float) -> Change:
         parameter = self._parameters.get(name)
         if parameter is None:
             raise refuse(Kind.UNKNOWN_NAME, f"there is no parameter {name!r}; parameter.list has them all")
-        return Change(parameter, self._node(parameter), parameter.encode(value))
+        return Change(parameter, self._rules.node(parameter), parameter.encode(value))
 
-    def _begin(
-        self,
-        changes: list[Change],
-        interrupted: threading.Event,
-        session: "Session",
-        trial_s: float | None,
-    ) -> "Future[Written]":
-        ledger = WriteLedger(self._keeping, next(self._numbers), session.who, changes, trial_s)
-        transaction = Transaction(changes, self._check, interrupted, ledger)
-        for change in changes:
-            self._known.pop(change.parameter.name, None)
-        ended = back(self._loop, self._writer.submit(transaction.run))
-        ended.add_done_callback(lambda _ended: self._follow(ledger, session, trial_s))
+    def _begin(self, asked: "_Asked") -> "Future[Written]":
+        self._check_enabling(asked.changes)
+        ledger = WriteLedger(
+            self._records, self._rules.address, next(self._numbers), asked.who, asked.trial_s
+        )
+        leave = Leave(asked.permit, lambda: self._ending or asked.over)
+        let_pass = partial(self._writer.let_pass, Turn.WRITE)
+        transaction = Transaction(list(asked.changes), self._rules, leave, ledger, let_pass)
+        self._forget(change.name for change in asked.changes)
+        ended = back(self._loop, self._writer.submit(transaction.run, Turn.WRITE))
+        ended.add_done_callback(lambda ended: self._follow(asked, ledger, ended))
         return then(ended, lambda outcome: self._written(outcome, ledger))
 
-    def _follow(self, ledger: WriteLedger, session: "Session", trial_s: float | None) -> None:
-        """What stays of a write: its trial, or what could not be rolled back."""
-        if ledger.kept is None:
+    def _end(self, asked: "_Asked") -> None:
+        self._asked.discard(asked)
+        self.trials.dismiss(asked.coming)
+
+    def _check_enabling(self, changes: Iterable[Change]) -> None:
+        """The other half of `enabling_objection`: whichever was asked for first is done."""
+        if self._authority.state.phase is not Phase.ENABLING:
             return
-        if ledger.kept.trial and trial_s is not None:
-            self.trials.begin(ledger.kept, trial_s, session, ledger.replaced)
+        for change in changes:
+            if self._rules.bars(change.name, self._joints):
+                text = "an enabling is under way; wait for its answer"
+                raise change.parameter.refusal(Kind.WRONG_STATE, text)
+
+    def _follow(self, asked: "_Asked", ledger: WriteLedger, ended: "Future[Outcome]") -> None:
+        """What stays of a write: its trial, or what could not be rolled back."""
+        kept = ledger.kept
+        if kept is None:
+            return
+        if ended.exception() is None and asked.trial_s is not None:
+            self.trials.begin(kept, asked.trial_s, asked.coming, ledger.taken_over)
         else:
-            self.trials.take_up(ledger.kept, "its roll-back failed", done(None), ledger.problem)
+            self.trials.take_up(kept, "its roll-back failed", done(None), ledger.problem)
 
     def _written(self, outcome: Outcome, ledger: WriteLedger) -> Written:
         now_ns = time.monotonic_ns()
         self._known.update({name: (now_ns, value) for name, value in outcome.after.items()})
-        if ledger.kept is None:
+        kept = ledger.kept
+        if kept is None:
             return Written(ledger.number, outcome.before, outcome.after)
-        return Written(ledger.number, ledger.kept.before(), ledger.kept.values(), ledger.trial_s)
-
-    def _check(self, change: Change, current: float) -> None:
-        """In the writer's thread: the step, and the states of the drives that the parameter may move."""
-        parameter = change.parameter
-        new, most = parameter.decode(change.data), parameter.settings.max_step
-        if most is not None and too_far(current, new, most):
-            unit, step = parameter.settings.unit, abs(new - current)
-            text = f"from {current:g} {unit} it may change by {most:g} {unit} at once, not by {step:g}"
-            raise parameter.refusal(Kind.OUT_OF_LIMIT, text, most)
-        allowed = allowed_states(parameter)
-        if allowed is not None:
-            for drive in self._config.drives_of(parameter.component):
-                self._check_state(parameter, drive, allowed)
-
-    def _check_state(self, parameter: Parameter, drive: str, allowed: frozenset[DriveState]) -> None:
-        state, why = self._state(drive)
-        if state in allowed:
-            return
-        said = f"unknown: {why}" if state is None else STATE_WORDS[state]
-        wanted = ", ".join(sorted(STATE_WORDS[one] for one in allowed))
-        text = f"the state of {drive} is {said}; this parameter may be written in: {wanted}"
-        raise parameter.refusal(Kind.WRONG_STATE, text)
-
-    def _state(self, drive: str) -> tuple[DriveState | None, str]:
-        """The drive's state as it says now; or why that is not known."""
-        component: Any = self._component.robot.components.get(drive)
-        if component is None:
-            return None, self._component.absent.get(drive, "it is not there")
-        index = STATUSWORD + AXIS_OFFSET * self._config.joint[drive].axis
-        try:
-            statusword = unsigned(component.node.upload(index, 0).result(ANSWER_S))
-        except (DriverError, TimeoutError) as error:
-            return None, str(error)
-        return drive_state(statusword), f"its statusword is 0x{statusword:04X}"
-
-    def _place(self, component: str) -> tuple[str, int]:
-        device = self._devices[component]
-        return device.bus, device.node_id
-
-    def _reach(self, change: UndoChange) -> Node:
-        """The device that a change was written to, as long as it is the same one."""
-        device = self._devices.get(change.component)
-        if device is None or (device.bus, device.node_id) != (change.bus, change.node_id):
-            where = f"node {change.node_id} on bus {change.bus!r}"
-            raise OutOfReach(
-                f"the robot's file no longer says that {where} is {change.component}", final=True
-            )
-        component: Any = self._component.robot.components.get(change.component)
-        if component is None:
-            raise OutOfReach(self._component.absent.get(change.component, "it is not there"), final=False)
-        quality = self._component.quality(change.component, time.monotonic_ns())
-        if quality["state"] == State.LOST:
-            raise OutOfReach(str(quality["problem"] or "it is silent"), final=False)
-        node: Node = component.node
-        return node
-
-
-def allowed_states(parameter: Parameter) -> frozenset[DriveState] | None:
-    """The drive states in which a parameter may be written; `None` where the state does not matter."""
-    settings = parameter.settings
-    if settings.states is None:
-        return None if settings.live else frozenset(DriveState) - ENERGISED
-    named = frozenset(state for state in DriveState if STATE_WORDS[state] in settings.states)
-    return named if settings.live else named - ENERGISED
+        return Written(ledger.number, kept.before(), kept.values(), ledger.trial_s)
 
 
 def _value(

@@ -9,7 +9,7 @@ def write(path: Path, data: bytes) -> None:
     """Replace the file's content.
 
     Raises:
-        OSError: it is as it was before.
+        OSError: it is as it was before; where only its folder could not be synced, perhaps as it is to be.
 
     """
     draft = path.with_name(f"{path.name}.draft")

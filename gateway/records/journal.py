@@ -4,10 +4,11 @@ Its own thread writes, so that a slow disk delays nobody but who chooses to wait
 kept beside the journal (`.head`), because a chain alone does not show that its end was cut off.
 """
 
+import contextlib
 import logging
 import os
-import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -69,7 +70,6 @@ class Journal:
         self._head = Head()
         self._file: BinaryIO | None = None
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
-        self._lock = threading.Lock()
 
     def append(self, who: str, what: str, **details: Any) -> "Future[None]":
         """Add an entry of this instant. The future is done when it is durable.
@@ -106,9 +106,10 @@ class Journal:
         try:
             file = self._file or self._open()
             data, head = line(self._head, fields)
-            _append_whole(file, data + b"\n")
+            with self._as_before_if_it_fails(file):
+                _append(file, data + b"\n")
+                durable.write(head_file(self.path), msgspec.json.encode(head))
             self._head = head
-            durable.write(head_file(self.path), msgspec.json.encode(head))
         except OSError as error:
             self.problem = (
                 f"{self.path} cannot be written: {error.strerror or error}; make room or correct its rights"
@@ -117,15 +118,29 @@ class Journal:
             raise OSError(error.errno, self.problem) from error
         self.problem = None
 
+    @contextlib.contextmanager
+    def _as_before_if_it_fails(self, file: BinaryIO) -> Iterator[None]:
+        """An entry that is reported lost stands neither in the journal nor in its head."""
+        size = file.seek(0, os.SEEK_END)
+        try:
+            yield
+        except OSError:
+            self._file = None  # whatever is there now, the next entry follows it
+            with contextlib.suppress(OSError), file:
+                os.ftruncate(file.fileno(), size)
+                os.fsync(file.fileno())
+                durable.write(head_file(self.path), msgspec.json.encode(self._head))
+            raise
+
     def _open(self) -> BinaryIO:
         """Open it behind its last whole line; what a crash has left half-written is cut off and said."""
         file = self.path.open("a+b", buffering=0)
         try:
             said = self._take_up(file)
+            durable.sync_folder(self.path.parent)
         except BaseException:
             file.close()
             raise
-        durable.sync_folder(self.path.parent)
         self._file = file
         if said is not None:
             log.warning("the journal %s: %s", self.path, said)
@@ -165,17 +180,12 @@ class Journal:
         return [msgspec.json.decode(one) for one in _last_lines(file, count)]
 
 
-def _append_whole(file: BinaryIO, data: bytes) -> None:
-    """Append and make durable, or leave the file as it was."""
-    size = file.seek(0, os.SEEK_END)
-    try:
-        written = file.write(data)
-        if written != len(data):
-            raise OSError(None, f"only {written} of {len(data)} bytes could be written")
-        os.fsync(file.fileno())
-    except OSError:
-        os.ftruncate(file.fileno(), size)
-        raise
+def _append(file: BinaryIO, data: bytes) -> None:
+    """Append and make durable."""
+    written = file.write(data)
+    if written != len(data):
+        raise OSError(None, f"only {written} of {len(data)} bytes could be written")
+    os.fsync(file.fileno())
 
 
 def _end_of_last_line(file: BinaryIO) -> int:

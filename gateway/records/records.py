@@ -1,4 +1,4 @@
-"""One robot's records, open: its folder, its lock and its journal."""
+"""One robot's records, open: its folder, its lock, its journal, and what is to be taken back."""
 
 import logging
 from pathlib import Path
@@ -7,6 +7,7 @@ from gateway.boot import boot_id
 from gateway.messages import RecordsInfo
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import Journal
+from gateway.records.undo import UndoFile
 
 log = logging.getLogger(__name__)
 
@@ -28,11 +29,12 @@ class Records:
             log.error("%s", unusable)
         self.unusable = unusable
         self.journal = Journal(self.folder.journal, boot_id(), unusable)
+        self.undo = UndoFile(self.folder.undo, unusable)
 
     @property
     def info(self) -> RecordsInfo:
         """As `robot.describe` shows it."""
-        return RecordsInfo(str(self.folder.path), self.journal.problem)
+        return RecordsInfo(str(self.folder.path), self.journal.problem or self.undo.problem)
 
     def close(self) -> None:
         """Write what was appended, and let others have the folder."""

@@ -17,15 +17,33 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from drivers.errors import DeviceAbort
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
-from tests.unit.gateway.harness import HEAD, ROBOT, Answered, Bench, Client, FakeDrive, config, serving, until
+from tests.unit.gateway.harness import (
+    DISABLED,
+    ENABLED,
+    HEAD,
+    ROBOT,
+    Answered,
+    Bench,
+    Client,
+    FakeDrive,
+    config,
+    serving,
+    until,
+)
 
-STEP, CYCLE = "gait.step_length", "gait.cycle_time"
-OBJECTS = {STEP: (0x2001, 0), CYCLE: (0x2002, 0)}
+STEP, CYCLE, TOE = "gait.step_length", "gait.cycle_time", "gait.toe_height"
+OBJECTS = {STEP: (0x2001, 0), CYCLE: (0x2002, 0), TOE: (0x2003, 0)}
 CONTROLWORD = 0x6040
 ENABLE_OPERATION = 0x0F
 
-# Counts, few enough to meet again; from one step length to another it is sometimes too far (100 at most).
-counts = {STEP: st.sampled_from([360, 400, 440, 480]), CYCLE: st.sampled_from([1100, 1200, 1300])}
+FARTHEST = 100  # that a step length may change at once, there and back
+# Counts, few enough to meet again; from one step length to another it is sometimes too far. The height of a
+# toe is changed only while no drive can move.
+counts = {
+    STEP: st.sampled_from([360, 400, 440, 480]),
+    CYCLE: st.sampled_from([1100, 1200, 1300]),
+    TOE: st.sampled_from([60, 80]),
+}
 changes = st.fixed_dictionaries({}, optional=counts).filter(bool)
 aborts = st.sampled_from([None, None, None, 0, 1])  # at which download of a write the device refuses
 people = st.sampled_from(["whoever has the lease"] * 4 + ["ada", "ben"])
@@ -47,10 +65,11 @@ actions = ["quick_stop"]
 
 
 class Trial:
-    """What the model knows of a write on trial."""
+    """What the model knows of a write on trial; a `late` one is taken back when the drives allow it."""
 
     def __init__(self, number: int, before: dict[str, int], written: dict[str, int]) -> None:
         self.number, self.before, self.written = number, before, written
+        self.late = False
 
 
 class ControlMachine(RuleBasedStateMachine):
@@ -64,6 +83,8 @@ class ControlMachine(RuleBasedStateMachine):
         patch = self.ending.enter_context(pytest.MonkeyPatch.context())
         self.bench = Bench()
         patch.setattr("gateway.modules.component.assemble", self.bench.assemble)
+        patch.setattr("gateway.modules.trials.LAST_RETRY_S", 0.02)
+        patch.setattr("gateway.modules.trials.FIRST_RETRY_S", 0.02)
         text = ROBOT.replace(HEAD, HEAD.replace("port = 0", 'port = 0\nrecords = "records"')) + GUARD
         settled = config(folder, text)
         self.folder = RecordsFolder(settled.records)
@@ -72,7 +93,8 @@ class ControlMachine(RuleBasedStateMachine):
         self.values = {name: self.held(name) for name in OBJECTS}
         self.lease: str | None = None
         self.trials: list[Trial] = []
-        self.stopped = False
+        self.late: set[int] = set()  # trials that have had to wait for the drives, also those that ended
+        self.stopped = self.at_rest = False
         self.happened: list[str] = []
         until(self.rules_of_guard, "the guard runs")
         self.acquire("ada")
@@ -122,7 +144,9 @@ class ControlMachine(RuleBasedStateMachine):
         who = self.person(who)
         trial = self.trials[-1]
         changed = any(self.values[name] != value for name, value in trial.written.items())
-        expected = "no_lease" if self.lease != who else "mismatch" if changed else None
+        expected = "mismatch" if changed else None
+        expected = "unknown_name" if trial.late else expected
+        expected = "no_lease" if self.lease != who else expected
         assert self.refused(who, "parameter.confirm", write=trial.number) == expected
         if expected is None:
             self.trials.remove(trial)
@@ -133,16 +157,17 @@ class ControlMachine(RuleBasedStateMachine):
     def revert(self, who: str) -> None:
         who = self.person(who)
         trial = self.trials[0]
-        expected = None if self.lease == who else "no_lease"
+        expected = "rollback_failed" if self.must_wait(trial) else None
+        expected = expected if self.lease == who else "no_lease"
         assert self.refused(who, "parameter.revert", write=trial.number) == expected
-        if expected is None:
+        if expected != "no_lease":
             self.take_back(trial)
 
     @rule(who=st.sampled_from(["ada", "ben", "watcher"]))
     def stop(self, who: str) -> None:
         answer = self.clients[who].call("robot.stop", reason="any")
         assert answer["drives"] == {"left_knee": "confirmed", "right_knee": "confirmed"}
-        self.stopped = True
+        self.stopped, self.at_rest = True, False
         self.happened += ["stop", "stop answered"]
 
     @rule(who=people)
@@ -155,6 +180,7 @@ class ControlMachine(RuleBasedStateMachine):
             assert (self.answer["drives"], self.answer["held"]) == (down, False)
             self.stopped = False
             self.happened.append("reset")
+            self.drives_rest()
 
     @rule(who=people)
     def enable(self, who: str) -> None:
@@ -162,10 +188,21 @@ class ControlMachine(RuleBasedStateMachine):
         who = self.person(who)
         assert self.refused(who, "robot.enable") == ("not_allowed" if self.lease == who else "no_lease")
 
-    @rule(name=st.sampled_from([STEP, CYCLE]), data=st.data())
+    @precondition(lambda self: not self.stopped)
+    @rule(on=st.booleans())
+    def another_master_switches(self, on: bool) -> None:
+        for drive in (self.bench.left, self.bench.right):
+            drive.set_state(ENABLED if on else DISABLED)
+        self.at_rest = False
+        if not on:
+            self.drives_rest()
+
+    @rule(name=st.sampled_from([STEP, CYCLE, TOE]), data=st.data())
     def somebody_else_writes(self, name: str, data: st.DataObject) -> None:
         self.values[name] = data.draw(counts[name])
         self.bench.gait.node.objects[OBJECTS[name]] = self.values[name].to_bytes(2, "little")
+        for trial in [one for one in self.trials if one.late and not self.must_wait(one)]:
+            self.take_back(trial)
 
     @rule()
     def left_knee_bends_too_far(self) -> None:
@@ -181,7 +218,7 @@ class ControlMachine(RuleBasedStateMachine):
         self.bends(self.bench.right, "stops")
         if not self.stopped:
             self.happened += ["stop", "stop answered"]
-        self.stopped = True
+        self.stopped, self.at_rest = True, False
         until(self.stop_held, "the guard's stop is held")
         if self.lease is not None:
             assert self.refused(self.lease, "robot.reset") == "stopped"
@@ -207,7 +244,7 @@ class ControlMachine(RuleBasedStateMachine):
             self.wrote(who, wanted, trial)
         elif kind in ("device_abort", "rolled_back"):
             self.happened += ["write", "write taken back"]
-        elif kind in ("out_of_limit", "trial_pending"):
+        elif kind in ("out_of_limit", "trial_pending", "wrong_state"):
             self.happened.append("write refused")
 
     def abort_download(self, number: int | None) -> None:
@@ -224,10 +261,15 @@ class ControlMachine(RuleBasedStateMachine):
     def expected(self, who: str, wanted: dict[str, int], trial: bool, aborts_at: int | None) -> str | None:
         if self.lease != who:
             return "no_lease"
-        if STEP in wanted and abs(wanted[STEP] - self.values[STEP]) > 100:
-            return "out_of_limit"
-        if not trial and any(set(wanted) & set(one.written) for one in self.trials):
+        others = [one for one in self.trials if set(wanted) & set(one.written)]
+        if any(one.late or not trial for one in others):
             return "trial_pending"
+        goals = self.values | {name: value for one in others for name, value in one.before.items()}
+        for origin in (self.values, goals if trial else self.values):
+            if STEP in wanted and abs(wanted[STEP] - origin[STEP]) > FARTHEST:
+                return "out_of_limit"
+        if TOE in wanted and not self.at_rest:
+            return "wrong_state"
         if aborts_at is None or aborts_at >= len(wanted):
             return None
         order = sorted(wanted, key=lambda name: wanted[name] > self.values[name])
@@ -254,12 +296,29 @@ class ControlMachine(RuleBasedStateMachine):
         for trial in tuple(self.trials):
             self.take_back(trial)
 
+    def must_wait(self, trial: Trial) -> bool:
+        ours = self.values[TOE] == trial.written.get(TOE) != trial.before.get(TOE)
+        return ours and not self.at_rest
+
     def take_back(self, trial: Trial) -> None:
-        self.trials.remove(trial)
+        waits = self.must_wait(trial)
         for name, written in trial.written.items():
-            if self.values[name] == written:
+            if self.values[name] == written and not (waits and name == TOE):
                 self.values[name] = trial.before[name]
-        self.happened.append("taken back")
+        if waits:
+            trial.before, trial.written = {TOE: trial.before[TOE]}, {TOE: trial.written[TOE]}
+            trial.late = True
+            self.late.add(trial.number)
+            return
+        self.trials.remove(trial)
+        if trial.number not in self.late:
+            self.happened.append("taken back")
+
+    def drives_rest(self) -> None:
+        """What has waited for it is taken back."""
+        self.at_rest = True
+        for trial in [one for one in self.trials if one.late]:
+            self.take_back(trial)
 
     def rules_of_guard(self) -> dict[str, Any]:
         guard = self.clients["watcher"].call("robot.describe")["guard"]
@@ -281,9 +340,19 @@ class ControlMachine(RuleBasedStateMachine):
         until(well, f"{rule} is cleared")
 
     def told(self) -> list[str]:
-        """What the journal says; the guard's alarms are limited by the time between them."""
+        """What the journal says; the guard's alarms are limited by the time between them.
+
+        When what has waited for the drives is taken back, is another matter.
+        """
         entries = self.clients["watcher"].call("journal.tail", n=1000)["entries"]
-        return [one["what"] for one in entries if not one["what"].startswith("alarm")]
+        return [
+            one["what"]
+            for one in entries
+            if not one["what"].startswith(("alarm", "NOT TAKEN BACK")) and not self.is_late_end(one)
+        ]
+
+    def is_late_end(self, entry: dict[str, Any]) -> bool:
+        return entry["what"] == "taken back" and entry["write"] in self.late
 
     def stop_held(self) -> bool:
         held: bool = self.clients["watcher"].call("robot.describe")["stop"]["held"]
@@ -300,6 +369,9 @@ class ControlMachine(RuleBasedStateMachine):
             f"trials are {expected}",
         )
         assert {name: self.held(name) for name in OBJECTS} == self.values
+        ended = self.late - {trial.number for trial in self.trials}
+        entries = watcher.call("journal.tail", n=1000)["entries"]
+        assert sorted(one["write"] for one in entries if self.is_late_end(one)) == sorted(ended)
         assert self.folder.undo.exists() == bool(self.trials)
         assert self.stop_held() == self.stopped
 

@@ -147,18 +147,27 @@ def test_a_node_lost_in_mid_roll_back_is_taken_back_when_it_returns(
 THREE = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")}
 
 
-def test_nothing_is_written_while_each_sdo_answer_comes_twice(robot: SimulatedRobot, writer: Client) -> None:
-    """As they do from two devices with one node id: nobody knows who would take it."""
+def test_a_joint_whose_sdo_answers_are_doubled_is_not_written_to(
+    robot: SimulatedRobot, writer: Client
+) -> None:
+    """Two devices may answer, and both would take it. The others can be written."""
     before = read(writer)
-    for joint in ("left_hip", "left_knee", "left_ankle"):
-        ask(robot.folder.path, {"fault": "sdo_duplicate", "on": joint})
-    for _ in range(3):
-        assert read(writer) == before
-    assert "two devices answer as node" in str(writer.refused("parameter.write", changes=THREE))
+    ask(robot.folder.path, {"fault": "sdo_duplicate", "on": "left_knee"})
+    until(lambda: "two devices" in _findings(writer, "left_knee"), "it is seen")
+    error = writer.refused("parameter.write", changes=THREE)
+    assert (error.kind, error.data["component"]) == ("not_allowed", "left_knee")
+    assert read(writer) == before
+    others = {name: value for name, value in THREE.items() if "knee" not in name}
+    assert writer.call("parameter.write", changes=others)["after"] == others
     ask(robot.folder.path, {"clear": "all"})
-    for _ in range(30):
-        assert read(writer) == before
+    until(lambda: "two devices" not in _findings(writer, "left_knee"), "it is well again")
     assert writer.call("parameter.write", changes=THREE)["after"] == THREE
+
+
+def _findings(client: Client, component: str) -> str:
+    """What is said of it, after it was read once more."""
+    read(client)
+    return str(client.call("component.snapshot")["quality"][component]["problem"])
 
 
 @pytest.mark.parametrize(
@@ -183,6 +192,20 @@ def test_answers_that_fail_in_mid_transaction_leave_all_as_they_were_in_the_end(
     ask(robot.folder.path, {"clear": "all"})
     until(lambda: writer.call("robot.describe")["trials"] == [], "all is taken back")
     until(lambda: read(writer) == before, "as it was")
+
+
+def test_a_trial_ends_in_time_also_where_no_sample_comes(robot: SimulatedRobot, writer: Client) -> None:
+    """The drive answers SDO; that its position is missing is another matter."""
+    torque = robot.exoskeleton.drives["left_knee"].dictionary[KNEE_TORQUE]
+    before = torque.number()
+    ask(robot.folder.path, {"fault": "tpdo_silent", "on": "left_knee"})
+    quality = "component.snapshot"
+    until(lambda: writer.call(quality)["quality"]["left_knee"]["state"] == "lost", "it is not seen")
+    writer.call("parameter.write", changes={"left_knee.max_torque": 60.0}, trial_s=0.2)
+    assert torque.number() != before
+    until(lambda: writer.call("robot.describe")["trials"] == [], "its time was over")
+    assert torque.number() == before
+    assert writer.call(quality)["quality"]["left_knee"]["state"] == "lost"
 
 
 def test_a_write_goes_through_a_storm_of_emergencies(robot: SimulatedRobot, writer: Client) -> None:

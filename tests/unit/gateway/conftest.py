@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.gateway.harness import Bench, Client, config, serving
+from tests.unit.gateway.harness import DISABLED, Bench, Client, config, serving
+from tests.unit.gateway.tuned import STEP, Tuned, drives, tuned
 
 
 @pytest.fixture
@@ -26,3 +27,25 @@ def connect(bench: Bench, tmp_path: Path) -> Iterator[Callable[[], Client]]:
 @pytest.fixture
 def client(connect: Callable[[], Client]) -> Client:
     return connect()
+
+
+@pytest.fixture
+def calm(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """Its drives are off; what could not be taken back is tried again at once."""
+    monkeypatch.setattr("gateway.modules.trials.FIRST_RETRY_S", 0.01)
+    monkeypatch.setattr("gateway.modules.trials.LAST_RETRY_S", 0.05)
+    drives(bench, DISABLED)
+    return bench
+
+
+@pytest.fixture
+def robot(calm: Bench, tmp_path: Path) -> Iterator[Tuned]:
+    with tuned(tmp_path) as running:
+        yield running
+
+
+@pytest.fixture
+def controlled(calm: Bench, tmp_path: Path) -> Iterator[Tuned]:
+    """A robot whose controller is stopped by its step length."""
+    with tuned(tmp_path, STEP) as running:
+        yield running

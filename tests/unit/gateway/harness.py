@@ -19,7 +19,7 @@ import pytest
 import eds
 from drivers.bus.life import NodeLife
 from drivers.component import Component, Kind
-from drivers.errors import DeviceAbort
+from drivers.errors import DeviceAbort, NotPermitted
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import Led
@@ -153,6 +153,8 @@ class FakeNode:
         self.objects = dict(objects)
         self.log: list[tuple[str, int, bytes | None]] = []
         self.life = NodeLife(None)
+        self.ready = True
+        self.distrust: str | None = None  # why nothing may be written to it
         self.before_download: Callable[[int, bytes], None] = lambda index, data: None
         self.before_upload: Callable[[int], None] = lambda index: None
         self.store: Callable[[int, bytes], bytes] = lambda index, data: data
@@ -161,9 +163,20 @@ class FakeNode:
         return self._do(lambda: self._upload(index, subindex))
 
     def download(
-        self, index: int, subindex: int, data: bytes, timeout_s: float | None = None
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        timeout_s: float | None = None,
+        permitted: Callable[[], str | None] | None = None,
     ) -> "Future[None]":
-        return self._do(lambda: self._download(index, subindex, data))
+        def work() -> None:
+            objection = self.distrust or (None if permitted is None else permitted())
+            if objection is not None:
+                raise NotPermitted(objection)
+            self._download(index, subindex, data)
+
+        return self._do(work)
 
     def run(
         self,

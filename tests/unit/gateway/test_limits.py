@@ -15,7 +15,7 @@ import pytest
 from drivers.joint.cia402 import DriveState
 from gateway import coding
 from gateway.config import ParameterSettings
-from gateway.modules import catalogue, offer, parameters, tuning
+from gateway.modules import catalogue, offer, parameters, rules
 from gateway.modules.parameters import Lock, Parameter
 from gateway.wire import Kind, RpcError
 from tests.unit.gateway.mutants import Mutant, mutants
@@ -66,6 +66,14 @@ LIMITS = [
     (9.2, 20, 9.2, Kind.OUT_OF_LIMIT),  # the device would hold 9
     (10, 19.8, 19.8, Kind.OUT_OF_LIMIT),  # the device would hold 20
 ]  # min, max, value, what comes of it
+ACCEPTED = [
+    (b"\x05", None),
+    (b"\xfb", None),
+    (b"\x06", Kind.OUT_OF_LIMIT),
+    (b"\xfa", Kind.OUT_OF_LIMIT),
+    (b"", Kind.MISMATCH),
+    (b"\x05\x00", Kind.MISMATCH),
+]  # bytes within −5 and 5, what comes of them
 CONTRADICTIONS: list[tuple[float | None, float | None, bool]] = [
     (None, None, False),
     (1, None, False),
@@ -122,6 +130,11 @@ def check_parameter(module: ModuleType) -> None:
     broken = one(problem="no such object")
     assert {refused(broken.check_readable), refused(lambda: broken.encode(1))} == {Kind.UNAVAILABLE}
     assert one().encode(5) == b"\x05"
+    for data, kind in ACCEPTED:
+        limited = one(min=-5, max=5)
+        assert refused(lambda limited=limited, data=data: limited.accepts(data)) == kind  # type: ignore[misc]
+    assert one().accepts(b"\xff") == -1
+    assert refused(lambda: one(access="ro").accepts(b"\x01")) == Kind.READ_ONLY
 
 
 # Numbers and bytes
@@ -323,7 +336,7 @@ def check_states(module: ModuleType) -> None:
             at_rest = state not in moving and state is not None
             expected = None if allowed and (live or at_rest) else Kind.WRONG_STATE
             expected = None if live and named is None else expected
-            assert refused(lambda one=one, state=state: _check(module, one, 5, 5.0, state)) == expected  # type: ignore[misc]
+            assert refused(lambda one=one, state=state: _check(module, one, 5, 5, state)) == expected  # type: ignore[misc]
     for most, after, kind in ((None, 200, None), (10.0, 60, None), (10.0, 61, Kind.OUT_OF_LIMIT)):
         one = _stepping(most)
         assert refused(lambda one=one, after=after: _check(module, one, after, 50, None)) == kind  # type: ignore[misc]
@@ -338,13 +351,33 @@ def _stepping(most: float | None) -> Parameter:
     return Parameter("knee.x", "knee", settings, 0x6072, 0, UNSIGNED8, "rw")
 
 
-def _check(module: ModuleType, one: Parameter, after: int, before: float, state: DriveState | None) -> None:
+def _check(module: ModuleType, one: Parameter, after: int, before: int, state: DriveState | None) -> None:
     fake = SimpleNamespace(
         _config=SimpleNamespace(drives_of=lambda _component: ("knee",)),
-        _state=lambda _drive: (state, "why"),
+        states=lambda drives: dict.fromkeys(drives, (state, "why")),
     )
-    fake._check_state = lambda *given: module.Tuning._check_state(fake, *given)
-    module.Tuning._check(fake, SimpleNamespace(parameter=one, data=bytes([after])), before)
+    module.Rules.check_value(fake, one, bytes([before]), bytes([after]))
+    module.Rules.check_states(fake, one)
+
+
+def check_enabling(module: ModuleType) -> None:
+    """What is on trial bars the way up where it could not be taken back there."""
+    enabled, at_rest = ("operation enabled", "fault"), ("fault",)
+    for live, states, barred in (
+        (False, None, True),
+        (True, None, False),
+        (True, enabled, False),
+        (True, at_rest, True),
+        (False, enabled, True),
+    ):
+        settings = ParameterSettings(object="0x6072:0", live=live, states=states)
+        one = Parameter("knee.x", "knee", settings, 0x6072, 0, UNSIGNED8, "rw")
+        fake = SimpleNamespace(
+            _parameters={"knee.x": one}, _config=SimpleNamespace(drives_of=lambda _component: ("knee",))
+        )
+        assert module.Rules.bars(fake, "knee.x", ["hip", "knee"]) is barred
+        assert module.Rules.bars(fake, "knee.x", ["hip"]) is False
+        assert module.Rules.bars(fake, "knee.y", ["knee"]) is False
 
 
 CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] = [
@@ -357,6 +390,7 @@ CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] =
             "check_readable",
             "check_writable",
             "encode",
+            "accepts",
             "_check_limits",
             "contradiction",
         ),
@@ -364,7 +398,8 @@ CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] =
     (check_coding, coding, ("scaled", "too_far", "decode", "encode", "nearest", "_finite")),
     (check_described, catalogue, ("described", "_scaled_limits")),
     (check_locks, offer, ("_lock", "_axis", "_of_first_axis")),
-    (check_states, tuning, ("_check", "_check_state", "allowed_states")),
+    (check_states, rules, ("check_value", "check_states", "allowed_states")),
+    (check_enabling, rules, ("bars", "_may_be_enabled", "allowed_states")),
 ]
 SAME = ("scale <= 0",)  # a scale is never 0: the robot's file is refused
 

@@ -9,6 +9,8 @@ import pytest
 
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import RobotConfig
+from gateway.modules.storage import STORING
+from gateway.records.journal import Journal
 from tests.unit.gateway.harness import (
     DISABLED,
     ENABLED,
@@ -20,6 +22,7 @@ from tests.unit.gateway.harness import (
     config,
     serving,
 )
+from tests.unit.gateway.tuned import tuned
 
 STORE, RESTORE, TORQUE = 0x1010, 0x1011, 0x6072
 FAULT_REACTION, SWITCHED_ON, FAULT, NO_STATE = 0x021F, 0x0233, 0x0218, 0x006F
@@ -208,6 +211,58 @@ def test_without_a_journal_nothing_is_stored(resting: Bench, tmp_path: Path) -> 
         client.call("control.acquire", ttl_s=60)
         error = client.refused("parameter.store", component="left_knee")
         assert (error.kind, "nothing was sent" in str(error)) == ("unavailable", True)
+    assert resting.left.node.written() == []
+
+
+def test_what_was_asked_for_before_a_stop_is_not_stored_after_it(resting: Bench, tmp_path: Path) -> None:
+    def stop(_index: int, _data: bytes) -> None:
+        robot.do(lambda: stored.append(robot.tuning.store(STORING, "tester", "left_knee")))
+        robot.stop()
+
+    stored: list[Any] = []
+    with tuned(tmp_path) as robot:
+        resting.gait.node.before_download = stop
+        robot.ask(robot.writing({"gait.cycle_time": 1.3})).exception(20)
+        error = stored[0].exception(20)
+    assert (error.kind, "nothing was sent" in str(error)) == ("stopped", True)
+    assert resting.left.node.log == []
+
+
+def test_a_stop_at_the_last_moment_keeps_the_command_from_the_bus(resting: Bench, tmp_path: Path) -> None:
+    download = resting.left.node.download
+
+    def stopped(index: int, subindex: int, data: bytes, *given: Any, **named: Any) -> Any:
+        robot.stop()
+        return download(index, subindex, data, *given, **named)
+
+    resting.left.node.download = stopped  # type: ignore[method-assign]
+    with tuned(tmp_path) as robot:
+        error = robot.refused(lambda: robot.tuning.store(STORING, "tester", "left_knee"))
+        assert [one["what"] for one in robot.told("store", "store FAILED")] == ["store", "store FAILED"]
+    assert (error.kind, "nothing was sent" in str(error)) == ("stopped", True)
+    assert resting.left.node.written() == []
+
+
+def test_a_drive_that_was_enabled_while_the_command_was_recorded_is_not_disturbed(
+    resting: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append = Journal.append
+
+    def slow(self: Journal, who: str, what: str, **details: Any) -> Any:
+        if what == "store":
+            resting.left.set_state(ENABLED)
+        return append(self, who, what, **details)
+
+    monkeypatch.setattr(Journal, "append", slow)
+    with tuned(tmp_path) as robot:
+        assert robot.refused(lambda: robot.tuning.store(STORING, "tester", "left_knee")).kind == "wrong_state"
+    assert resting.left.node.written() == []
+
+
+def test_a_node_that_is_not_trusted_stores_nothing(resting: Bench, writer: Client) -> None:
+    resting.left.node.distrust = "two devices answer as node 2"
+    error = writer.refused("parameter.store", component="left_knee")
+    assert (error.kind, "two devices answer as node 2" in str(error)) == ("not_allowed", True)
     assert resting.left.node.written() == []
 
 

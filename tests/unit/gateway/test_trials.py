@@ -187,7 +187,7 @@ def test_what_somebody_else_has_changed_is_left_alone_and_said(
 
 def test_what_cannot_be_taken_back_is_said_and_tried_until_it_can(writer: Client, bench: Bench) -> None:
     written = try_(writer, step_length=0.42)
-    bench.gait.lost = "no frame of node 16"
+    bench.gait.lost, bench.gait.node.ready = "no frame of node 16", False
     error = writer.refused("parameter.revert", write=written["write"])
     assert error.kind == "rollback_failed"
     assert "no frame of node 16" in str(error)
@@ -197,7 +197,7 @@ def test_what_cannot_be_taken_back_is_said_and_tried_until_it_can(writer: Client
     assert trial["left_s"] is None
     assert "no frame of node 16" in trial["problem"]
     assert writer.refused("parameter.confirm", write=written["write"]).kind == "unknown_name"
-    bench.gait.lost = None
+    bench.gait.node.ready = True
     until(lambda: held(bench) == 400, "taken back")
     until(lambda: trials(writer) == [], "ended")
 

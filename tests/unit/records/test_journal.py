@@ -1,6 +1,7 @@
 """The journal: durable, hash-chained, and it finds one altered byte."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -145,5 +146,42 @@ def test_a_full_disk_fails_the_entry_and_leaves_the_journal_whole(path: Path) ->
     assert [entry["what"] for entry in read_verified(path)] == ["write", "write", "before", "after"]
 
 
-def _no_space(_descriptor: int) -> None:
+def test_an_entry_whose_head_cannot_be_written_is_not_in_the_journal(
+    journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal.append("tester", "before").result(10)
+    with monkeypatch.context() as failing:
+        failing.setattr("gateway.records.durable.os.fsync", _fails_for(f"{head_file(path).name}.draft"))
+        with pytest.raises(OSError, match="No space left on device; make room"):
+            journal.append("tester", "lost").result(10)
+    assert [entry["what"] for entry in read_verified(path)] == ["before"]
+    journal.append("tester", "after").result(10)
+    assert [entry["what"] for entry in read_verified(path)] == ["before", "after"]
+
+
+def test_an_entry_whose_head_was_written_and_perhaps_not_kept_is_in_neither(
+    journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The head has its new name, and only the folder cannot be made durable."""
+    journal.append("tester", "before").result(10)
+    with monkeypatch.context() as failing:
+        failing.setattr("gateway.records.durable.sync_folder", _no_space)
+        with pytest.raises(OSError, match="No space left on device"):
+            journal.append("tester", "lost").result(10)
+    assert [entry["what"] for entry in read_verified(path)] == ["before"]
+
+
+def _fails_for(name: str) -> Callable[[int], None]:
+    """What makes durable every file but this one."""
+    fsync = os.fsync
+
+    def fails(descriptor: int) -> None:
+        if Path(f"/proc/self/fd/{descriptor}").readlink().name == name:
+            _no_space(descriptor)
+        fsync(descriptor)
+
+    return fails
+
+
+def _no_space(_what: object) -> None:
     raise OSError(28, "No space left on device")
