@@ -168,7 +168,9 @@ class ControlModule:
 
     def _enable(self, session: "Session", joints: list[str] | None) -> "Future[messages.Enabled]":
         self._leases.require(session)
-        return self._stop.enable(session.who, joints, lambda _joints: self._lost_lease(session))
+        return self._stop.enable(
+            session.who, joints, lambda: self._lost_lease(session), self._tuning.enabling_objection
+        )
 
     def _lost_lease(self, session: "Session") -> str | None:
         return None if self._leases.held_by(session) else "the lease of who asked for it has ended"

@@ -4,7 +4,7 @@ Whatever happens is told to the `Authority`; what follows is done by `_act`: sto
 the record in that of the disk, all else in the loop.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
@@ -260,14 +260,20 @@ class StopControl:
     # Enabling; in the loop.
 
     def enable(
-        self, who: str, globs: list[str] | None, objection: Callable[[list[str]], str | None]
+        self,
+        who: str,
+        globs: list[str] | None,
+        objection: Callable[[], str | None],
+        on_trial: Callable[[Sequence[str]], str | None],
     ) -> "Future[messages.Enabled]":
         """Enable the joints that the globs mean, as long as there is no `objection`.
 
+        `on_trial` says why the end of a trial could not be written back to a drive that is enabled.
+
         Raises:
-            RpcError: not_allowed to an observer; stopped while a stop is held; wrong_state while a reset or
-                another enabling is under way; unavailable where it cannot be journaled, as the future's
-                error.
+            RpcError: not_allowed to an observer; trial_pending; stopped while a stop is held; wrong_state
+                while a reset or another enabling is under way; unavailable where it cannot be journaled, as
+                the future's error.
 
         """
         if self._config.gateway.role is not Role.MASTER:
@@ -277,11 +283,14 @@ class StopControl:
             )
         check_globs("joint", self.drives, globs, self._absent)
         chosen = {name: drive for name, drive in self.drives.items() if matches(name, globs)}
+        pending = on_trial(list(chosen))
+        if pending is not None:
+            raise refuse(Kind.TRIAL_PENDING, pending)
         number = self._begin(Input.ENABLE)
 
         def objects() -> str | None:
             overtaken = None if self.authority.is_newest(number) else self._hold_words()
-            return overtaken or objection(list(chosen))
+            return overtaken or objection() or on_trial(list(chosen))
 
         enabling = Enabling(self._loop, chosen, who, objects, self._journal)
         answer = self._explained(who, list(chosen), enabling)
