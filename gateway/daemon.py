@@ -81,6 +81,7 @@ class Daemon:
             self._loop.run()
         finally:
             self._intake.end()
+            self._service.close()
             if self._told:
                 self._listener.close()
             if self._classic is not None:

@@ -10,6 +10,7 @@ from gateway import __version__, messages, wire
 from gateway.boot import boot_id
 from gateway.budget import Budget
 from gateway.config import RobotConfig
+from gateway.first_stop import FirstStop
 from gateway.futures import gather, then
 from gateway.loop import Loop
 from gateway.modules.resource import RESOURCE_CHANNELS
@@ -18,6 +19,7 @@ from gateway.registry import MODULES, Module, Registry, Spec
 from gateway.session import Answer, Session
 from gateway.sources import channel_info, check_globs, merge, narrow
 from gateway.standing import Standing
+from gateway.stop_lines import STOP
 from gateway.streams import Streams
 
 if TYPE_CHECKING:
@@ -62,6 +64,7 @@ class Service:
         self._config = config
         self._loop = loop
         self._boot_id = boot_id()
+        self._first_stop = FirstStop(config)
         self._guard_problem = "it has not started yet"
         self._own: Mapping[str, Callable[[Session, Any], Answer]] = {
             "hello": self._hello,
@@ -86,6 +89,10 @@ class Service:
     def _guard_failed(self, why: str) -> None:
         self._guard_problem = why
         log.critical("the guard does not run: %s", why)
+
+    def close(self) -> None:
+        """When the loop has ended."""
+        self._first_stop.join()
 
     def objection(self) -> str | None:
         """Why the gateway must not end now, in words; `None` where it may."""
@@ -122,6 +129,8 @@ class Service:
         own = self._own.get(request.method)
         if own is not None:
             return own(session, params)
+        if request.method == STOP and self.registry.running("control") is None:
+            self._first_stop.begin()
         module = self._use(MODULE_OF[request.method], session)
         return then(module, lambda running: running.handlers[request.method](session, params))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.frames import REMOTE, wire_id
+from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.sdo_channel import Interrupted, SdoChannel
@@ -29,7 +29,7 @@ T = TypeVar("T")
 FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
-EMCY, SDO_REQUEST, SDO_RESPONSE = 0x080, 0x600, 0x580
+EMCY = 0x080
 
 
 class NodeUser(Protocol):
@@ -80,8 +80,7 @@ class Node(BusUser):
         self._booting: Future[None] | None = None
         self._retry_s = FIRST_RETRY_S
         self._retry_ns = 0
-        sdo_ids = times.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
-        self._request_id, response_id = map(wire_id, sdo_ids)
+        self._request_id, response_id = times.sdo_ids(node_id)
         self.channel = SdoChannel(
             f"node {node_id} on {bus.name}",
             _Requests(bus, self._request_id),

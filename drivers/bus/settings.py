@@ -6,6 +6,10 @@ from typing import Annotated, Any
 
 import msgspec
 
+from drivers.bus.frames import wire_id
+
+SDO_REQUEST, SDO_RESPONSE = 0x600, 0x580  # of the predefined connection set (CiA 301 §7.3.3)
+
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NodeId = Annotated[int, msgspec.Meta(ge=1, le=127)]
 CobId = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
@@ -48,6 +52,11 @@ class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     sdo_cob_ids: tuple[CobId, CobId] | None = None  # request, response; None: 600h and 580h + node id
     heartbeat_timeout_s: Positive | None = None  # None: 2.5 times what the device says in 1017h
     guard_time_s: Positive | None = None  # node guarding by us, for a device without heartbeat; master only
+
+    def sdo_ids(self, node_id: int) -> tuple[int, int]:
+        """The identifiers of its SDO channel, of requests and of responses, with their flags."""
+        request, response = self.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
+        return wire_id(request), wire_id(response)
 
 
 class DeviceSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=True):

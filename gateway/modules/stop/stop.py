@@ -57,12 +57,15 @@ class StopAnswers:
         return self._answer_in_time(stops, last, kept or done(None))
 
     def _once_more(self, name: str, first: "Future[Report]") -> "Future[Report]":
-        """On a cold start the first attempt may come before the bus is open."""
+        """On a cold start the first attempt may come before the bus is open; a confirmed one is enough."""
         ready = self._when_ready(name)
         if ready.done():
             return first
-        both = gather({"first": then(first, lambda _report: None), "ready": ready})
-        return then(both, lambda _both: first if _is_confirmed(first) else self._targets[name].stop())
+
+        def again(_tried: object) -> "Future[Report]":
+            return first if _is_confirmed(first) else then(ready, lambda _none: self._targets[name].stop())
+
+        return then(gather({"first": first}), again)
 
     def _last_resort(self, found: Mapping[str, Report | Exception]) -> dict[str, Report]:
         reports = {name: _report(one) for name, one in found.items()}
