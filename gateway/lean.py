@@ -3,6 +3,7 @@
 import contextlib
 import sys
 from collections.abc import Iterator
+from types import ModuleType
 
 
 @contextlib.contextmanager
@@ -19,3 +20,27 @@ def without(*names: str) -> Iterator[None]:
     finally:
         for name in absent:
             sys.modules.pop(name, None)
+
+
+@contextlib.contextmanager
+def standing_in(name: str) -> Iterator[None]:
+    """While inside, importing `name` gives a module whose classes are empty, where it is not there already.
+
+    For what a library needs for a part of it that nobody uses: canopen reads an EDS without python-can.
+    Afterwards it can be imported itself.
+    """
+    if name in sys.modules:
+        yield
+        return
+    sys.modules[name] = _StandIn(name)
+    try:
+        yield
+    finally:
+        del sys.modules[name]
+
+
+class _StandIn(ModuleType):
+    def __getattr__(self, name: str) -> type:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return type(name, (), {})

@@ -37,6 +37,11 @@ _OWN: dict[str, Callable[[CanSettings], Transport]] = {
 }
 
 
+def needs_python_can(settings: CanSettings) -> bool:
+    """Whether the interface is opened by python-can, and not by a transport of ours."""
+    return settings.interface not in _OWN or (settings.interface == "socketcan" and bool(settings.more))
+
+
 def open_transport(settings: CanSettings) -> Transport:
     """Open the interface that `settings` name; imports only what it needs. Raises `Unavailable`."""
     return _OWN.get(settings.interface, _python_can)(settings)

@@ -287,6 +287,18 @@ def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards
     assert done.stdout == "False\nTrue\n"
 
 
+def test_an_eds_is_read_without_python_can_which_can_be_imported_afterwards() -> None:
+    code = (
+        "import sys; from gateway.modules.assembly import _import_canopen; _import_canopen(with_can=False)\n"
+        "import eds; print(eds.load(eds.locate('joint_drive.eds', None), 2).product, 'can' in sys.modules)\n"
+        "import can; print(can.Bus.__module__)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.splitlines() == ["GWRMS joint drive False", "can.interface"]
+
+
 def test_a_port_in_use_is_named_with_what_to_do() -> None:
     with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
