@@ -4,6 +4,7 @@ A module's code is imported only when it starts. Starting and stopping take thre
 files are read and devices are opened and closed there, and no client waits for another's devices.
 """
 
+import contextlib
 import gc
 import importlib
 import logging
@@ -63,6 +64,11 @@ class Spec:
 
     path: str
     needs: tuple[str, ...] = ()
+
+    def preload(self) -> None:
+        """Import its code already; what is wrong with it is told when it starts."""
+        with contextlib.suppress(Exception):
+            importlib.import_module(self.path.partition(":")[0])
 
 
 # A module stands below those it needs.
@@ -218,8 +224,12 @@ class Registry:
         there = {k: v for k, v in needs.items() if v is not None}
         context = Context(self._config, self._loop, there, keep, self._stops_by)
 
+        waiting = [self._slots[other].spec for other in self._standing_on(name) if self._is_wanted(other)]
+
         def work() -> None:
             try:
+                for spec in waiting:  # now, because devices that come up would slow it down
+                    spec.preload()
                 path, _, class_name = slot.spec.path.partition(":")
                 module: Module = getattr(importlib.import_module(path), class_name)(context)
                 module.start()
