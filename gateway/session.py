@@ -212,6 +212,8 @@ class Session:
 
     def _end_input(self) -> None:
         """Nothing more is asked: what was asked is answered, as far as that can be soon."""
+        if self._input_ended:
+            return
         self._input_ended = True
         if self._end is not None:
             self._end.cancel()

@@ -153,8 +153,10 @@ class ResourceModule:
     def _meter_of(self, session: "Session", method: str) -> "Meter":
         meter = self._meters.get((session, method))
         if meter is None:
-            meter = self._meters[session, method] = self.meter()
-            session.on_close(lambda: self._forget(session, method))
+            meter = self.meter()
+            if not session.closed:
+                self._meters[session, method] = meter
+                session.on_close(lambda: self._forget(session, method))
         return meter
 
     def _forget(self, session: "Session", method: str) -> None:

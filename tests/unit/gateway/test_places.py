@@ -2,6 +2,7 @@
 
 import socket
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -47,6 +48,32 @@ def test_beyond_the_last_place_all_else_is_refused_and_ends_the_connection(
     assert late.line() is None
     full[0].close()
     until(lambda: _is_served(connect), "a place is free again")
+
+
+def test_who_is_refused_and_goes_on_asking_is_ended_all_the_same(
+    connect: Connect, full: list[Client], bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "LAST_ANSWERS_S", 0.3)
+    bench.left.hanging = Future()
+    late = connect()
+    late.request("robot.stop")
+    late.socket.settimeout(0.05)
+    told = b""
+
+    def ended() -> bool:
+        nonlocal told
+        try:
+            late.request("clock.read")
+            data = late.socket.recv(65536)
+        except TimeoutError:
+            return False
+        except OSError:
+            return True
+        told += data
+        return not data
+
+    until(ended, "the connection ends")
+    assert b'"held"' not in told  # it did not last until the stop was answered
 
 
 def _is_served(connect: Connect) -> bool:

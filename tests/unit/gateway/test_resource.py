@@ -12,12 +12,15 @@ from typing import Any
 import psutil
 import pytest
 
+from gateway.loop import Loop
 from gateway.messages import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
 from gateway.modules import extras, host
 from gateway.modules.counters import CoreTimes, ProcessTimes
 from gateway.modules.host import Meter
 from gateway.modules.redact import redact
-from tests.unit.gateway.harness import DEADLINE_S, Client
+from gateway.modules.resource import ResourceModule
+from gateway.registry import Context
+from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config
 
 MB = 1 << 20
 
@@ -282,6 +285,20 @@ def test_nobody_waits_while_somebody_s_table_is_made(
         assert asker.answer(asked)
         looking.clear()
         seen.clear()
+
+
+def test_nothing_is_kept_of_who_had_gone_when_it_was_measured(tmp_path: Path) -> None:
+    loop = Loop()
+    module = ResourceModule(Context(config(tmp_path, HEAD), loop, {}, lambda _on: None))
+    module.start()
+    gone: Any = type("Gone", (), {"closed": True, "cpu_ns": 0})()
+    measured = module.measure(gone, "status.snapshot")
+    measured.add_done_callback(lambda _snapshot: loop.stop())
+    loop.run()
+    module.stop()
+    loop.close()
+    assert measured.result().cpu.per_core
+    assert module._meters == {}
 
 
 def test_one_asker_s_looks_are_taken_one_after_the_other(client: Client) -> None:
