@@ -15,7 +15,7 @@ from gateway import intake, wire
 from gateway.daemon import Daemon
 from gateway.intake import Heard, Inlet
 from gateway.listeners import listen
-from gateway.loop import Loop
+from gateway.loop import HANGUP, READ, Loop
 from gateway.messages import Stopped
 from gateway.registry import Context, Spec
 from gateway.session import Session
@@ -363,16 +363,19 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
     inlet.receiver = heard.append
     client.setblocking(False)
     rest = CLOCK % 1 * 2 * intake.QUEUED_LINES + STOP % b"paced"
+    watched_for: set[int] = set()
 
     def paced() -> bool:
         nonlocal rest
         with contextlib.suppress(BlockingIOError):
             rest = rest[client.send(rest) :] if rest else rest
         front._turn()
+        watched_for.add(front._watched[accepted.fileno()][0])
         return bool(asked)
 
     front.call_later(DEADLINE_S, lambda: None)
     until(paced, "the stop is read")
+    assert watched_for == {READ, HANGUP}
     while (patience_s := loop._patience_s()) == 0.0:
         loop._turn()
     assert patience_s is None
