@@ -1,5 +1,6 @@
 """How one drive is stopped: by quick stop; where that is not confirmed, by what `[stop] fallback` allows."""
 
+import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import replace
@@ -26,6 +27,11 @@ class Stopper:
     @property
     def running(self) -> bool:
         return self._stops.running
+
+    @property
+    def idle_s(self) -> float:
+        """How long no stop of it has been under way; 0 while one is."""
+        return 0.0 if self.running else time.monotonic() - self._stops.ended
 
     def stop(self, *, wake: bool = True) -> "Future[Report]":
         """Ask for it; the fallback that a drive can confirm follows by itself."""

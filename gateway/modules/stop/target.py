@@ -1,6 +1,7 @@
 """What a stop goes to, drives and controllers alike: each can be asked, and reports what is known then."""
 
 import threading
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -53,6 +54,7 @@ class OneAtATime:
         self._lock = threading.Lock()
         self._running: Future[Report] | None = None
         self._next: Future[Report] | None = None
+        self.ended = 0.0  # when the last one did, on the monotonic clock
 
     @property
     def running(self) -> bool:
@@ -73,6 +75,7 @@ class OneAtATime:
 
     def _ended(self, report: "Future[Report]", found: "Future[Report]") -> None:
         with self._lock:
+            self.ended = time.monotonic()
             following = self._running = self._next
             self._next = None
         pass_on(found, report)

@@ -24,7 +24,9 @@ from gateway.modules.stop.target import Target, stop_all
 
 log = logging.getLogger(__name__)
 
-LOOK_S = 0.25  # how often drives are looked at that say nothing by themselves
+# How often drives are looked at that say nothing by themselves; how long one that is not seen is left between
+# two stops, too, so that it can come up and tell: an unconfirmed stop keeps its node busy to its end.
+LOOK_S = 0.25
 CONTROLLERS_S = 1.0  # how often a controller is read whether it is still stopped
 SAY_AGAIN_S = 5.0  # how often one target that is started again and again is told
 
@@ -105,7 +107,7 @@ class Watch:
         value, stamp_ns = (None, None) if index is None else stopper.drive.latest.read(index, now_ns)
         if value is not None and is_enabled(value):
             self._seen(name, stamp_ns or now_ns)
-        elif value is None and asks and not stopper.running:
+        elif value is None and asks and stopper.idle_s >= LOOK_S:
             stopper.stop()
 
     def _read(self, name: str, controller: Controller) -> None:
