@@ -24,8 +24,8 @@ from gateway.modules.stop.target import Target, stop_all
 
 log = logging.getLogger(__name__)
 
-# How often drives are looked at that say nothing by themselves; how long one that is not seen is left between
-# two stops, too, so that it can come up and tell: an unconfirmed stop keeps its node busy to its end.
+# How often drives are looked at that say nothing by themselves; how long a node is left between two stops of
+# what is not seen, too, so that it can come up and tell: an unconfirmed stop keeps it busy to its end.
 LOOK_S = 0.25
 CONTROLLERS_S = 1.0  # how often a controller is read whether it is still stopped
 SAY_AGAIN_S = 5.0  # how often one target that is started again and again is told
@@ -83,8 +83,11 @@ class Watch:
         if not self._authority.held:
             return
         asks = self._authority.state.phase not in _LED
+        unseen: list[Stopper] = []
         for name, stopper in self._stoppers.items():
-            self._look_at(name, stopper, asks=asks)
+            self._look_at(name, stopper, unseen, asks=asks)
+        for stopper in unseen:
+            stopper.stop()
         if time.monotonic() >= self._controllers_due:
             self._controllers_due = time.monotonic() + CONTROLLERS_S
             for name, controller in self._controllers.items():
@@ -101,14 +104,19 @@ class Watch:
             self._silent_until[name] = time.monotonic() + SAY_AGAIN_S
             self._tell(name, self._times[name])
 
-    def _look_at(self, name: str, stopper: Stopper, *, asks: bool) -> None:
+    def _is_left_alone(self, stopper: Stopper) -> bool:
+        """Whether no axis of its node has been asked to stop for a while."""
+        node = stopper.drive.node
+        return all(one.idle_s >= LOOK_S for one in self._stoppers.values() if one.drive.node is node)
+
+    def _look_at(self, name: str, stopper: Stopper, unseen: list[Stopper], *, asks: bool) -> None:
         index = _statusword(stopper.drive)
         now_ns = time.monotonic_ns()
         value, stamp_ns = (None, None) if index is None else stopper.drive.latest.read(index, now_ns)
         if value is not None and is_enabled(value):
             self._seen(name, stamp_ns or now_ns)
-        elif value is None and asks and stopper.idle_s >= LOOK_S:
-            stopper.stop()
+        elif value is None and asks and self._is_left_alone(stopper):
+            unseen.append(stopper)
 
     def _read(self, name: str, controller: Controller) -> None:
         if name not in self._looking and not controller.running:
