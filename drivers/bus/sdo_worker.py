@@ -115,7 +115,10 @@ class SdoWorker:
         self.channel.wake()
 
     def repeat(self, period_s: float, job: Job[object]) -> Callable[[], None]:
-        """Do `job` every `period_s`, never twice at once; returns how to end it. Its errors are its own."""
+        """Do `job` every `period_s`, never twice at once; returns how to end it. Its errors are its own.
+
+        It goes on after urgent jobs: beside one stop after another it still gets somewhere.
+        """
         repeated = _Repeated(period_s, job, time.monotonic())
         with self._changed:
             self._repeated.append(repeated)
@@ -197,7 +200,7 @@ class SdoWorker:
         now = time.monotonic()
         for repeated in self._repeated:
             if repeated.due <= now and (repeated.task is None or repeated.task.future.done()):
-                repeated.task = _Task(USUAL, next(self._numbers), repeated.job)
+                repeated.task = _Task(USUAL, next(self._numbers), repeated.job, lambda: True)
                 heapq.heappush(self._tasks, repeated.task)
                 repeated.due = max(repeated.due + repeated.period_s, now)
         waiting = [r.due for r in self._repeated if r.task is None or r.task.future.done()]

@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 # How often drives are looked at that say nothing by themselves; how long a node is left between two stops of
 # what is not seen, too, so that it can come up and tell: an unconfirmed stop keeps it busy to its end.
 LOOK_S = 0.25
+AT_LEAST_S = 1.0  # how often what is not seen is asked to stop, whatever keeps its node busy
 CONTROLLERS_S = 1.0  # how often a controller is read whether it is still stopped
 SAY_AGAIN_S = 5.0  # how often one target that is started again and again is told
 
@@ -105,9 +106,11 @@ class Watch:
             self._tell(name, self._times[name])
 
     def _is_left_alone(self, stopper: Stopper) -> bool:
-        """Whether no axis of its node has been asked to stop for a while."""
+        """Whether no axis of its node has been asked to stop for a while; or itself for long."""
         node = stopper.drive.node
-        return all(one.idle_s >= LOOK_S for one in self._stoppers.values() if one.drive.node is node)
+        return stopper.idle_s >= AT_LEAST_S or all(
+            one.idle_s >= LOOK_S for one in self._stoppers.values() if one.drive.node is node
+        )
 
     def _look_at(self, name: str, stopper: Stopper, unseen: list[Stopper], *, asks: bool) -> None:
         index = _statusword(stopper.drive)
