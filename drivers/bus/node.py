@@ -28,6 +28,7 @@ T = TypeVar("T")
 
 FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
+DOUBT_S = 0.1  # how often a node is asked that answers twice, to see when it does so no more
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 EMCY = 0x080
 
@@ -40,6 +41,10 @@ class NodeUser(Protocol):
 
     def forget(self) -> None:
         """What was read and received is no longer true: the node rebooted or its bus is gone."""
+
+
+def _ask_type(sdo: SdoChannel) -> None:
+    sdo.upload(0x1000, 0, attempts=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,7 @@ class Node(BusUser):
         self._guard_s = times.guard_time_s if bus.role is Role.MASTER else None
         self._guard_ns = 0
         self._guard_problem: str | None = None
+        self._doubt_ns = 0
         self._generation = 0  # counts what makes an earlier boot worthless
         self._booted_generation = 0  # of the boot that is under way, or was the last
         self._booting: Future[None] | None = None
@@ -219,6 +225,9 @@ class Node(BusUser):
         if self._guard_s is not None and self.ready and now_ns >= self._guard_ns:
             self._guard_ns = now_ns + round(self._guard_s * 1e9)
             self._ask_life(now_ns)
+        if self.ready and self.channel.doubled and now_ns >= self._doubt_ns:
+            self._doubt_ns = now_ns + round(DOUBT_S * 1e9)
+            self.worker.submit(_ask_type)
 
     def _ask_life(self, now_ns: int) -> None:
         """Node guarding: the answer is the node's state and counts as a heartbeat (CiA 301 §7.2.8)."""

@@ -203,3 +203,18 @@ def test_a_device_whose_answers_cannot_be_assigned_is_not_written(gait: CanDevic
         gait.node.download(0x2002, 0, b"\xa4\x01").result(WAIT_S)
         gait.stop()
         assert [write[0] for write in fake.writes] == [0x2002]
+
+
+def test_a_node_that_answers_once_again_is_trusted_though_nobody_asks_it(
+    gait: CanDevice, channel: str
+) -> None:
+    with FakeNode(channel, 5, dict(OBJECTS)) as fake:
+        gait.start()
+        until(lambda: gait.node.ready)
+        fake.repeat_replies = 2
+        for _ in range(4):
+            gait.node.upload(*STEP).result(WAIT_S)
+        until(lambda: gait.node.distrust == TWO)
+        fake.repeat_replies = 1
+        until(lambda: gait.node.distrust is None, within_s=30)
+        gait.stop()
