@@ -5,6 +5,7 @@ reads, writes, reverts, stops or resets ever enables a drive; the journal tells 
 """
 
 import tempfile
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,22 @@ class ControlMachine(RuleBasedStateMachine):
     def try_(self, who: str, wanted: dict[str, int], aborts_at: int | None) -> None:
         self.write(self.person(who), wanted, True, aborts_at)
 
+    @rule(data=st.data())
+    def try_one(self, data: st.DataObject) -> None:
+        """Most likely what is on trial already, which it takes over then."""
+        self.try_by_whoever_may(data, self.trials[-1].written if self.trials else counts)
+
+    @precondition(lambda self: self.at_rest)
+    @rule(data=st.data())
+    def try_what_needs_rest(self, data: st.DataObject) -> None:
+        self.try_by_whoever_may(data, [TOE])
+
+    def try_by_whoever_may(self, data: st.DataObject, names: Iterable[str]) -> None:
+        name = data.draw(st.sampled_from(sorted(names)))
+        if self.lease is None:
+            self.acquire("ada")
+        self.write(self.person("whoever has the lease"), {name: data.draw(counts[name])}, True, None)
+
     @rule(who=people, wanted=changes, aborts_at=aborts)
     def write_plainly(self, who: str, wanted: dict[str, int], aborts_at: int | None) -> None:
         self.write(self.person(who), wanted, False, aborts_at)
@@ -197,8 +214,10 @@ class ControlMachine(RuleBasedStateMachine):
         if not on:
             self.drives_rest()
 
-    @rule(name=st.sampled_from([STEP, CYCLE, TOE]), data=st.data())
-    def somebody_else_writes(self, name: str, data: st.DataObject) -> None:
+    @rule(data=st.data())
+    def somebody_else_writes(self, data: st.DataObject) -> None:
+        tried = self.trials[-1].written if self.trials else OBJECTS
+        name = data.draw(st.sampled_from(sorted(tried)))
         self.values[name] = data.draw(counts[name])
         self.bench.gait.node.objects[OBJECTS[name]] = self.values[name].to_bytes(2, "little")
         for trial in [one for one in self.trials if one.late and not self.must_wait(one)]:
@@ -354,6 +373,14 @@ class ControlMachine(RuleBasedStateMachine):
     def is_late_end(self, entry: dict[str, Any]) -> bool:
         return entry["what"] == "taken back" and entry["write"] in self.late
 
+    def described(self) -> dict[int, dict[str, int]]:
+        """The trials, and what is written by them."""
+        trials = self.clients["watcher"].call("robot.describe")["trials"]
+        return {
+            one["write"]: {name: round(value * 1000) for name, value in one["values"].items()}
+            for one in trials
+        }
+
     def stop_held(self) -> bool:
         held: bool = self.clients["watcher"].call("robot.describe")["stop"]["held"]
         return held
@@ -362,12 +389,9 @@ class ControlMachine(RuleBasedStateMachine):
 
     @invariant()
     def devices_and_trials_are_as_the_model_says(self) -> None:
-        expected = [trial.number for trial in self.trials]
+        expected = {trial.number: trial.written for trial in self.trials}
         watcher = self.clients["watcher"]
-        until(
-            lambda: [one["write"] for one in watcher.call("robot.describe")["trials"]] == expected,
-            f"trials are {expected}",
-        )
+        until(lambda: self.described() == expected, f"trials are {expected}")
         assert {name: self.held(name) for name in OBJECTS} == self.values
         ended = self.late - {trial.number for trial in self.trials}
         entries = watcher.call("journal.tail", n=1000)["entries"]
@@ -396,8 +420,8 @@ class ControlMachine(RuleBasedStateMachine):
 
 
 ControlMachine.TestCase.settings = settings(
-    max_examples=20,
-    stateful_step_count=40,
+    max_examples=40,
+    stateful_step_count=50,
     deadline=None,
     suppress_health_check=list(HealthCheck),
     phases=(Phase.explicit, Phase.reuse, Phase.generate),  # making a failure smaller takes minutes here
