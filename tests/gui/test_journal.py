@@ -62,6 +62,9 @@ def test_every_way_that_a_write_can_end_is_told(journal: RobotsJournal) -> None:
     journal.written(
         {STEP: 0.43}, {STEP: 0.5}, "write taken back", result="no", outcome={STEP: "it holds 0.429"}
     )
+    claimed = journal.written({STEP: 0.43}, {STEP: 0.5}, "trial begun")
+    outcome = {STEP: "left as the stop set it"}
+    journal.say("claimed by the stop", "gateway", write=claimed, outcome=outcome)
     journal.say("write refused", after={STEP: 9.0}, result="above the maximum 0.6 m")
     journal.say("write", write=99, before={STEP: 0.43}, after={STEP: 0.45}, trial_s=None)
     audit.take(journal.told().journal.entries)
@@ -69,10 +72,11 @@ def test_every_way_that_a_write_can_end_is_told(journal: RobotsJournal) -> None:
         ("trial of 20 s", STEP, "kept after its trial"),
         ("trial of 20 s", STEP, "taken back: taken back"),
         ("write", STEP, "write taken back: it holds 0.429"),
+        ("trial of 20 s", STEP, "claimed by the stop: left as the stop set it"),
         ("write", STEP, "refused: above the maximum 0.6 m"),
         ("write", STEP, OPEN),
     ]
-    assert [act.read_back for act in acts(audit.entries)] == [0.43, 0.5, None, None, None]
+    assert [act.read_back for act in acts(audit.entries)] == [0.43, 0.5, None, 0.5, None, None]
 
 
 def test_stores_and_stops_are_told_too(journal: RobotsJournal) -> None:

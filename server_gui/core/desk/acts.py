@@ -100,6 +100,8 @@ _ENDINGS: Final[Mapping[str, Callable[[Act, Entry], Act]]] = {
     "taken back": _other_end,
     "NOT TAKEN BACK yet": _other_end,
     "write taken back": _other_end,
+    "claimed by the stop": _other_end,
+    "trial NOT confirmed": _told,
     "ROLL-BACK FAILED": _other_end,
     "store done": _told,
     "store FAILED": _told,

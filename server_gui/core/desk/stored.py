@@ -94,6 +94,7 @@ _EFFECTS: Final[Mapping[str, Callable[[_Reading, Entry], None]]] = {
     "taken back": _Reading.taken_back,
     "NOT TAKEN BACK yet": _Reading.taken_back,
     "write taken back": _Reading.taken_back,
+    "claimed by the stop": _Reading.taken_back,
     "ROLL-BACK FAILED": _Reading.taken_back,
     "store": _Reading.storing,
     "store done": _Reading.stored,
