@@ -12,6 +12,7 @@ FRAME_NS = 130_000  # at 1 Mbit/s
 QUEUE = 10  # frames that an interface takes when nobody acknowledges them
 SEND_TIMEOUT_NS = 100_000_000  # how long a full interface keeps a blocking sender
 KEPT = 4000  # frames
+NEVER_NS = 1 << 62
 
 
 class Sent(NamedTuple):
@@ -42,6 +43,7 @@ class Wire:
         self.listeners: list[Listener] = []
         self.frames: deque[Sent] = deque(maxlen=KEPT)
         self.transport: Transport | None = None
+        self.takes_since_ns = NEVER_NS  # since when it takes the gateway's frames
         self._free_ns = 0
         self._waiting: deque[tuple[str, int, bytes]] = deque()  # in the gateway's interface
 
@@ -61,12 +63,14 @@ class Wire:
     def block(self, blocked: bool) -> None:
         """A blocked bus sends what waited as soon as it can."""
         self.blocked = blocked
+        self._look()
         while not blocked and self._waiting:
             self.send(*self._waiting.popleft())
 
     def lose(self, gone: bool) -> None:
         """Take the gateway's interface away, or bring it back."""
         self.gone = gone
+        self._look()
         self._waiting.clear()
         if self.transport is not None:
             self.transport.wake()
@@ -76,7 +80,16 @@ class Wire:
         if self.gone:
             raise Unavailable(f"interface {self.name} is not there")
         self.transport = Transport(self)
+        self._look()
         return self.transport
+
+    def disconnect(self) -> None:
+        self.transport = None
+        self._look()
+
+    def _look(self) -> None:
+        takes = self.transport is not None and not self.blocked and not self.gone
+        self.takes_since_ns = self.runtime.now_ns if takes else NEVER_NS
 
     def _arrive(self, sent: Sent) -> None:
         self.frames.append(sent)
@@ -126,7 +139,7 @@ class Transport:
     def close(self) -> None:
         self._closed = True
         if self._wire.transport is self:
-            self._wire.transport = None
+            self._wire.disconnect()
 
     def take(self, frame: tuple[int, int, bytes]) -> None:
         if self._accepted is None or frame[1] in self._accepted:

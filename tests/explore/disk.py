@@ -43,6 +43,12 @@ class Disk:
         """The only process has ended: its locks are free."""
         self.locks = {}
 
+    def make_durable(self) -> None:
+        """Everything as it is now."""
+        self.durable = dict(self.files)
+        for file in self.files.values():
+            file.durable = bytes(file.data)
+
     def lose_power(self) -> None:
         """Only what was made durable is left."""
         self.files = dict(self.durable)

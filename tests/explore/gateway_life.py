@@ -98,7 +98,7 @@ class Life:
         self.world.runtime.kill(self)
         self.world.disk.lose_process()
         for one in self.world.wires.values():
-            one.transport = None
+            one.disconnect()
 
     def _take(self) -> None:
         for arrival in self._arrivals.take():

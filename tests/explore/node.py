@@ -56,11 +56,12 @@ class Written:
 
 
 class Device:
-    """One node on a wire. `told_read` hears what is answered to a read, in the moment it is on the bus."""
+    """One node on a wire. `told` hears what is answered to a read, when it is on the bus, and when it was so."""
 
     def __init__(self, wire: Wire, name: str, node_id: int, entries: dict[Address, Entry]) -> None:
         self.wire, self.name, self.node_id, self.entries = wire, name, node_id, entries
         self.faults = Faults()
+        self.told: Callable[[Device, Address, int, bytes], object] = lambda *_read: None
         self.values: dict[Address, bytes] = {}
         self.writers: dict[Address, Written] = {}
         self.nmt = OPERATIONAL
@@ -131,7 +132,7 @@ class Device:
         if can_id == SDO_REQUEST + self.node_id and not self.faults.no_sdo and self.nmt != STOPPED:
             answer = self._serve(data)
             if answer is not None:
-                self._answer(answer)
+                self._answer(answer, self.wire.runtime.now_ns)
         elif can_id == RPDO1 + self.node_id and self.nmt == OPERATIONAL:
             self.on_rpdo(data)
         elif can_id == 0 and data[1] in (0, self.node_id) and data[0] in (1, 2):
@@ -154,7 +155,7 @@ class Device:
         self.writers = {}
         self.on_power()
 
-    def _answer(self, data: bytes) -> None:
+    def _answer(self, data: bytes, asked_ns: int) -> None:
         """In order, each as late as the device is now."""
         runtime, faults = self.wire.runtime, self.faults
         if faults.lose:
@@ -162,7 +163,13 @@ class Device:
             return
         due_ns = max(self._answer_ns, runtime.now_ns + round((ANSWER_S + faults.late_s) * 1e9))
         self._answer_ns = due_ns
-        send: Callable[[], None] = lambda: self._send(SDO_RESPONSE + self.node_id, data)  # noqa: E731
+
+        def send() -> None:
+            self._send(SDO_RESPONSE + self.node_id, data)
+            command, index, subindex = struct.unpack_from("<BHB", data)
+            if command & 0xE0 == 0x40 and self.wire.transport is not None:
+                self.told(self, (index, subindex), asked_ns, data[4 : 8 - (command >> 2 & 3)])
+
         runtime.call_at(due_ns, send)
         if faults.doubled:
             runtime.call_at(due_ns + round(DOUBLED_AFTER_S * 1e9), send)

@@ -18,7 +18,7 @@ START_NS = 1_000_000_000_000
 MOST_STEPS_AT_ONCE = 100_000  # without time going on
 
 
-class Spinning(Exception):
+class Spinning(BaseException):
     """Somebody does something again and again and never waits."""
 
 
@@ -71,9 +71,19 @@ class Runtime:
     def point(self) -> None:
         """Here something may come in between."""
         self.steps += 1
+        if self.steps > self._spinning_at:
+            raise Spinning(
+                f"{self.current and self.current.name} goes on and on at {self.now_ns / 1e9:.6f} s"
+            )
         if self.steps >= self.attention and self.current is not None:
             self.ready.appendleft(self.current)
             self._to_hub()
+
+    def end_of(self, timeout_ns: int | None) -> int | None:
+        return None if timeout_ns is None else self.now_ns + timeout_ns
+
+    def left_ns(self, until_ns: int | None) -> int | None:
+        return None if until_ns is None else until_ns - self.now_ns
 
     def block(self, timeout_ns: int | None) -> bool:
         """Wait for `wake`, at most so long; whether it came."""
@@ -86,12 +96,14 @@ class Runtime:
         self._to_hub()
         return task.woken
 
-    def wake(self, task: Task) -> None:
-        """Let it run, if it waits."""
-        if task.token:
-            task.token = 0
-            task.woken = True
-            self.ready.append(task)
+    def wake(self, task: Task) -> bool:
+        """Let it run, if it waits; whether it does."""
+        if not task.token:
+            return False
+        task.token = 0
+        task.woken = True
+        self.ready.append(task)
+        return True
 
     # For the hub
 
@@ -120,7 +132,7 @@ class Runtime:
     def run_until(self, due_ns: int, ended: Callable[[], bool] = lambda: False) -> bool:
         """Let everything happen until then, or until it has `ended`; whether it has."""
         while not ended():
-            self.steps += 1
+            self.point()
             if self.steps >= self.attention:
                 self.at_attention()
             if self.at_boundary is not None:
@@ -155,8 +167,6 @@ class Runtime:
             self.ready.append(what)
 
     def _switch_to(self, task: Task) -> None:
-        if self.steps > self._spinning_at:
-            raise Spinning(f"{task.name} goes on and on at {self.now_ns / 1e9:.6f} s")
         self.current = task
         task.greenlet.switch()
         self.current = None

@@ -1,5 +1,7 @@
 """`threading`, `queue` and thread pools over the runtime: as the standard library says, but deterministic."""
 
+import contextlib
+import math
 import queue
 import threading
 from collections import deque
@@ -43,7 +45,8 @@ class _OnRuntime:
 
 
 def _ns(timeout_s: float | None) -> int | None:
-    return None if timeout_s is None or timeout_s < 0 else round(timeout_s * 1e9)
+    """Never 0 for a time that is left, however short: who waits for its end would wait for ever."""
+    return None if timeout_s is None or timeout_s < 0 else math.ceil(timeout_s * 1e9)
 
 
 class _Waiters(_OnRuntime):
@@ -61,13 +64,13 @@ class _Waiters(_OnRuntime):
         self._tasks.append(task)
         if self.runtime.block(timeout_ns):
             return True
-        self._tasks.remove(task)
+        with contextlib.suppress(ValueError):  # somebody has tried to wake it in this very moment
+            self._tasks.remove(task)
         return False
 
     def wake(self, count: int = 1) -> None:
         while self._tasks and count > 0:
-            count -= 1
-            self.runtime.wake(self._tasks.popleft())
+            count -= self.runtime.wake(self._tasks.popleft())
 
 
 class Lock(_OnRuntime):
@@ -87,11 +90,9 @@ class Lock(_OnRuntime):
         if self._owner is me and self.reentrant:
             self._depth += 1
             return True
-        until_ns = None if timeout < 0 else runtime.now_ns + round(timeout * 1e9)
+        until_ns = self.runtime.end_of(_ns(timeout))
         while self._owner is not None:
-            if not blocking or not self._waiters.wait(
-                None if until_ns is None else until_ns - runtime.now_ns
-            ):
+            if not blocking or not self._waiters.wait(self.runtime.left_ns(until_ns)):
                 return False
         self._owner, self._depth = me, 1
         return True
@@ -156,10 +157,10 @@ class Condition(_OnRuntime):
             self._lock.take_again(depth)
 
     def wait_for(self, predicate: Callable[[], Any], timeout: float | None = None) -> Any:
-        until_ns = None if timeout is None else self.runtime.now_ns + round(timeout * 1e9)
+        until_ns = self.runtime.end_of(_ns(timeout))
         while not (found := predicate()):
-            left_s = None if until_ns is None else (until_ns - self.runtime.now_ns) / 1e9
-            if not self.wait(left_s):
+            left_ns = self.runtime.left_ns(until_ns)
+            if not self.wait(None if left_ns is None else left_ns / 1e9):
                 return predicate()
         return found
 
@@ -254,10 +255,9 @@ class SimpleQueue(_OnRuntime):
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
         self.runtime.point()
-        until_ns = None if timeout is None else self.runtime.now_ns + round(timeout * 1e9)
+        until_ns = self.runtime.end_of(_ns(timeout))
         while not self._items:
-            left_ns = None if until_ns is None else until_ns - self.runtime.now_ns
-            if not block or not self._waiters.wait(left_ns):
+            if not block or not self._waiters.wait(self.runtime.left_ns(until_ns)):
                 raise queue.Empty
         return self._items.popleft()
 

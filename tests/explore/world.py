@@ -124,6 +124,7 @@ class World:
         self.file = at(self.disk, FILE)
         self.records = at(self.disk, RECORDS)
         self.file.write_bytes(self._toml(guard, fallback).encode())
+        self.disk.make_durable()
         patching.install(self.runtime, self.disk, self._open_transport)
 
     def _toml(self, guard: str, fallback: str) -> str:
