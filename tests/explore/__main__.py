@@ -24,7 +24,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="explore-") as folder:
         scenes = tuple(SCENES[name] for name in options.scenes or SCENES)
         asked = Options(
-            options.seconds or FOR_EVER_S,
+            options.seconds,
             options.seed,
             options.depth,
             options.workers,
@@ -49,7 +49,7 @@ def _explore(options: Options) -> int:
     begun = time.monotonic()
     shared = Shared(options.workers)
     for number, scene in enumerate(options.scenes):
-        left_s = options.seconds - (time.monotonic() - begun)
+        left_s = (options.seconds or FOR_EVER_S) - (time.monotonic() - begun)
         until = time.monotonic() + left_s / (len(options.scenes) - number)
         for worker in [_spawn(worker, scene, options, shared, until) for worker in range(options.workers)]:
             os.waitpid(worker, 0)
@@ -88,7 +88,8 @@ def _replay(text: str) -> int:
 def _summary(shared: Shared, seconds: float, found: list[Found]) -> str:
     total = {what: shared.total(what) for what in Count}
     return (
-        f"{total[Count.ORDERS]} orders tried, {total[Count.STATES]} distinct states, {total[Count.RUNS]} runs "
+        f"{total[Count.ORDERS]} orders tried, {total[Count.STATES]} distinct states, "
+        f"{total[Count.RUNS]} runs "
         f"({total[Count.CUT]} cut), {total[Count.VIRTUAL_MS] / 3.6e6:.1f} virtual hours, "
         f"{seconds:.0f} s, {len(found)} violations"
     )

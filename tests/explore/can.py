@@ -23,6 +23,7 @@ class Sent(NamedTuple):
     sender: str
     can_id: int
     data: bytes
+    asked_ns: int = 0  # when its sender gave it to its interface
 
 
 class Listener(Protocol):
@@ -40,22 +41,31 @@ class Wire:
         self.runtime, self.name, self._told = runtime, name, told
         self.blocked = False  # nobody acknowledges: what is sent waits
         self.gone = False  # the gateway's interface is not there
+        self.breaks = False  # its next reception fails as nobody expects
         self.listeners: list[Listener] = []
         self.frames: deque[Sent] = deque(maxlen=KEPT)
         self.transport: Transport | None = None
         self.takes_since_ns = NEVER_NS  # since when it takes the gateway's frames
+        self.in_flight = 0  # frames that are on their way
         self._free_ns = 0
-        self._waiting: deque[tuple[str, int, bytes]] = deque()  # in the gateway's interface
+        self._waiting: deque[tuple[str, int, bytes, int]] = deque()  # in the gateway's interface
 
-    def send(self, sender: str, can_id: int, data: bytes) -> None:
+    def send(self, sender: str, can_id: int, data: bytes, asked_ns: int | None = None) -> None:
         """Anybody's frame; it is on the bus a moment later."""
+        asked_ns = self.runtime.now_ns if asked_ns is None else asked_ns
         if self.blocked:
             if sender == GATEWAY:
-                self._waiting.append((sender, can_id, data))
+                self._waiting.append((sender, can_id, data, asked_ns))
             return  # what devices could not send is old when the bus is back: they do not keep it
-        due_ns = max(self.runtime.now_ns, self._free_ns) + FRAME_NS
-        self._free_ns = due_ns
-        self.runtime.call_at(due_ns, lambda: self._arrive(Sent(due_ns, self.name, sender, can_id, data)))
+        due_ns = self._free_ns = max(self.runtime.now_ns, self._free_ns) + FRAME_NS
+        self.in_flight += 1
+        sent = Sent(due_ns, self.name, sender, can_id, data, asked_ns)
+        self.runtime.call_at(due_ns, lambda: self._arrive(sent))
+
+    @property
+    def hears(self) -> bool:
+        """Whether the gateway hears what is sent here."""
+        return self.transport is not None and not self.gone
 
     def full(self) -> bool:
         return self.blocked and len(self._waiting) >= QUEUE
@@ -83,6 +93,10 @@ class Wire:
         self._look()
         return self.transport
 
+    def lose_power(self) -> None:
+        """The gateway's computer forgets what it has not sent."""
+        self._waiting.clear()
+
     def disconnect(self) -> None:
         self.transport = None
         self._look()
@@ -92,6 +106,7 @@ class Wire:
         self.takes_since_ns = self.runtime.now_ns if takes else NEVER_NS
 
     def _arrive(self, sent: Sent) -> None:
+        self.in_flight -= 1
         self.frames.append(sent)
         self._told(sent)
         for listener in self.listeners:
@@ -120,6 +135,9 @@ class Transport:
         if not self._inbox and not self._wire.gone:
             self._reader.wait(round(timeout_s * 1e9))
         self._check()
+        if self._wire.breaks:
+            self._wire.breaks = False
+            raise ArithmeticError("what no driver has thought of")
         frames, self._inbox = self._inbox, []
         return frames
 

@@ -34,6 +34,7 @@ class Disk:
         self.durable: dict[str, File] = {}  # names that outlive a loss of power
         self.locks: dict[str, object] = {}
         self.full = False  # takes nothing more
+        self.read_only = False  # nor can anything be renamed or removed
         self.sync_ns = SYNC_NS
         self.changes = 0  # counts whatever anybody could see afterwards
         self._open: dict[int, OpenFile | str] = {}
@@ -60,9 +61,14 @@ class Disk:
         self.changes += 1
         self.runtime.point()
 
-    def check_room(self) -> None:
-        if self.full:
+    def check(self, *, room: bool = True) -> None:
+        if self.read_only:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        if room and self.full:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def heal(self) -> None:
+        self.full, self.read_only, self.sync_ns = False, False, SYNC_NS
 
     def opened(self, what: "OpenFile | str") -> int:
         self._next += 1
@@ -125,7 +131,7 @@ class DiskPath(PurePosixPath):
     def open(self, mode: str = "rb", buffering: int = -1) -> "OpenFile":
         files, path = self.disk.files, str(self)
         if mode.startswith("w"):
-            self.disk.check_room()
+            self.disk.check()
             files[path] = File()
         elif mode.startswith("a"):
             files.setdefault(path, File())
@@ -133,6 +139,7 @@ class DiskPath(PurePosixPath):
         return OpenFile(self.disk, path, self.file())
 
     def replace(self, target: "DiskPath") -> "DiskPath":
+        self.disk.check(room=False)
         self.disk.files[str(target)] = self.file()
         del self.disk.files[str(self)]
         self.disk.changed()
@@ -141,6 +148,7 @@ class DiskPath(PurePosixPath):
     def unlink(self, missing_ok: bool = False) -> None:
         if not missing_ok or self.exists():
             self.file()
+            self.disk.check(room=False)
             del self.disk.files[str(self)]
             self.disk.changed()
 
@@ -157,7 +165,7 @@ class OpenFile:
         return self._number
 
     def write(self, data: bytes) -> int:
-        self.disk.check_room()
+        self.disk.check()
         self.file.data += data
         self.disk.changed()
         return len(data)

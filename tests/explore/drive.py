@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from drivers.joint.cia402 import DriveState
-from tests.explore.can import Sent, Wire
+from tests.explore.can import GATEWAY, Sent, Wire
 from tests.explore.node import Address, Device, Entry
 from tests.unit.joint.standard import after, statusword
 
 AXIS = 0x800
-CONTROLWORD, STATUSWORD, POSITION, RUN = 0x6040, 0x6041, 0x6064, 0x2000
+CONTROLWORD, STATUSWORD, POSITION, MAX_TORQUE, RUN = 0x6040, 0x6041, 0x6064, 0x6072, 0x2000
 TPDO_S = 0.1
 BRAKES_S = 0.08
 CYCLE_S = 0.05  # of the controller
@@ -44,8 +44,9 @@ def drive_entries(axes: int, node_id: int, quick_stop_option: int) -> dict[Addre
             (0x1400, 0): Entry(U8, "const", 2),
             (0x1400, 1): Entry(U32, "rw", 0x200 + node_id),
             (0x1400, 2): Entry(U8, "rw", 255),
-            (0x1600, 0): Entry(U8, "rw", 1),
+            (0x1600, 0): Entry(U8, "rw", 2),
             (0x1600, 1): Entry(U32, "rw", CONTROLWORD << 16 | 16),
+            (0x1600, 2): Entry(U32, "rw", MAX_TORQUE << 16 | 16),
             (0x1800, 0): Entry(U8, "const", 5),
             (0x1800, 1): Entry(U32, "rw", 0x180 + node_id),
             (0x1800, 2): Entry(U8, "rw", 255),
@@ -64,7 +65,7 @@ def drive_entries(axes: int, node_id: int, quick_stop_option: int) -> dict[Addre
             (0x6060 + offset, 0): Entry(I8, "rww", 8),
             (0x6061 + offset, 0): Entry(I8, "ro", 8),
             (POSITION + offset, 0): Entry(I32, "ro"),
-            (0x6072 + offset, 0): Entry(U16, "rw", 1000),
+            (MAX_TORQUE + offset, 0): Entry(U16, "rw", 1000),
             (0x607A + offset, 0): Entry(I32, "rww"),
         }
     return found
@@ -88,7 +89,7 @@ class Axis:
         self.enabled_by = ""  # who enabled it last
         self.state = DriveState.SWITCH_ON_DISABLED
         self._before = 0  # the last controlword
-        self._since_ns = 0
+        self.since_ns = 0
 
     @property
     def enabled(self) -> bool:
@@ -107,7 +108,7 @@ class Axis:
         if state is self.state:
             return
         self.state = state
-        self._since_ns = now_ns = self.drive.wire.runtime.now_ns
+        self.since_ns = now_ns = self.drive.wire.runtime.now_ns
         if state is DriveState.QUICK_STOP_ACTIVE and not self._stays:
             self.drive.wire.runtime.call_in(BRAKES_S, lambda: self._stands(now_ns))
         if self.number == 0:
@@ -124,7 +125,7 @@ class Axis:
         """Counts; an axis that moves is never twice at the same place."""
         runtime = self.drive.wire.runtime
         braking = self.state is DriveState.QUICK_STOP_ACTIVE
-        moves = self.enabled or (braking and runtime.now_ns - self._since_ns < BRAKES_S * 1e9)
+        moves = self.enabled or (braking and runtime.now_ns - self.since_ns < BRAKES_S * 1e9)
         wander = runtime.now_ns // 1_000_000 % 997 * 10 if moves else 0
         return wander + round(self.pushed / 6.2832 * COUNTS_PER_TURN)
 
@@ -133,7 +134,7 @@ class Axis:
         return self.drive.get(0x605A + self.offset) >= 5
 
     def _stands(self, since_ns: int) -> None:
-        if self.state is DriveState.QUICK_STOP_ACTIVE and self._since_ns == since_ns:
+        if self.state is DriveState.QUICK_STOP_ACTIVE and self.since_ns == since_ns:
             self.go(DriveState.SWITCH_ON_DISABLED)
 
 
@@ -166,7 +167,9 @@ class Drive(Device):
             axis.command(who, int.from_bytes(data, "little"))
 
     def on_rpdo(self, data: bytes) -> None:
-        self.write("rpdo", CONTROLWORD, 0, data[:2])
+        self.write(GATEWAY, CONTROLWORD, 0, data[:2])
+        if data[2:4] != self.read(MAX_TORQUE, 0):
+            self.write(GATEWAY, MAX_TORQUE, 0, data[2:4])
 
     def on_power(self) -> None:
         for axis in self.axes:

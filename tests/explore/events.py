@@ -6,8 +6,9 @@ An event acts in one moment and waits for nothing; `possible` says where it woul
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.explore.facts import PARAMETERS
-from tests.explore.node import LATE_S, Faults
+from tests.explore.disk import SYNC_NS
+from tests.explore.node import LATE_S, SLOW_S, Faults
+from tests.explore.parameters import PARAMETERS, following
 from tests.explore.stage import Stage
 
 Act = Callable[[Stage], object]
@@ -15,6 +16,7 @@ Possible = Callable[[Stage], bool]
 
 LEASE_S, TRIAL_S = 6.0, 1.5
 PUSHED = 1.5  # rad, beyond every limit
+SLOW_SYNC_NS = 800_000_000
 LEADER, OTHER = "ada", "ben"
 
 
@@ -38,23 +40,9 @@ def _event(name: str, act: Act, possible: Possible = lambda _stage: True, *, wei
 # People
 
 
-def _next_value(stage: Stage, name: str) -> float:
-    """Another one than the device holds, one step further on."""
-    held = stage.facts.value(name)
-    low, step, most = {
-        "gait.run": (0, 1, 1),
-        "gait.step_length": (300, 60, 540),
-        "gait.cycle_time": (1000, 100, 1400),
-        "knee.max_torque": (700, 100, 1000),
-        "ankle.max_torque": (600, 120, 1080),
-    }[name]
-    value = held + step if held + step <= most else low if held - low <= step else held - step
-    return value / PARAMETERS[name][2]
-
-
 def _write(*names: str, trial: bool = False, who: str = LEADER) -> Act:
     def act(stage: Stage) -> None:
-        changes = {name: _next_value(stage, name) for name in names}
+        changes = {name: following(name, stage.facts.value(name)) for name in names}
         more = {"trial_s": TRIAL_S} if trial else {}
         stage.ask(who, "parameter.write", changes=changes, **more)
 
@@ -78,10 +66,10 @@ def _has_trial(stage: Stage) -> bool:
     return _latest_trial(stage) is not None and bool(stage.facts.undo)
 
 
-_event("ada stops", _asks(LEADER, "robot.stop", reason="ada"))
-_event("ben stops", _asks(OTHER, "robot.stop", reason="ben"))
-_event("ada resets", _asks(LEADER, "robot.reset"))
-_event("ada leads", _asks(LEADER, "control.acquire", ttl_s=LEASE_S))
+_event("ada stops", _asks(LEADER, "robot.stop", reason="ada"), weight=2.0)
+_event("ben stops", _asks(OTHER, "robot.stop", reason="ben"), weight=2.0)
+_event("ada resets", _asks(LEADER, "robot.reset"), weight=3.0)
+_event("ada leads", _asks(LEADER, "control.acquire", ttl_s=LEASE_S), weight=3.0)
 _event("ada gives back", _asks(LEADER, "control.release"))
 _event("ben leads", _asks(OTHER, "control.acquire", ttl_s=LEASE_S))
 _event("ben resets", _asks(OTHER, "robot.reset"))
@@ -189,7 +177,7 @@ def _is_well(device: str) -> Possible:
 def _boot(device: str) -> Act:
     def act(stage: Stage) -> None:
         stage.world.devices[device].boot()
-        stage.facts.on_others(*(name for name, (at, _, _) in PARAMETERS.items() if at == device))
+        stage.facts.on_others(*(name for name, one in PARAMETERS.items() if one.device == device))
 
     return act
 
@@ -200,8 +188,10 @@ for _device in ("left", "right", "gait"):
     _event(f"{_device} is late", _fault(_device, late_s=LATE_S), _is_well(_device))
     _event(f"{_device} loses an answer", _fault(_device, lose=1), _is_well(_device))
 _event("gait doubles answers", _fault("gait", doubled=True), _is_well("gait"))
-_event("left is slow", _fault("left", late_s=0.005), _is_well("left"))
-_event("right is slow", _fault("right", late_s=0.005), _is_well("right"))
+_event("left is slow", _fault("left", late_s=SLOW_S), _is_well("left"))
+_event("right is slow", _fault("right", late_s=SLOW_S), _is_well("right"))
+_event("left refuses a write", _fault("left", refuse=1), _is_well("left"))
+_event("gait refuses a write", _fault("gait", refuse=1), _is_well("gait"))
 _event("gait hears no SDO", _fault("gait", no_sdo=True), _is_well("gait"))
 _event("right sends no TPDO", _fault("right", no_tpdo=True), _is_well("right"))
 _event("left sends no TPDO", _fault("left", no_tpdo=True), _is_well("left"))
@@ -216,6 +206,7 @@ _event(
     lambda stage: stage.world.wires["left"].lose(True),
     lambda stage: not stage.world.wires["left"].gone,
 )
+_event("bus left breaks", lambda stage: setattr(stage.world.wires["left"], "breaks", True), weight=0.3)
 
 
 def heal(stage: Stage) -> None:
@@ -231,28 +222,50 @@ def heal(stage: Stage) -> None:
             wire.lose(False)
     for axis in stage.world.axes.values():
         axis.pushed, axis.ignores_quick_stop = 0.0, False
-    stage.world.disk.full = False
+    stage.world.disk.heal()
 
 
-_event("all is well", heal, lambda stage: not _all_well(stage))
-
-
-def _all_well(stage: Stage) -> bool:
+def _something_is_wrong(stage: Stage) -> bool:
     world = stage.world
-    return all(one.faults == Faults() for one in world.devices.values()) and not any(
-        wire.blocked or wire.gone for wire in world.wires.values()
-    )
+    devices = any(one.faults != Faults() for one in world.devices.values())
+    return devices or any(one.blocked or one.gone for one in world.wires.values()) or not _disk_is_well(stage)
 
+
+_event("all is well", heal, _something_is_wrong, weight=3.0)
 
 # The gateway's computer
 
 _event("gateway is killed", lambda stage: stage.restart())
 _event("power is lost", lambda stage: stage.restart(power=True))
+
+
+def _disk(**faults: object) -> Act:
+    def act(stage: Stage) -> None:
+        for name, value in faults.items():
+            setattr(stage.world.disk, name, value)
+
+    return act
+
+
+def _disk_is_well(stage: Stage) -> bool:
+    disk = stage.world.disk
+    return not disk.full and not disk.read_only and disk.sync_ns == SYNC_NS
+
+
+def _damage(stage: Stage) -> None:
+    """What the file said nobody knows any more."""
+    stage.world.disk.files[f"{stage.world.records}/undo.json"].data[:] = b"?"
+    stage.world.disk.make_durable()
+    stage.facts.on_damaged()
+
+
+_event("disk is full", _disk(full=True), _disk_is_well, weight=0.5)
+_event("disk is read only", _disk(read_only=True), _disk_is_well, weight=0.5)
+_event("disk is slow", _disk(sync_ns=SLOW_SYNC_NS), _disk_is_well)
+_event("undo is damaged", _damage, lambda stage: bool(stage.facts.undo), weight=0.5)
 _event(
-    "disk is full",
-    lambda stage: setattr(stage.world.disk, "full", True),
-    lambda stage: not stage.world.disk.full,
-)
-_event(
-    "a thread is late", lambda stage: stage.runtime.delay_next(), lambda stage: len(stage.runtime.ready) > 1
+    "a thread is late",
+    lambda stage: stage.runtime.delay_next(),
+    lambda stage: len(stage.runtime.ready) > 1,
+    weight=6.0,
 )

@@ -1,7 +1,7 @@
-"""What truly happened, as the devices, the wires and the disk know it: the invariants judge by nothing else."""
+"""What truly happened, as devices, wires and disk know it: the invariants judge by nothing else."""
 
 import struct
-from collections import defaultdict, deque
+from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -10,20 +10,14 @@ import msgspec
 from drivers.joint.cia402 import DriveState, drive_state
 from gateway.records.undo import Undo, UndoChange
 from tests.explore.can import GATEWAY, Sent
-from tests.explore.drive import CONTROLWORD, RUN, STATUSWORD, statusword_of
+from tests.explore.drive import CONTROLWORD, MAX_TORQUE, RUN, STATUSWORD, statusword_of
 from tests.explore.gateway_life import Asked, Life
 from tests.explore.node import RPDO1, SDO_REQUEST, TPDO1, Address, Device
+from tests.explore.parameters import NAMES, PARAMETERS, counts
 from tests.explore.world import JOINTS, World
 
-PARAMETERS: dict[str, tuple[str, Address, float]] = {  # name → device, object, counts per unit
-    "gait.run": ("gait", (RUN, 0), 1),
-    "gait.step_length": ("gait", (0x2001, 0), 1000),
-    "gait.cycle_time": ("gait", (0x2002, 0), 1000),
-    "knee.max_torque": ("left", (0x6072, 0), 1),
-    "ankle.max_torque": ("right", (0x6872, 0), 1),
-}
-NAMES = {(device, address): name for name, (device, address, _) in PARAMETERS.items()}
-LOOK_NS = 5_000_000  # how often the guard is asked how it is
+LOOK_NS = 5_000_000  # how often the guard and the devices are asked how they are
+KNOWN = 1000  # statuswords of a drive that are remembered
 
 
 class Known(NamedTuple):
@@ -35,12 +29,12 @@ class Known(NamedTuple):
 
 
 class Download(NamedTuple):
-    """A value that the gateway sent to an object that is a parameter."""
+    """A value that the gateway sent to an object that is a parameter, and what the device held then."""
 
     stamp_ns: int
     name: str
     value: int
-    before: int  # as the device held it then
+    before: int
 
 
 @dataclass(slots=True)
@@ -51,38 +45,50 @@ class Trial:
     who: str
 
 
+def _deques() -> dict[str, deque[Known]]:
+    return defaultdict(lambda: deque(maxlen=KNOWN))
+
+
 @dataclass(slots=True)
 class Facts:
     """Fed from all sides; `life` is the gateway's present one."""
 
     world: World
     life: Life
-    last_stop_ns: int = 0
-    stops: list[Asked] = field(default_factory=list)  # asked for and not yet judged
+    # Stops and holds
+    last_stop_ns: int = 0  # when the last one was asked for, or a rule tripped
+    stops: list[Asked] = field(default_factory=list)  # that nobody has judged yet
     held: bool = False
-    hold_ended: bool = False  # and nobody has judged it yet
     held_since_ns: int = 0
-    control_since_ns: int | None = None  # since when the control module runs
-    known: dict[str, deque[Known]] = field(default_factory=lambda: defaultdict(lambda: deque(maxlen=40)))
-    run_read: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=40))
-    quick_stops: dict[str, int] = field(default_factory=dict)  # joint → when its last one was on the bus
+    hold_ended: bool = False  # and nobody has judged it yet
+    must_hold: bool = False  # a stop was answered as held, also beyond this gateway
+    reset_ns: int = 0  # when the last reset was answered
+    tripped_since: dict[str, int] = field(default_factory=dict)  # rules that stop
+    trips: int = 0
+    # What the gateway was told, and what it sent
+    known: dict[str, deque[Known]] = field(default_factory=_deques)
+    run_read: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=KNOWN))
+    stopped_at: dict[str, int] = field(default_factory=dict)  # joint → when it was last told to stop
+    controlwords: list[tuple[str, int]] = field(default_factory=list)  # that nobody has judged yet
+    downloads: list[Download] = field(default_factory=list)  # that nobody has judged yet
+    # How the devices are
     healthy_since: dict[str, int] = field(default_factory=dict)
     enabled_since: dict[str, int] = field(default_factory=dict)
-    runs_since: int | None = None
-    trips: int = 0
-    tripped_since: dict[str, int] = field(default_factory=dict)  # rules that stop
-    undo: dict[tuple[int, str], UndoChange] = field(default_factory=dict)
+    runs_since: int | None = None  # the controller
+    # Writes
+    undo: dict[tuple[int, str], UndoChange] = field(default_factory=dict)  # by write and parameter
     undo_since: dict[tuple[int, str], int] = field(default_factory=dict)
+    undo_bytes: bytes = b""
     dropped: list[tuple[int, UndoChange, tuple[Undo, ...]]] = field(default_factory=list)
     trials: dict[int, Trial] = field(default_factory=dict)
-    legit: dict[str, set[int]] = field(default_factory=dict)
-    downloads: list[Download] = field(default_factory=list)
-    controlwords: list[tuple[int, str, int]] = field(default_factory=list)
-    enabling: int = 0  # requests to enable that are under way
-    last_change_ns: int = 0  # when the gateway last did something that lasts
-    disk_seen: int = -1
-    undo_bytes: bytes = b""
+    legit: dict[str, set[int]] = field(default_factory=dict)  # what each parameter may hold for good
+    # The gateway
+    control_since_ns: int | None = None  # since when the control module runs
+    open: Counter[str] = field(default_factory=Counter)  # requests that are under way, by their methods
+    last_change_ns: int = 0  # when something last happened that lasts
     looked_ns: int = 0
+    looked_at_all_ns: int = 0
+    _disk_seen: int = -1
 
     def __post_init__(self) -> None:
         self.world.watchers.append(self.on_frame)
@@ -90,21 +96,26 @@ class Facts:
             device.told = self.on_read
         self.legit = {name: {self.value(name)} for name in PARAMETERS}
 
+    # Questions
+
     @property
     def now_ns(self) -> int:
         return self.world.runtime.now_ns
 
-    # Questions
+    @property
+    def waiting(self) -> list[Asked]:
+        """Requests that are not answered yet."""
+        return [one for one in self.life.asked if one.answered_ns is None] if self.open.total() else []
 
     def value(self, name: str) -> int:
-        device, address, _ = PARAMETERS[name]
-        return self.world.devices[device].get(*address)
+        parameter = PARAMETERS[name]
+        return self.world.devices[parameter.device].get(*parameter.address)
 
     def is_ours(self, name: str) -> bool:
         """Whether the gateway wrote what the device holds."""
-        device, address, _ = PARAMETERS[name]
-        written = self.world.devices[device].writers.get(address)
-        return written is not None and written.who == GATEWAY
+        parameter = PARAMETERS[name]
+        written = self.world.devices[parameter.device].writers.get(parameter.address)
+        return written == GATEWAY
 
     def healthy_for(self, device: str, seconds: float) -> bool:
         since = self.healthy_since.get(device)
@@ -118,8 +129,8 @@ class Facts:
     def on_frame(self, sent: Sent) -> None:
         if sent.sender == GATEWAY:
             self._on_ours(sent)
-        elif TPDO1 < sent.can_id < TPDO1 + 0x80 and self._hears(sent.bus):
-            joint = next(name for name, (bus, axis) in JOINTS.items() if bus == sent.bus and axis == 0)
+        elif TPDO1 < sent.can_id < TPDO1 + 0x80 and self.world.wires[sent.bus].hears:
+            joint = next(name for name, at in JOINTS.items() if at == (sent.bus, 0))
             self.known[joint].append(Known(self.now_ns, self.now_ns, drive_state(statusword_of(sent))))
 
     def on_read(self, device: Device, address: Address, sampled_ns: int, data: bytes) -> None:
@@ -128,30 +139,26 @@ class Facts:
             if device.name == bus and address == (STATUSWORD + 0x800 * axis, 0):
                 self.known[joint].append(Known(sampled_ns, self.now_ns, drive_state(number)))
         if device is self.world.gait and address == (RUN, 0):
-            self.run_read.append((sampled_ns, self.now_ns, number))
+            self.run_read.append((sampled_ns, number))
 
     def on_asked(self, asked: Asked) -> None:
         if asked.method == "robot.stop":
             self.last_stop_ns = self.now_ns
             self.stops.append(asked)
-        self.enabling += asked.method == "robot.enable"
+        self.open[asked.method] += 1
         self.last_change_ns = self.now_ns
 
     def on_answer(self, asked: Asked) -> None:
         self.last_change_ns = self.now_ns
-        self.enabling -= asked.method == "robot.enable"
-        if asked.method == "parameter.write" and asked.result is not None:
-            written = asked.result
-            if written.trial_s is not None:
-                self.trials[written.write] = Trial(self.now_ns + round(written.trial_s * 1e9), asked.who)
-                if asked.who not in self.life.people:
-                    self.on_left(asked.who)
-            else:
-                for name, value in asked.params["changes"].items():
-                    self.legit[name] = {round(value * PARAMETERS[name][2])}
-        if asked.method == "parameter.confirm" and asked.result is not None:
-            for name, value in asked.result.values.items():
-                self.legit[name] = {round(value * PARAMETERS[name][2])}
+        self.open[asked.method] -= 1
+        follow = {
+            "robot.stop": self._on_stopped,
+            "robot.reset": self._on_reset,
+            "parameter.write": self._on_written,
+            "parameter.confirm": self._on_confirmed,
+        }.get(asked.method)
+        if follow is not None:
+            follow(asked)
 
     def on_left(self, who: str) -> None:
         """What somebody has on trial ends now."""
@@ -164,16 +171,22 @@ class Facts:
         for name in names:
             self.legit[name] = {self.value(name)}
 
+    def on_damaged(self) -> None:
+        """Nobody knows any more what is to be taken back."""
+        for (_, name), change in self.undo.items():
+            self.legit[name].add(counts(name, change.written_value))
+        self.undo, self.undo_since, self.undo_bytes = {}, {}, b"?"
+
     def on_new_life(self, life: Life) -> None:
-        """Of what was not answered nobody knows what became of it."""
-        for asked in self.life.asked:
-            if asked.method == "parameter.write" and asked.answered_ns is None:
-                for name, value in asked.params["changes"].items():
-                    self.legit[name].add(round(value * PARAMETERS[name][2]))
+        """Of what was not answered nobody knows what became of it; what was on trial is so no more."""
+        for asked in self.waiting:
+            for name, value in asked.params.get("changes", {}).items():
+                self.legit[name].add(counts(name, value))
         for trial in self.trials.values():
             trial.due_ns = min(trial.due_ns, self.now_ns)
-        self.life, self.held, self.control_since_ns, self.enabling = life, False, None, 0
+        self.life, self.held, self.control_since_ns = life, False, None
         self.trips, self.tripped_since, self.stops = 0, {}, []
+        self.open.clear()
 
     def look(self) -> None:
         """Between two tasks."""
@@ -185,33 +198,63 @@ class Facts:
             self.held_since_ns = self.now_ns
         self.hold_ended |= self.held and not held and control is not None
         self.held = held
-        if self.world.disk.changes != self.disk_seen:
-            self.disk_seen = self.world.disk.changes
+        if self.world.disk.changes != self._disk_seen:
+            self._disk_seen = self.world.disk.changes
             self._look_at_undo()
         if self.now_ns - self.looked_ns >= LOOK_NS:
             self.looked_ns = self.now_ns
             self._look_at_guard()
             self.look_at_devices()
 
-    # How it is found
+    def look_at_devices(self) -> None:
+        now_ns = self.now_ns
+        for name, device in self.world.devices.items():
+            if not device.answers or not device.wire.hears:
+                self.healthy_since.pop(name, None)
+            else:
+                self.healthy_since.setdefault(name, now_ns)
+        for joint, axis in self.world.axes.items():
+            if axis.enabled:
+                self.enabled_since.setdefault(joint, now_ns)
+            else:
+                self.enabled_since.pop(joint, None)
+        self.runs_since = (self.runs_since or now_ns) if self.world.gait.runs else None
 
-    def _hears(self, bus: str) -> bool:
-        wire = self.world.wires[bus]
-        return wire.transport is not None and not wire.gone
+    # What follows from it
+
+    def _on_stopped(self, asked: Asked) -> None:
+        self.must_hold |= asked.result is not None and asked.result.problem is None
+
+    def _on_reset(self, asked: Asked) -> None:
+        self.reset_ns = self.now_ns
+        self.must_hold &= asked.result is None or asked.result.held
+
+    def _on_written(self, asked: Asked) -> None:
+        written = asked.result
+        if written is not None and written.trial_s is not None:
+            self.trials[written.write] = Trial(self.now_ns + round(written.trial_s * 1e9), asked.who)
+            if asked.who not in self.life.people:
+                self.on_left(asked.who)
+        elif written is not None:
+            self._settle(asked.params["changes"])
+
+    def _on_confirmed(self, asked: Asked) -> None:
+        if asked.result is not None:
+            self._settle(asked.result.values)
+
+    def _settle(self, values: dict[str, float]) -> None:
+        for name, value in values.items():
+            self.legit[name] = {counts(name, value)}
 
     def _on_ours(self, sent: Sent) -> None:
-        device = next(
-            (
-                one
-                for one in self.world.devices.values()
-                if one.wire.name == sent.bus and one.node_id == sent.can_id & 0x7F
-            ),
-            None,
-        )
+        device = self.world.at(sent.bus, sent.can_id & 0x7F)
         if device is None:
             return
         if sent.can_id & 0x780 == RPDO1:
             self._on_controlword(device, 0, int.from_bytes(sent.data[:2], "little"))
+            torque = int.from_bytes(sent.data[2:4], "little")
+            if torque != device.get(MAX_TORQUE):
+                self._on_download(device, (MAX_TORQUE, 0), torque, sent.asked_ns)
         if sent.can_id & 0x780 != SDO_REQUEST or sent.data[0] >> 5 != 1:
             return
         self.last_change_ns = self.now_ns
@@ -219,15 +262,18 @@ class Facts:
         value = int.from_bytes(sent.data[4 : 8 - (command >> 2 & 3)], "little")
         if index in range(CONTROLWORD, 0xA000, 0x800):
             self._on_controlword(device, (index - CONTROLWORD) // 0x800, value)
-        name = NAMES.get((device.name, (index, subindex)))
+        self._on_download(device, (index, subindex), value, sent.asked_ns)
+
+    def _on_download(self, device: Device, address: Address, value: int, asked_ns: int) -> None:
+        name = NAMES.get((device.name, address))
         if name is not None:
-            self.downloads.append(Download(self.now_ns, name, value, self.value(name)))
+            self.downloads.append(Download(asked_ns, name, value, self.value(name)))
 
     def _on_controlword(self, device: Device, axis: int, value: int) -> None:
         joint = next(name for name, at in JOINTS.items() if at == (device.name, axis))
-        self.controlwords.append((self.now_ns, joint, value))
-        if value & 0x86 == 0x02:
-            self.quick_stops[joint] = self.now_ns
+        self.controlwords.append((joint, value))
+        if value & 0x86 == 0x02 or value & 0x82 == 0:  # quick stop, disable voltage
+            self.stopped_at[joint] = self.now_ns
 
     def _look_at_undo(self) -> None:
         file = self.world.disk.files.get(f"{self.world.records}/undo.json")
@@ -237,9 +283,8 @@ class Facts:
         self.undo_bytes = data
         undos: list[Undo] = msgspec.json.decode(data, type=list[Undo]) if data else []
         now = {(one.write, change.parameter): change for one in undos for change in one.changes}
-        for (write, _name), change in self.undo.items():
-            if (write, change.parameter) not in now:
-                self.dropped.append((write, change, tuple(undos)))
+        gone = (key for key in self.undo if key not in now)
+        self.dropped += [(key[0], self.undo[key], tuple(undos)) for key in gone]
         self.undo_since = {key: self.undo_since.get(key, self.now_ns) for key in now}
         self.undo = now
         self.last_change_ns = self.now_ns
@@ -249,26 +294,9 @@ class Facts:
         if guard is None:
             return
         rules = [one for one in guard.info().rules if "quick_stop" in one.actions]
+        tripped = {one.name: one.since_ns or 0 for one in rules if one.state == "tripped"}
         trips = sum(one.trips for one in rules)
         if trips > self.trips:
-            since = [one.since_ns or 0 for one in rules if one.state == "tripped"]
-            self.last_stop_ns = max(self.last_stop_ns, *since, 0)
+            self.last_stop_ns = max(self.last_stop_ns, *tripped.values(), 0)
         self.trips = trips
-        self.tripped_since = {
-            one.name: self.tripped_since.get(one.name, self.now_ns) for one in rules if one.state == "tripped"
-        }
-
-    def look_at_devices(self) -> None:
-        now_ns = self.now_ns
-        for name, device in self.world.devices.items():
-            well = device.answers and device.wire.transport is not None
-            if well != (name in self.healthy_since):
-                self.healthy_since = {one: at for one, at in self.healthy_since.items() if one != name}
-                if well:
-                    self.healthy_since[name] = now_ns
-        for joint, axis in self.world.axes.items():
-            if axis.enabled:
-                self.enabled_since.setdefault(joint, now_ns)
-            else:
-                self.enabled_since.pop(joint, None)
-        self.runs_since = (self.runs_since or now_ns) if self.world.gait.runs else None
+        self.tripped_since = {name: self.tripped_since.get(name, self.now_ns) for name in tripped}

@@ -2,17 +2,18 @@
 
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
-from tests.explore.can import Wire
+from tests.explore.can import GATEWAY, Wire
 
 Address = tuple[int, int]
 
 SDO_REQUEST, SDO_RESPONSE, HEARTBEAT, RPDO1, TPDO1 = 0x600, 0x580, 0x700, 0x200, 0x180
 BOOT_UP, OPERATIONAL, STOPPED = 0x00, 0x05, 0x04
 ABORT_NO_OBJECT, ABORT_READ_ONLY, ABORT_LENGTH = 0x06020000, 0x06010002, 0x06070010
-ABORT_COMMAND = 0x05040001
-ANSWER_S, LATE_S, DOUBLED_AFTER_S = 0.0004, 1.2, 0.0006
+ABORT_COMMAND, ABORT_REFUSED = 0x05040001, 0x08000022
+_OWN_OBJECTS = (*range(0x2000, 0x3000), *range(0x6072, 0xA000, 0x800))
+ANSWER_S, SLOW_S, LATE_S, DOUBLED_AFTER_S = 0.0004, 0.005, 1.2, 0.0006
 HEARTBEAT_S = 0.5
 BOOT_S = 0.3  # from losing its power to its boot-up
 _SIZES = {0x02: 1, 0x03: 2, 0x04: 4, 0x05: 1, 0x06: 2, 0x07: 4}
@@ -45,28 +46,22 @@ class Faults:
     late_s: float = 0.0  # its answers come so much later
     doubled: bool = False
     lose: int = 0  # answers that get lost
-
-
-@dataclass(frozen=True, slots=True)
-class Written:
-    """Who wrote an object last, and when."""
-
-    who: str
-    stamp_ns: int
+    refuse: int = 0  # writes of its own objects that it refuses
 
 
 class Device:
-    """One node on a wire. `told` hears what is answered to a read, when it is on the bus, and when it was so."""
+    """One node on a wire. `told` hears what is answered to a read, and of when that is."""
 
     def __init__(self, wire: Wire, name: str, node_id: int, entries: dict[Address, Entry]) -> None:
         self.wire, self.name, self.node_id, self.entries = wire, name, node_id, entries
         self.faults = Faults()
         self.told: Callable[[Device, Address, int, bytes], object] = lambda *_read: None
         self.values: dict[Address, bytes] = {}
-        self.writers: dict[Address, Written] = {}
+        self.writers: dict[Address, str] = {}  # who wrote each object last
         self.nmt = OPERATIONAL
         self.boots = 0
         self._answer_ns = 0
+        self._answers = 0  # that are still to come
         self._forget()
         wire.listeners.append(self)
         wire.runtime.call_in(0.01 * node_id, self._beat)
@@ -85,20 +80,19 @@ class Device:
     def write(self, who: str, index: int, subindex: int, data: bytes) -> None:
         """Anybody's write, by SDO or otherwise."""
         self.values[index, subindex] = data
-        self.writers[index, subindex] = Written(who, self.wire.runtime.now_ns)
+        self.writers[index, subindex] = who
 
     @property
     def state(self) -> tuple[object, ...]:
         """What tells one situation from another."""
         faults = self.faults
-        flags = (faults.dead, faults.no_sdo, faults.no_tpdo, faults.late_s, faults.doubled, faults.lose)
-        return (self.nmt, flags, tuple(self.values.items()))
+        return (self.nmt, astuple(faults), self._answers, tuple(self.values.values()))
 
     @property
     def answers(self) -> bool:
         """Whether who asks it gets an answer in time."""
         faults = self.faults
-        well = not (faults.dead or faults.no_sdo or faults.late_s or faults.lose)
+        well = not (faults.dead or faults.no_sdo or faults.late_s > SLOW_S or faults.lose)
         return well and self.nmt != STOPPED and not self.wire.blocked and not self.wire.gone
 
     # What happens to it
@@ -164,7 +158,10 @@ class Device:
         due_ns = max(self._answer_ns, runtime.now_ns + round((ANSWER_S + faults.late_s) * 1e9))
         self._answer_ns = due_ns
 
+        self._answers += 1
+
         def send() -> None:
+            self._answers = max(0, self._answers - 1)
             self._send(SDO_RESPONSE + self.node_id, data)
             command, index, subindex = struct.unpack_from("<BHB", data)
             if command & 0xE0 == 0x40 and self.wire.transport is not None:
@@ -186,7 +183,10 @@ class Device:
         if specifier == 2:
             data = self.read(index, subindex) or b""
             return struct.pack("<BHB", 0x43 | (4 - len(data)) << 2, index, subindex) + data.ljust(4, b"\0")
-        self.write("gateway", index, subindex, request[4 : 4 + entry.size])
+        if self.faults.refuse and index in _OWN_OBJECTS:
+            self.faults.refuse -= 1
+            return struct.pack("<BHBI", 0x80, index, subindex, ABORT_REFUSED)
+        self.write(GATEWAY, index, subindex, request[4 : 4 + entry.size])
         return struct.pack("<BHB", 0x60, index, subindex) + bytes(4)
 
 

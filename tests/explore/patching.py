@@ -3,6 +3,7 @@
 import concurrent.futures
 import concurrent.futures._base as futures
 import fcntl
+import gc
 import importlib
 import os
 import pkgutil
@@ -12,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import drivers
@@ -37,6 +39,9 @@ def install(runtime: Runtime, disk: Disk, open_transport: Callable[..., object])
         id(os): system.os,
         id(selectors): system.selectors,
         id(fcntl): Locking,
+        id(gc): SimpleNamespace(
+            collect=_nothing, freeze=_nothing, unfreeze=_nothing
+        ),  # it would copy all pages
         id(concurrent.futures.ThreadPoolExecutor): ThreadPoolExecutor,
         id(opening.open_transport): open_transport,
         id(eds.load): _loading_once(),
@@ -50,6 +55,10 @@ def install(runtime: Runtime, disk: Disk, open_transport: Callable[..., object])
                 if id(value) in instead:
                     setattr(module, key, instead[id(value)])
     eds.load = instead[id(eds.load)]
+
+
+def _nothing() -> None:
+    """Done elsewhere."""
 
 
 def _load_all(name: str, path: Any) -> None:

@@ -9,7 +9,7 @@ from typing import Self
 import msgspec
 
 from tests.explore.can import Sent
-from tests.explore.invariants import ALWAYS, AT_ANSWERS, AT_THE_END
+from tests.explore.invariants import KNOWN
 from tests.explore.player import Order, written
 from tests.explore.runtime import START_NS
 from tests.explore.stage import Finding
@@ -41,12 +41,9 @@ class Found(msgspec.Struct, frozen=True):
         return len(self.order), sum(gap for gap, _ in self.order)
 
     def words(self) -> str:
-        checks = {**ALWAYS, **AT_ANSWERS, **AT_THE_END}
-        check = checks.get(self.invariant)
-        sentence = " ".join((check.__doc__ or "").split()) if check is not None else self.invariant
         return "\n".join(
             [
-                f"VIOLATED: {sentence} [{self.invariant}]",
+                f"VIOLATED: {KNOWN.sentence(self.invariant)} [{self.invariant}]",
                 f"  {self.text}",
                 f"  --replay {written(self.scene, self.order)!r}",
             ]

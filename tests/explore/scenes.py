@@ -44,6 +44,7 @@ _SCENES = (
     Scene("restarted", (*_WALKS, "ben stops", "gateway is killed"), settles=False),
     Scene("resting", ("ada leads",)),
     Scene("bench", ("ada leads",), role="master"),
+    Scene("cold", ("gait is started",), guard=""),
     Scene("dark", ("ada leads",), guard=GUARD + BLIND, dark=True),
 )
 SCENES = {scene.name: scene for scene in _SCENES}

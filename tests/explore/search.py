@@ -4,6 +4,8 @@ So every branch has a true copy of the whole state, and nothing is ever played t
 orders is walked in passes, each over a larger share of its branches, until all of it was walked.
 """
 
+import gc
+import itertools
 import os
 import random
 import signal
@@ -47,7 +49,9 @@ class Search:
 
     def __init__(self, scene: Scene, options: Options, shared: Shared, until: float) -> None:
         self.scene, self.options, self.shared = scene, options, shared
+        gc.disable()
         self.stage = scene.build()
+        gc.freeze()
         self.player = Player(self.stage)
         self._until = until
         self._left = 0  # events that may still happen in this run
@@ -60,11 +64,11 @@ class Search:
         """Until the time is over; the tree alone, where there is no limit."""
         begun = time.monotonic()
         tree_until = begun + TREE_SHARE * (self._until - begun)
-        for low, high in zip(SHARES, SHARES[1:], strict=False):
+        for low, high in itertools.pairwise(SHARES):
             if time.monotonic() < tree_until:
                 self._fork(lambda low=low, high=high: self._tree(low, high, tree_until), ())  # type: ignore[misc]
         seed = 0
-        while time.monotonic() < self._until:
+        while self.options.seconds and time.monotonic() < self._until:
             seed += 1
             self._fork(lambda seed=seed: self._random(seed), ((seed, "random"),))  # type: ignore[misc]
 
@@ -162,7 +166,7 @@ class Search:
         except Violation:
             self._note(self.stage.findings[0])
         except Spinning as error:
-            self._note(Finding("everything_waits", str(error)))
+            self._note(Finding("Everybody waits now and then.", str(error)))
         except Exception:  # noqa: BLE001 - whoever wrote this wants to see it
             traceback.print_exc()
             code = 2
@@ -185,5 +189,5 @@ class Search:
     def _wait(self, child: int, order: Order) -> None:
         _pid, status = os.waitpid(child, 0)
         if os.WIFSIGNALED(status) or os.waitstatus_to_exitcode(status) not in (0, 1):
-            finding = Finding("everything_ends", f"the run ended with status {status}")
+            finding = Finding("Every run comes to its end.", f"the run ended with status {status}")
             note(self.options.reports, Found.of(self.scene.name, order, finding, []))

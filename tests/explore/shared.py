@@ -1,4 +1,4 @@
-"""What the processes of one search have in common: counters, and a table of what was seen, in shared memory."""
+"""What the processes of one search share: counters, and a table of what was seen."""
 
 import mmap
 import struct

@@ -1,4 +1,4 @@
-"""Makes an order shorter that led to a violation: events are left out as long as it is violated all the same."""
+"""Makes an order shorter that led to a violation: leaves out every event that it does not take."""
 
 import os
 from collections.abc import Iterator
@@ -52,8 +52,8 @@ def _less(order: Order) -> Iterator[Order]:
         after = order[at + 1 :]
         if after:
             after = ((order[at][0] + after[0][0], after[0][1]), *after[1:])
-            yield order[:at] + ((order[at + 1][0], order[at + 1][1]),) + order[at + 2 :]
-        yield order[:at] + after
+            yield (*order[:at], order[at + 1], *order[at + 2 :])
+        yield (*order[:at], *after)
 
 
 def _try(stage: Stage, found: Found, order: Order, scratch: Path) -> Found | None:

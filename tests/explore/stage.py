@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tests.explore import about_all, about_stops, about_writes  # noqa: F401 - they make themselves known
 from tests.explore.can import Sent
 from tests.explore.facts import Facts
 from tests.explore.gateway_life import Asked, Life
-from tests.explore.invariants import ALWAYS, AT_ANSWERS, AT_THE_END
+from tests.explore.invariants import KNOWN
 from tests.explore.world import World
 
 QUIET_NS = 600_000_000  # so long after the last thing it did, the gateway has come to rest
@@ -36,7 +37,7 @@ class Stage:
         self.facts = Facts(world, self.life)
         self.findings: list[Finding] = []
         self.life.answered = self._on_answer
-        self._judges = tuple(ALWAYS.items())
+        self._judges = tuple(KNOWN.always.items())
         self.judging = True
         self.runtime.after_task = self.judge
 
@@ -47,13 +48,13 @@ class Stage:
 
     def fingerprint(self) -> int:
         """What tells this situation from others: where each thread is, the devices, what is kept and held."""
-        devices = hash(tuple(device.state for device in self.world.devices.values()))
+        devices = tuple(device.state for device in self.world.devices.values())
         places = tuple(task.place for task in self.runtime.tasks)
         facts = self.facts
-        waiting = tuple(one.method for one in self.life.asked if one.answered_ns is None)
-        wires = tuple((wire.blocked, wire.gone) for wire in self.world.wires.values())
-        told = (facts.undo_bytes, facts.held, tuple(facts.tripped_since), waiting, wires)
-        return hash((devices, places, told))
+        asked = tuple((one.who, one.method, one.answered_ns is None, one.kind) for one in self.life.asked)
+        wires = tuple((wire.blocked, wire.gone, wire.in_flight) for wire in self.world.wires.values())
+        told = (facts.undo_bytes, facts.held, tuple(facts.tripped_since), asked, wires)
+        return hash((devices, places, told, self.world.disk.full))
 
     @property
     def frames(self) -> list[Sent]:
@@ -76,6 +77,8 @@ class Stage:
         self.life.kill()
         if power:
             self.world.disk.lose_power()
+            for wire in self.world.wires.values():
+                wire.lose_power()
         life = Life(self.world)
         life.answered = self._on_answer
         self.facts.on_new_life(life)
@@ -97,7 +100,7 @@ class Stage:
         facts = self.facts
         if self.runtime.ready or self.runtime.now_ns - facts.last_change_ns < QUIET_NS or facts.undo:
             return False
-        return all(one.answered_ns is not None for one in self.life.asked)
+        return not facts.open.total()
 
     def settle(self, longest_s: float = LONGEST_S) -> bool:
         """Let everything happen until it is quiet; whether it is."""
@@ -114,7 +117,7 @@ class Stage:
         self.run_for(1.0)
         if self.facts.held:
             self._reset()
-        for name, check in AT_THE_END.items():
+        for name, check in KNOWN.at_the_end.items():
             for text in check(self.facts):
                 self._find(name, text)
 
@@ -127,7 +130,7 @@ class Stage:
         reset = self.ask("carol", "robot.reset")
         self.settle(HEALED_S)
         if self.facts.held:
-            self._find("a_robot_that_is_well_is_reset", f"{reset.result or reset.error}")
+            self._find("A robot that is well can be reset.", f"{reset.result or reset.error}")
 
     def heal(self) -> None:
         from tests.explore.events import heal
@@ -142,7 +145,7 @@ class Stage:
 
     def _on_answer(self, asked: Asked) -> None:
         self.facts.on_answer(asked)
-        for name, check in AT_ANSWERS.items():
+        for name, check in KNOWN.at_answers.items():
             for text in check(self.facts, asked):
                 self._find(name, text)
 

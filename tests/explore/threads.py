@@ -209,7 +209,7 @@ class Thread(_OnRuntime):
         *,
         daemon: bool | None = None,
     ) -> None:
-        self.name: str = name or getattr(target, "__name__", "thread")
+        self.name = name or str(getattr(target, "__name__", "thread"))
         self.daemon = bool(daemon)
         self.ident: int | None = None
         self._work: Callable[[], object] = (

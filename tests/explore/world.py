@@ -14,6 +14,7 @@ from tests.explore.can import Sent, Transport, Wire
 from tests.explore.disk import Disk, at
 from tests.explore.drive import Axis, Controller, Drive
 from tests.explore.node import Device, EdsText
+from tests.explore.parameters import PARAMETERS
 from tests.explore.runtime import Runtime
 
 RECORDS = "/robot/records"
@@ -38,26 +39,6 @@ channel = "right"
 bus = "left"
 node_id = 10
 eds = "{folder}/gait.eds"
-[parameter."gait.run"]
-object = "0x2000:0"
-live = true
-[parameter."gait.step_length"]
-object = "0x2001:0"
-unit = "m"
-scale = 0.001
-live = true
-max_step = 0.1
-[parameter."gait.cycle_time"]
-object = "0x2002:0"
-unit = "s"
-scale = 0.001
-live = true
-[parameter."knee.max_torque"]
-object = "0x6072:0"
-[parameter."ankle.max_torque"]
-object = "0x6872:0"
-live = true
-max_step = 200
 [stop]
 timeout_s = {stop_timeout_s}
 fallback = [{fallback}]
@@ -138,7 +119,13 @@ class World:
         head = _TOML.format(
             role=self.role, folder=folder, guard=guard, fallback=fallback, stop_timeout_s=STOP_TIMEOUT_S
         )
-        return head + "".join(joints)
+        parameters = (f'[parameter."{name}"]\n{one.toml}\n' for name, one in PARAMETERS.items())
+        return head + "".join(joints) + "".join(parameters)
+
+    def at(self, bus: str, node_id: int) -> Device | None:
+        """The device of that node id."""
+        found = (one for one in self.devices.values() if (one.wire.name, one.node_id) == (bus, node_id))
+        return next(found, None)
 
     def _tell(self, sent: Sent) -> None:
         for watcher in self.watchers:

@@ -1,0 +1,51 @@
+"""What must never be with the gateway as a whole."""
+
+from gateway.records.chain import Broken
+from gateway.records.journal import read_verified
+from tests.explore.facts import Facts
+from tests.explore.invariants import Complaints, always, at_the_end
+from tests.explore.world import JOINTS
+
+THERE_S = 5.0  # how long it may take to come up
+
+
+@always
+def nothing_fails_unexpectedly(facts: Facts) -> Complaints:
+    """No thread of the gateway ends by an error, and nothing in it fails that nobody expected."""
+    yield from facts.world.errors.unexpected
+    for task in facts.world.runtime.failed:
+        yield f"the thread {task.name} ended: {type(task.error).__name__}: {task.error}"
+
+
+@always
+def who_answers_is_there(facts: Facts) -> Complaints:
+    """What has answered for seconds is not called lost."""
+    since_ns = facts.control_since_ns
+    if facts.open["robot.reset"]:  # as long as one drive is led down, nobody asks its other axis
+        facts.looked_at_all_ns = facts.now_ns
+    if since_ns is None or facts.now_ns - max(since_ns, facts.looked_at_all_ns) < THERE_S * 1e9:
+        return
+    facts.looked_at_all_ns = facts.now_ns
+    for one in facts.life.module("component").components():
+        device = JOINTS[one.name][0] if one.name in JOINTS else one.name
+        speaks = facts.healthy_for(device, THERE_S) and not facts.world.devices[device].faults.no_tpdo
+        if one.state == "lost" and speaks:
+            yield f"{one.name} has answered for {THERE_S:g} s, and is called lost: {one.problem}"
+
+
+@at_the_end
+def all_is_answered(facts: Facts) -> Complaints:
+    """Everything comes to rest: each request is answered, whatever happened."""
+    for asked in facts.waiting:
+        if asked.who in facts.life.people:
+            yield f"{asked.method} of {asked.who} was never answered"
+
+
+@at_the_end
+def the_journal_holds(facts: Facts) -> Complaints:
+    """Whatever happened, the journal's chain is whole."""
+    try:
+        if facts.control_since_ns is not None:
+            read_verified(facts.world.records / "journal.jsonl")
+    except (Broken, OSError) as error:
+        yield f"the journal: {error}"
