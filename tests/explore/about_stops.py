@@ -1,7 +1,7 @@
 """What must never be with a stop, its hold and its reset."""
 
 from drivers.joint.cia402 import DriveState
-from tests.explore.facts import Facts
+from tests.explore.facts import Commanded, Facts
 from tests.explore.gateway_life import Asked
 from tests.explore.invariants import Complaints, always, at_answers
 from tests.explore.world import JOINTS, STOP_TIMEOUT_S
@@ -24,18 +24,17 @@ COLD_S = 2.0  # more for a stop that has to start its module
 def nobody_enables(facts: Facts) -> Complaints:
     """Nothing but robot.enable or another master ever enables a drive, and none that stops is made limp."""
     sent, facts.controlwords = facts.controlwords, []
-    for joint, controlword in sent:
-        if controlword & OPERATION_BITS == ENABLE_OPERATION and not facts.open["robot.enable"]:
-            yield f"controlword 0x{controlword:04X} to {joint}"
-        if controlword == 0 and _brakes_by_itself(facts, joint):
-            yield f"{joint} was made limp, though it has stopped as it was asked to"
+    for one in sent:
+        if one.controlword & OPERATION_BITS == ENABLE_OPERATION and not facts.open["robot.enable"]:
+            yield f"controlword 0x{one.controlword:04X} to {one.joint}"
+        if one.controlword == 0 and _has_stopped(facts, one):
+            yield f"{one.joint} was made limp, though it has stopped as it was asked to"
 
 
-def _brakes_by_itself(facts: Facts, joint: str) -> bool:
-    axis = facts.world.axes[joint]
-    stopped = axis.state is DriveState.QUICK_STOP_ACTIVE and facts.now_ns - axis.since_ns > BRAKES_NS
+def _has_stopped(facts: Facts, one: Commanded) -> bool:
+    stopped = one.state is DriveState.QUICK_STOP_ACTIVE and facts.now_ns - one.since_ns > BRAKES_NS
     reset = facts.open["robot.reset"] > 0 or facts.now_ns - facts.reset_ns < BRAKES_NS
-    return stopped and not reset and facts.healthy_for(JOINTS[joint][0], 0.5)
+    return stopped and not reset and facts.healthy_for(JOINTS[one.joint][0], 0.5)
 
 
 @always
@@ -93,7 +92,7 @@ def a_stop_is_on_the_bus(facts: Facts) -> Complaints:
 def _is_missed(facts: Facts, joint: str, asked_ns: int) -> bool:
     """Of two axes of a drive that does not answer, the second cannot be asked yet."""
     bus = JOINTS[joint][0]
-    answers = facts.healthy_for(bus, 0.1)
+    answers = facts.healthy_for(bus, 1.5)
     axes = [joint] if answers else [one for one in JOINTS if JOINTS[one][0] == bus]
     last_ns = max(facts.stopped_at.get(one, 0) for one in axes)
     takes = facts.world.wires[bus].takes_since_ns <= asked_ns
@@ -140,7 +139,8 @@ def what_a_stop_says_is_true(facts: Facts, asked: Asked) -> Complaints:
     for joint, outcome in asked.result.drives.items():
         axis = facts.world.axes[joint]
         stands = axis.state in STOPPED and facts.now_ns - axis.since_ns > 5 * BRAKES_NS
-        if outcome != "confirmed" and stands and facts.healthy_for(JOINTS[joint][0], 2.0):
+        healthy_ns = facts.healthy_since.get(JOINTS[joint][0], facts.now_ns)
+        if outcome != "confirmed" and stands and healthy_ns <= asked.asked_ns:
             yield f"{joint} is called {outcome}, though it has stopped and answers"
         last = facts.newest(joint, facts.now_ns - NOTICED_NS)
         since = [one for one in facts.known[joint] if one.sampled_ns >= asked.asked_ns]

@@ -262,7 +262,15 @@ def _damage(stage: Stage) -> None:
 _event("disk is full", _disk(full=True), _disk_is_well, weight=0.5)
 _event("disk is read only", _disk(read_only=True), _disk_is_well, weight=0.5)
 _event("disk is slow", _disk(sync_ns=SLOW_SYNC_NS), _disk_is_well)
+
+
+def _damage_for_good(stage: Stage) -> None:
+    _damage(stage)
+    _disk(read_only=True)(stage)
+
+
 _event("undo is damaged", _damage, lambda stage: bool(stage.facts.undo), weight=0.5)
+_event("undo is damaged for good", _damage_for_good, lambda stage: bool(stage.facts.undo), weight=0.5)
 _event(
     "a thread is late",
     lambda stage: stage.runtime.delay_next(),

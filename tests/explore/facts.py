@@ -28,6 +28,15 @@ class Known(NamedTuple):
     state: DriveState | None
 
 
+class Commanded(NamedTuple):
+    """A controlword that the gateway sent, and the state in which it met the drive, and since when."""
+
+    joint: str
+    controlword: int
+    state: DriveState
+    since_ns: int
+
+
 class Download(NamedTuple):
     """A value that the gateway sent to an object that is a parameter, and what the device held then."""
 
@@ -69,10 +78,11 @@ class Facts:
     known: dict[str, deque[Known]] = field(default_factory=_deques)
     run_read: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=KNOWN))
     stopped_at: dict[str, int] = field(default_factory=dict)  # joint → when it was last told to stop
-    controlwords: list[tuple[str, int]] = field(default_factory=list)  # that nobody has judged yet
+    controlwords: list[Commanded] = field(default_factory=list)  # that nobody has judged yet
     downloads: list[Download] = field(default_factory=list)  # that nobody has judged yet
     # How the devices are
-    healthy_since: dict[str, int] = field(default_factory=dict)
+    healthy_since: dict[str, int] = field(default_factory=dict)  # since when it answers in time
+    whole_since: dict[str, int] = field(default_factory=dict)  # and says by itself what it should
     enabled_since: dict[str, int] = field(default_factory=dict)
     runs_since: int | None = None  # the controller
     # Writes
@@ -111,11 +121,14 @@ class Facts:
         parameter = PARAMETERS[name]
         return self.world.devices[parameter.device].get(*parameter.address)
 
+    def writer(self, name: str) -> tuple[str, int]:
+        """Who wrote what the device holds, and when."""
+        parameter = PARAMETERS[name]
+        return self.world.devices[parameter.device].writers.get(parameter.address, ("", 0))
+
     def is_ours(self, name: str) -> bool:
         """Whether the gateway wrote what the device holds."""
-        parameter = PARAMETERS[name]
-        written = self.world.devices[parameter.device].writers.get(parameter.address)
-        return written == GATEWAY
+        return self.writer(name)[0] == GATEWAY
 
     def healthy_for(self, device: str, seconds: float) -> bool:
         since = self.healthy_since.get(device)
@@ -180,6 +193,7 @@ class Facts:
     def on_new_life(self, life: Life) -> None:
         """Of what was not answered nobody knows what became of it; what was on trial is so no more."""
         for asked in self.waiting:
+            self.must_hold &= asked.method != "robot.reset"
             for name, value in asked.params.get("changes", {}).items():
                 self.legit[name].add(counts(name, value))
         for trial in self.trials.values():
@@ -209,15 +223,11 @@ class Facts:
     def look_at_devices(self) -> None:
         now_ns = self.now_ns
         for name, device in self.world.devices.items():
-            if not device.answers or not device.wire.hears:
-                self.healthy_since.pop(name, None)
-            else:
-                self.healthy_since.setdefault(name, now_ns)
+            answers = device.answers and device.wire.hears
+            _follow(self.healthy_since, name, now_ns, holds=answers)
+            _follow(self.whole_since, name, now_ns, holds=answers and not device.faults.no_tpdo)
         for joint, axis in self.world.axes.items():
-            if axis.enabled:
-                self.enabled_since.setdefault(joint, now_ns)
-            else:
-                self.enabled_since.pop(joint, None)
+            _follow(self.enabled_since, joint, now_ns, holds=axis.enabled)
         self.runs_since = (self.runs_since or now_ns) if self.world.gait.runs else None
 
     # What follows from it
@@ -271,7 +281,8 @@ class Facts:
 
     def _on_controlword(self, device: Device, axis: int, value: int) -> None:
         joint = next(name for name, at in JOINTS.items() if at == (device.name, axis))
-        self.controlwords.append((joint, value))
+        drive = self.world.axes[joint]
+        self.controlwords.append(Commanded(joint, value, drive.state, drive.since_ns))
         if value & 0x86 == 0x02 or value & 0x82 == 0:  # quick stop, disable voltage
             self.stopped_at[joint] = self.now_ns
 
@@ -300,3 +311,11 @@ class Facts:
             self.last_stop_ns = max(self.last_stop_ns, *tripped.values(), 0)
         self.trips = trips
         self.tripped_since = {name: self.tripped_since.get(name, self.now_ns) for name in tripped}
+
+
+def _follow(since: dict[str, int], name: str, now_ns: int, *, holds: bool) -> None:
+    """Keep since when something holds."""
+    if holds:
+        since.setdefault(name, now_ns)
+    else:
+        since.pop(name, None)

@@ -3,6 +3,7 @@
 A check looks at the facts and says in words what is wrong, or nothing. Add one in `about_….py` with its mark.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -27,7 +28,21 @@ class Invariants:
         return " ".join((checks[name].__doc__ or "").split()) if name in checks else name
 
 
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Which of them count: those that are named, or all but those ignored, where the text says so."""
+
+    only: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    saying: str = ""  # a regular expression
+
+    def counts(self, invariant: str, text: str) -> bool:
+        named = invariant in self.only if self.only else invariant not in self.ignored
+        return named and re.search(self.saying, text) is not None
+
+
 KNOWN = Invariants()
+EVERYTHING = Judged()
 
 
 def always(check: Check) -> Check:

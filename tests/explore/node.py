@@ -13,7 +13,7 @@ BOOT_UP, OPERATIONAL, STOPPED = 0x00, 0x05, 0x04
 ABORT_NO_OBJECT, ABORT_READ_ONLY, ABORT_LENGTH = 0x06020000, 0x06010002, 0x06070010
 ABORT_COMMAND, ABORT_REFUSED = 0x05040001, 0x08000022
 _OWN_OBJECTS = (*range(0x2000, 0x3000), *range(0x6072, 0xA000, 0x800))
-ANSWER_S, SLOW_S, LATE_S, DOUBLED_AFTER_S = 0.0004, 0.005, 1.2, 0.0006
+ANSWER_S, SLOW_S, LATE_S, DOUBLED_AFTER_S = 0.0004, 0.01, 1.2, 0.0006
 HEARTBEAT_S = 0.5
 BOOT_S = 0.3  # from losing its power to its boot-up
 _SIZES = {0x02: 1, 0x03: 2, 0x04: 4, 0x05: 1, 0x06: 2, 0x07: 4}
@@ -57,7 +57,7 @@ class Device:
         self.faults = Faults()
         self.told: Callable[[Device, Address, int, bytes], object] = lambda *_read: None
         self.values: dict[Address, bytes] = {}
-        self.writers: dict[Address, str] = {}  # who wrote each object last
+        self.writers: dict[Address, tuple[str, int]] = {}  # who wrote each object last, and when
         self.nmt = OPERATIONAL
         self.boots = 0
         self._answer_ns = 0
@@ -80,7 +80,7 @@ class Device:
     def write(self, who: str, index: int, subindex: int, data: bytes) -> None:
         """Anybody's write, by SDO or otherwise."""
         self.values[index, subindex] = data
-        self.writers[index, subindex] = who
+        self.writers[index, subindex] = who, self.wire.runtime.now_ns
 
     @property
     def state(self) -> tuple[object, ...]:

@@ -4,7 +4,7 @@ An order is a list of events, each so many steps after the one before.
 """
 
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from tests.explore.events import EVENTS, Event
 from tests.explore.stage import Stage
@@ -40,7 +40,7 @@ class Player:
             self._after(gap, [EVENTS[name]], random.Random(0))
         self.stage.end()
 
-    def improvise(self, source: random.Random, count: int) -> None:
+    def improvise(self, source: random.Random, count: int, events: Sequence[Event]) -> None:
         """So many events at random, then its end."""
         gaps, weights = zip(*GAPS, strict=True)
         for _ in range(count):
@@ -50,10 +50,10 @@ class Player:
             gap = source.randint(1, most or 1)
             if most is None:
                 gap += self._runtime.steps - self._mark
-            self._after(gap, list(EVENTS.values()), source)
+            self._after(gap, events, source)
         self.stage.end()
 
-    def _after(self, gap: int, events: list[Event], source: random.Random) -> None:
+    def _after(self, gap: int, events: Sequence[Event], source: random.Random) -> None:
         """One of the events that are possible then."""
         happened = False
 

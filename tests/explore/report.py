@@ -25,11 +25,14 @@ class Found(msgspec.Struct, frozen=True):
     scene: str
     order: Order
     frames: list[str]
+    after_s: float = 0.0  # so long after the search began
 
     @classmethod
-    def of(cls, scene: str, order: Order, finding: Finding, frames: Sequence[Sent]) -> Self:
+    def of(
+        cls, scene: str, order: Order, finding: Finding, frames: Sequence[Sent], after_s: float = 0.0
+    ) -> Self:
         told = [_frame(one) for one in frames[-FRAMES:]]
-        return cls(finding.invariant, finding.text, scene, order, told)
+        return cls(finding.invariant, finding.text, scene, order, told, after_s)
 
     @property
     def kind(self) -> tuple[str, str]:

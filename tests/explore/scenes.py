@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from tests.explore.events import EVENTS
+from tests.explore.invariants import EVERYTHING, Judged
 from tests.explore.stage import Stage
 from tests.explore.world import BLIND, GUARD, World
 
@@ -20,9 +21,9 @@ class Scene:
     settles: bool = True
     dark: bool = False  # the robot is switched off while the gateway starts
 
-    def build(self) -> Stage:
-        """The robot in this situation; one process builds one."""
-        stage = Stage(World(role=self.role, guard=self.guard))
+    def build(self, judged: Judged = EVERYTHING) -> Stage:
+        """The robot in this situation, one process builds one."""
+        stage = Stage(World(role=self.role, guard=self.guard), judged)
         if self.dark:
             for device in stage.world.devices.values():
                 device.faults.dead = True

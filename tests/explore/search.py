@@ -11,12 +11,14 @@ import random
 import signal
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from tests.explore.events import EVENTS, Event
+from tests.explore.can import Sent
+from tests.explore.events import Event
+from tests.explore.invariants import Judged
 from tests.explore.player import Order, Player
 from tests.explore.report import Found, note
 from tests.explore.runtime import START_NS, Spinning
@@ -40,8 +42,16 @@ class Options:
     seed: int
     depth: int
     workers: int
-    scenes: tuple[Scene, ...]
-    reports: Path
+    events: tuple[Event, ...]  # what may happen
+    judged: Judged
+    first: bool  # whether the first violation ends it
+    begun: float  # time.time()
+    reports: Path  # where violations are noted
+
+    @property
+    def ended(self) -> bool:
+        """Whether what was looked for was found."""
+        return self.first and self.reports.exists()
 
 
 class Search:
@@ -50,7 +60,7 @@ class Search:
     def __init__(self, scene: Scene, options: Options, shared: Shared, until: float) -> None:
         self.scene, self.options, self.shared = scene, options, shared
         gc.disable()
-        self.stage = scene.build()
+        self.stage = scene.build(options.judged)
         gc.freeze()
         self.player = Player(self.stage)
         self._until = until
@@ -68,7 +78,7 @@ class Search:
             if time.monotonic() < tree_until:
                 self._fork(lambda low=low, high=high: self._tree(low, high, tree_until), ())  # type: ignore[misc]
         seed = 0
-        while self.options.seconds and time.monotonic() < self._until:
+        while self.options.seconds and not self._is_over():
             seed += 1
             self._fork(lambda seed=seed: self._random(seed), ((seed, "random"),))  # type: ignore[misc]
 
@@ -85,7 +95,10 @@ class Search:
 
     def _random(self, seed: int) -> None:
         source = random.Random(f"{self.options.seed} {seed} {self.shared.worker} {self.scene.name}")
-        self.player.improvise(source, source.randint(3, MOST_EVENTS))
+        self.player.improvise(source, source.randint(3, MOST_EVENTS), self.options.events)
+
+    def _is_over(self) -> bool:
+        return time.monotonic() > self._until or self.options.ended
 
     def _end(self) -> None:
         """Where another run has been, its end is known too."""
@@ -105,8 +118,8 @@ class Search:
         state = hash((self.scene.name, self.stage.fingerprint()))
         if self.shared.is_new(state):
             self.shared.add(Count.STATES)
-        for event in EVENTS.values():
-            if time.monotonic() > self._until:
+        for event in self.options.events:
+            if self._is_over():
                 self._left = 0
                 return
             if event.possible(self.stage) and self._is_due(event, state) and self._branch(event):
@@ -183,11 +196,14 @@ class Search:
             shared.add(Count.ORDERS)
 
     def _note(self, finding: Finding) -> None:
-        found = Found.of(self.scene.name, self.player.order, finding, self.stage.frames)
-        note(self.options.reports, found)
+        self._report(self.player.order, finding, self.stage.frames)
+
+    def _report(self, order: Order, finding: Finding, frames: Sequence[Sent]) -> None:
+        after_s = time.time() - self.options.begun
+        note(self.options.reports, Found.of(self.scene.name, order, finding, frames, after_s))
 
     def _wait(self, child: int, order: Order) -> None:
         _pid, status = os.waitpid(child, 0)
         if os.WIFSIGNALED(status) or os.waitstatus_to_exitcode(status) not in (0, 1):
             finding = Finding("Every run comes to its end.", f"the run ended with status {status}")
-            note(self.options.reports, Found.of(self.scene.name, order, finding, []))
+            self._report(order, finding, ())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from tests.explore.invariants import Judged
 from tests.explore.player import Order, Player
 from tests.explore.report import Found
 from tests.explore.scenes import SCENES
@@ -21,20 +22,20 @@ def replayed(stage: Stage, scene: str, order: Order) -> Found | None:
     return None
 
 
-def shrunk(found: Found, scratch: Path) -> Found:
+def shrunk(found: Found, scratch: Path, judged: Judged) -> Found:
     """The same violation by a shorter order, as far as there is one. Forks."""
     child = os.fork()
     if child:
         os.waitpid(child, 0)
         return msgspec.json.decode(scratch.read_bytes(), type=Found) if scratch.exists() else found
     try:
-        scratch.write_bytes(msgspec.json.encode(_shorter(found, scratch)))
+        scratch.write_bytes(msgspec.json.encode(_shorter(found, scratch, judged)))
     finally:
         os._exit(0)
 
 
-def _shorter(found: Found, scratch: Path) -> Found:
-    stage = SCENES[found.scene].build()
+def _shorter(found: Found, scratch: Path, judged: Judged) -> Found:
+    stage = SCENES[found.scene].build(judged)
     tried = True
     while tried:
         tried = False
