@@ -112,7 +112,7 @@ def an_answer_to_a_write_is_true(facts: Facts, asked: Asked) -> Complaints:
     """After "unchanged" or "taken back" the device holds the old value, after success the new one."""
     if asked.method != "parameter.write":
         return
-    outcome = (asked.error.data.outcome or {}) if asked.error is not None else {}
+    outcome = asked.outcome
     for name in asked.params["changes"]:
         written, held = _wanted(asked, name), facts.value(name)
         if not facts.is_ours(name) or (PARAMETERS[name].starts and not written):

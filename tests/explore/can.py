@@ -76,6 +76,8 @@ class Wire:
         self._look()
         while not blocked and self._waiting:
             self.send(*self._waiting.popleft())
+        if not blocked and self.transport is not None:
+            self.transport.wake()
 
     def lose(self, gone: bool) -> None:
         """Take the gateway's interface away, or bring it back."""
@@ -125,10 +127,13 @@ class Transport:
     def __init__(self, wire: Wire) -> None:
         self.dropped = 0
         self.warning: str | None = None
+        self.blocks = False
+        self.full = f"interface {wire.name} does not send: nobody acknowledges"
         self._wire = wire
         self._inbox: list[tuple[int, int, bytes]] = []
         self._accepted: frozenset[int] | None = None
         self._reader = Waiters()
+        self._room = Waiters()
         self._closed = False
 
     def receive(self, timeout_s: float) -> Sequence[tuple[int, int, bytes]]:
@@ -151,6 +156,21 @@ class Transport:
         self._check()
         self._wire.send(GATEWAY, can_id, data)
 
+    def try_send(self, can_id: int, data: bytes) -> bool:
+        self._wire.runtime.point()
+        self._check()
+        if not self._wire.full():
+            self._wire.send(GATEWAY, can_id, data)
+            return True
+        return False
+
+    def flush(self) -> bool:
+        return True
+
+    def await_room(self, timeout_s: float) -> None:
+        if self._wire.full() and not self._wire.gone:
+            self._room.wait(round(timeout_s * 1e9))
+
     def accept(self, can_ids: frozenset[int] | None) -> None:
         self._accepted = can_ids
 
@@ -166,6 +186,7 @@ class Transport:
 
     def wake(self) -> None:
         self._reader.wake()
+        self._room.wake()
 
     def _check(self) -> None:
         if self._closed or self._wire.gone:

@@ -1,7 +1,8 @@
 """The defects that were proved once, each with how it would be put back and by which invariant it is found.
 
-`parts` are the texts that put it back; without any it is looked for in the code as it is. `scenes` and `events`
-are where the search looks, so that a defect takes seconds and not hours; nothing says in which order.
+`parts` are the texts that put it back; without any it is looked for in the code as it is. `scenes` and
+`events` are where the search looks, so that a defect takes seconds and not hours; nothing says in which
+order.
 """
 
 from dataclasses import dataclass

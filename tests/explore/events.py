@@ -74,6 +74,17 @@ _event("ada gives back", _asks(LEADER, "control.release"))
 _event("ben leads", _asks(OTHER, "control.acquire", ttl_s=LEASE_S))
 _event("ben resets", _asks(OTHER, "robot.reset"))
 _event("ada dies", lambda stage: stage.leave(LEADER), lambda stage: LEADER in stage.life.people)
+_event(
+    "ada says no more",
+    lambda stage: stage.leave(LEADER, gone=False),
+    lambda stage: LEADER in stage.life.people,
+)
+_event(
+    "ada streams",
+    _asks(LEADER, "stream.start", modules=["component"], channels=["knee.position"], rate_hz=2.0),
+    lambda stage: LEADER in stage.life.people,
+    weight=0.5,
+)
 _event("ada enables", _asks(LEADER, "robot.enable"), lambda stage: stage.world.role == "master")
 _event("ada stores", _asks(LEADER, "parameter.store", component="knee"))
 _event("write step", _write("gait.step_length"))

@@ -207,7 +207,7 @@ class Facts:
         control = self.life.module("control")
         if (control is None) != (self.control_since_ns is None):
             self.control_since_ns = None if control is None else self.now_ns
-        held = control is not None and control.stop_held
+        held = self.life.held
         if held and not self.held:
             self.held_since_ns = self.now_ns
         self.hold_ended |= self.held and not held and control is not None

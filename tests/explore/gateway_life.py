@@ -1,17 +1,16 @@
-"""One life of the gateway: its real service over its real loop, and people who ask it for things."""
+"""One life of the gateway: its real daemon, and people who ask it for things over their connections."""
 
 import itertools
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 
 from gateway import config, wire
-from gateway.loop import Loop
-from gateway.service import Service
-from tests.explore.system import Channel
+from gateway.daemon import Daemon
+from gateway.messages import METHODS
+from tests.explore.net import Connection, Listener
 from tests.explore.world import World
 
 
@@ -26,35 +25,17 @@ class Asked:
     asked_ns: int
     answered_ns: int | None = None
     result: Any = None
-    error: wire.RpcError | None = None
+    error: wire.ErrorBody | None = None
 
     @property
     def kind(self) -> str | None:
         """Of the error that it was answered with."""
-        return None if self.error is None else self.error.kind.value
+        return None if self.error is None or self.error.data is None else self.error.data.kind.value
 
-
-class Person:
-    """One client's connection, as far as the gateway's modules know it."""
-
-    def __init__(self, life: "Life", name: str) -> None:
-        self.peer = name
-        self.who = name
-        self.closed = False
-        self.cpu_ns = 0
-        self.outlets: dict[int, Any] = {}
-        self._life = life
-        self._farewells: list[Callable[[], None]] = []
-
-    def on_close(self, farewell: Callable[[], None]) -> None:
-        self._farewells.append(farewell)
-
-    def close(self) -> None:
-        """The connection has ended. In the loop."""
-        if not self.closed:
-            self.closed = True
-            for farewell in self._farewells:
-                farewell()
+    @property
+    def outcome(self) -> dict[str, str]:
+        """What the error says has become of each parameter."""
+        return {} if self.error is None or self.error.data is None else self.error.data.outcome or {}
 
 
 class Life:
@@ -62,36 +43,43 @@ class Life:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        self.people: dict[str, Person] = {}
+        self.people: dict[str, Connection] = {}  # those who are connected
         self.asked: list[Asked] = []
         self.answered: Callable[[Asked], object] = lambda _asked: None
         self._numbers = itertools.count(1)
-        self._arrivals = Channel()
-        runtime = world.runtime
-        runtime.owner = self
-        self.loop = Loop()
-        self.service = Service(config.load(world.file), self.loop)
-        self.loop.watch(self._arrivals, 1, lambda _events: self._take())
-        self.loop.post(self.service.resume)
-        runtime.spawn("loop", self.loop.run)
+        self._listener = Listener(world.system)
+        world.runtime.owner = self
+        self._daemon = Daemon(config.load(world.file), cast("Any", self._listener))
+        world.runtime.spawn("gateway", self._daemon.run)
 
     def module(self, name: str) -> Any:
         """The running module; `None` where it does not run."""
-        return self.service.registry.running(name)
+        return self._daemon._service.registry.running(name)
+
+    @property
+    def held(self) -> bool:
+        """Whether a stop is held."""
+        control = self.module("control")
+        if control is None:
+            return False
+        return bool(control.authority.held if hasattr(control, "authority") else control.stop_held)
 
     def ask(self, who: str, method: str, **params: Any) -> Asked:
-        """Send a request; it comes with the loop's next turn."""
-        now_ns = self.world.runtime.now_ns
-        asked = Asked(next(self._numbers), who, method, params, now_ns)
+        """Send a request, over a new connection where there is none."""
+        asked = Asked(next(self._numbers), who, method, params, self.world.runtime.now_ns)
         self.asked.append(asked)
-        self._arrivals.put(lambda: self._handle(asked))
+        connection = self.people.get(who)
+        if connection is None or connection.closed:
+            connection = self.people[who] = Connection(self.world.system, self._hear)
+            self._listener.connect(connection)
+        connection.say(wire.encode_request(asked.number, method, params))
         return asked
 
-    def leave(self, who: str) -> None:
-        """Close a person's connection."""
-        person = self.people.pop(who, None)
-        if person is not None:
-            self._arrivals.put(person.close)
+    def leave(self, who: str, *, gone: bool = True) -> None:
+        """Close a person's connection; or say nothing more, and still take what comes."""
+        connection = self.people.pop(who, None)
+        if connection is not None:
+            connection.end(gone=gone)
 
     def kill(self) -> None:
         """End it where it stands."""
@@ -100,40 +88,18 @@ class Life:
         for one in self.world.wires.values():
             one.disconnect()
 
-    def _take(self) -> None:
-        for arrival in self._arrivals.take():
-            arrival()
+    def _hear(self, data: bytes) -> None:
+        for line in data.splitlines():
+            if b'"id"' in line:
+                self._answer(msgspec.json.decode(line, type=wire.Response))
 
-    def _person(self, name: str) -> Person:
-        person = self.people.get(name)
-        if person is None:
-            person = self.people[name] = Person(self, name)
-            self.service.opened(person)  # type: ignore[arg-type]
-        return person
-
-    def _handle(self, asked: Asked) -> None:
-        params = msgspec.Raw(msgspec.json.encode(asked.params))
-        request = wire.Request("2.0", asked.method, params, asked.number)
-        try:
-            answer = self.service.handle(self._person(asked.who), request)  # type: ignore[arg-type]
-        except wire.RpcError as error:
-            self._tell(asked, None, error)
+    def _answer(self, response: wire.Response) -> None:
+        found = next((one for one in self.asked if one.number == response.id), None)
+        if found is None or found.answered_ns is not None:
             return
-        if isinstance(answer, Future):
-            answer.add_done_callback(lambda done: self.loop.call(lambda: self._complete(asked, done)))
-        else:
-            self._tell(asked, answer, None)
-
-    def _complete(self, asked: Asked, done: "Future[object]") -> None:
-        error = done.exception()
-        if error is None:
-            self._tell(asked, done.result(), None)
-        elif isinstance(error, wire.RpcError):
-            self._tell(asked, None, error)
-        else:
-            raise error
-
-    def _tell(self, asked: Asked, result: Any, error: wire.RpcError | None) -> None:
-        asked.answered_ns = self.world.runtime.now_ns
-        asked.result, asked.error = result, error
-        self.answered(asked)
+        found.answered_ns = self.world.runtime.now_ns
+        if isinstance(response.error, wire.ErrorBody):
+            found.error = response.error
+        elif isinstance(response.result, msgspec.Raw):
+            found.result = msgspec.json.decode(response.result, type=METHODS[found.method].result)
+        self.answered(found)

@@ -2,12 +2,14 @@
 
 import concurrent.futures
 import concurrent.futures._base as futures
+import ctypes
 import fcntl
 import gc
 import importlib
 import os
 import pkgutil
 import queue
+import select
 import selectors
 import sys
 import threading
@@ -20,24 +22,26 @@ import drivers
 import eds
 import gateway
 from drivers.bus import opening
-from tests.explore.disk import Disk, Locking
+from tests.explore.disk import Locking
 from tests.explore.runtime import Runtime
-from tests.explore.system import System
+from tests.explore.system import Poller, System
 from tests.explore.threads import Fakes, ThreadPoolExecutor
 
 UNDER_TEST = (gateway, drivers)
 _NOT_LOADED = ("cli", "client", "resting", "main")  # programs, and what only clients run
 
 
-def install(runtime: Runtime, disk: Disk, open_transport: Callable[..., object]) -> None:
+def install(runtime: Runtime, system: System, open_transport: Callable[..., object]) -> None:
     """From now on nothing under test knows any other world. There is no way back in this process."""
-    fakes, system = Fakes(runtime), System(runtime, disk)
+    fakes = Fakes(runtime)
     instead: dict[int, Any] = {
         id(threading): fakes.threading,
         id(queue): fakes.queue,
         id(time): system.time,
         id(os): system.os,
         id(selectors): system.selectors,
+        id(getattr(select, "epoll", None)): Poller,
+        id(ctypes): SimpleNamespace(CDLL=_Libc, get_errno=lambda: 0),  # no memory is locked here
         id(fcntl): Locking,
         id(gc): SimpleNamespace(
             collect=_nothing, freeze=_nothing, unfreeze=_nothing
@@ -59,6 +63,13 @@ def install(runtime: Runtime, disk: Disk, open_transport: Callable[..., object])
 
 def _nothing() -> None:
     """Done elsewhere."""
+
+
+class _Libc:
+    """As much of the C library as is asked for."""
+
+    def __init__(self, *_name: object, **_options: object) -> None:
+        self.mlockall = self.munlockall = lambda *_flags: 0
 
 
 def _load_all(name: str, path: Any) -> None:

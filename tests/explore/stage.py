@@ -68,8 +68,8 @@ class Stage:
         self.facts.on_asked(asked)
         return asked
 
-    def leave(self, who: str) -> None:
-        self.life.leave(who)
+    def leave(self, who: str, *, gone: bool = True) -> None:
+        self.life.leave(who, gone=gone)
         self.facts.on_left(who)
 
     def restart(self, *, power: bool = False) -> None:

@@ -16,6 +16,7 @@ from tests.explore.drive import Axis, Controller, Drive
 from tests.explore.node import Device, EdsText
 from tests.explore.parameters import PARAMETERS
 from tests.explore.runtime import Runtime
+from tests.explore.system import System
 
 RECORDS = "/robot/records"
 FILE = "/robot/robot.toml"
@@ -93,6 +94,7 @@ class World:
         self.role = role
         self.runtime = Runtime()
         self.disk = Disk(self.runtime)
+        self.system = System(self.runtime, self.disk)
         self.watchers: list[Callable[[Sent], None]] = []
         self.wires = {name: Wire(self.runtime, name, self._tell) for name in ("left", "right")}
         self.left = Drive(self.wires["left"], "left", 1, 1, quick_stop_option=2)
@@ -106,7 +108,7 @@ class World:
         self.records = at(self.disk, RECORDS)
         self.file.write_bytes(self._toml(guard, fallback).encode())
         self.disk.make_durable()
-        patching.install(self.runtime, self.disk, self._open_transport)
+        patching.install(self.runtime, self.system, self._open_transport)
 
     def _toml(self, guard: str, fallback: str) -> str:
         folder = Path(tempfile.mkdtemp(prefix="explore-"))
