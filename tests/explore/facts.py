@@ -3,6 +3,7 @@
 import struct
 from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import msgspec
@@ -17,6 +18,8 @@ from tests.explore.parameters import NAMES, PARAMETERS, counts
 from tests.explore.world import JOINTS, World
 
 LOOK_NS = 5_000_000  # how often the guard and the devices are asked how they are
+SEEN_NS = 500_000_000  # how long before a write a value may have been read
+LOST_S = 5.0  # how long the gateway may go on with what somebody asked for who has left
 KNOWN = 1000  # statuswords of a drive that are remembered
 
 
@@ -38,12 +41,16 @@ class Commanded(NamedTuple):
 
 
 class Download(NamedTuple):
-    """A value that the gateway sent to an object that is a parameter, and what the device held then."""
+    """A value that the gateway sent to an object that is a parameter, and what the device held then.
+
+    `seen`: the gateway can have known what it held.
+    """
 
     stamp_ns: int
     name: str
     value: int
     before: int
+    seen: bool
 
 
 @dataclass(slots=True)
@@ -114,8 +121,10 @@ class Facts:
 
     @property
     def waiting(self) -> list[Asked]:
-        """Requests that are not answered yet."""
-        return [one for one in self.life.asked if one.answered_ns is None] if self.open.total() else []
+        """Requests whose answers are waited for."""
+        if not self.open.total():
+            return []
+        return [one for one in self.life.asked if one.answered_ns is None and not one.lost]
 
     def value(self, name: str) -> int:
         parameter = PARAMETERS[name]
@@ -174,7 +183,12 @@ class Facts:
             follow(asked)
 
     def on_left(self, who: str) -> None:
-        """What somebody has on trial ends now."""
+        """What somebody has on trial ends now; what becomes of what they have asked for nobody is told."""
+        for asked in self.waiting:
+            if asked.who == who:
+                asked.lost = True
+                self._forget(asked)
+                self.world.runtime.call_in(LOST_S, partial(self._give_up, asked, self.life))
         for trial in self.trials.values():
             if trial.who == who:
                 trial.due_ns = min(trial.due_ns, self.now_ns)
@@ -193,9 +207,7 @@ class Facts:
     def on_new_life(self, life: Life) -> None:
         """Of what was not answered nobody knows what became of it; what was on trial is so no more."""
         for asked in self.waiting:
-            self.must_hold &= asked.method != "robot.reset"
-            for name, value in asked.params.get("changes", {}).items():
-                self.legit[name].add(counts(name, value))
+            self._forget(asked)
         for trial in self.trials.values():
             trial.due_ns = min(trial.due_ns, self.now_ns)
         self.life, self.held, self.control_since_ns = life, False, None
@@ -231,6 +243,17 @@ class Facts:
         self.runs_since = (self.runs_since or now_ns) if self.world.gait.runs else None
 
     # What follows from it
+
+    def _forget(self, asked: Asked) -> None:
+        """Nobody will know what became of it."""
+        self.must_hold &= asked.method != "robot.reset"
+        for name, value in asked.params.get("changes", {}).items():
+            self.legit[name].add(counts(name, value))
+
+    def _give_up(self, asked: Asked, life: Life) -> None:
+        if life is self.life and asked.answered_ns is None:
+            asked.answered_ns = self.now_ns
+            self.open[asked.method] -= 1
 
     def _on_stopped(self, asked: Asked) -> None:
         self.must_hold |= asked.result is not None and asked.result.problem is None
@@ -277,7 +300,9 @@ class Facts:
     def _on_download(self, device: Device, address: Address, value: int, asked_ns: int) -> None:
         name = NAMES.get((device.name, address))
         if name is not None:
-            self.downloads.append(Download(asked_ns, name, value, self.value(name)))
+            who, changed_ns = self.writer(name)
+            seen = who == GATEWAY or asked_ns - changed_ns > SEEN_NS
+            self.downloads.append(Download(asked_ns, name, value, self.value(name), seen))
 
     def _on_controlword(self, device: Device, axis: int, value: int) -> None:
         joint = next(name for name, at in JOINTS.items() if at == (device.name, axis))

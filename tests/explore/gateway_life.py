@@ -24,6 +24,7 @@ class Asked:
     params: dict[str, Any]
     asked_ns: int
     answered_ns: int | None = None
+    lost: bool = False  # nobody is there any more to take its answer
     result: Any = None
     error: wire.ErrorBody | None = None
 

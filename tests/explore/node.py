@@ -90,9 +90,9 @@ class Device:
 
     @property
     def answers(self) -> bool:
-        """Whether who asks it gets an answer in time."""
+        """Whether who asks it gets one answer in time."""
         faults = self.faults
-        well = not (faults.dead or faults.no_sdo or faults.late_s > SLOW_S or faults.lose)
+        well = not (faults.dead or faults.no_sdo or faults.late_s > SLOW_S or faults.lose or faults.doubled)
         return well and self.nmt != STOPPED and not self.wire.blocked and not self.wire.gone
 
     # What happens to it

@@ -11,7 +11,7 @@ from tests.explore.invariants import EVERYTHING, KNOWN, Judged
 from tests.explore.world import World
 
 QUIET_NS = 600_000_000  # so long after the last thing it did, the gateway has come to rest
-LONGEST_S = 6.0  # how long that is waited for while something is wrong
+LONGEST_S = 9.5  # how long that is waited for while something is wrong
 HEALED_S = 14.0  # and when nothing is any more
 
 
@@ -99,7 +99,7 @@ class Stage:
         facts = self.facts
         if self.runtime.ready or self.runtime.now_ns - facts.last_change_ns < QUIET_NS or facts.undo:
             return False
-        return not facts.open.total()
+        return not facts.waiting
 
     def settle(self, longest_s: float = LONGEST_S) -> bool:
         """Let everything happen until it is quiet; whether it is."""
