@@ -53,7 +53,7 @@ class Heard:
     def __init__(self) -> None:
         self.stamp_ns = time.monotonic_ns()
         self.stops: list[Stopping] = []
-        self.lines: list[bytes | wire.BadLine] = []
+        self.lines: list[tuple[int, bytes | wire.BadLine]] = []  # with when they came in (monotonic, ns)
         self.refusals: list[bytes] = []  # of what was too much, ready to be sent
         self.ended = False  # the client will say nothing more
         self.lost: str | None = None  # why there is nobody any more
@@ -183,7 +183,7 @@ class Inlet:
                 else:  # it acts; only its answer is lost
                     self.unanswered += 1
             elif not self._is_full:
-                heard.lines.append(line)
+                heard.lines.append((time.monotonic_ns(), line))
                 self._handed += 1
                 self._handed_bytes += wire.size(line)
             elif self._has_room:

@@ -131,8 +131,13 @@ class Service:
             return own(session, params)
         if request.method == STOP and self.registry.running("control") is None:
             self._first_stop.begin()
-        module = self._use(MODULE_OF[request.method], session)
-        return then(module, lambda running: running.handlers[request.method](session, params))
+        module, asked_ns = self._use(MODULE_OF[request.method], session), session.asked_ns
+
+        def answer(running: Module) -> Answer:
+            session.asked_ns = asked_ns  # others may have been asked for while the module was starting
+            return running.handlers[request.method](session, params)
+
+        return then(module, answer)
 
     def _use(self, name: str, session: Session) -> "Future[Module]":
         # What a client asked for just before it vanished is still done (a stop above all).

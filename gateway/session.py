@@ -24,6 +24,7 @@ from gateway.stop_lines import STOP
 
 log = logging.getLogger(__name__)
 
+GREETINGS = frozenset({"hello", "clock.read"})
 PENDING = 64  # requests waiting for a device before the next is handled
 OUTPUT_BYTES = 1024 * 1024  # answers not yet taken before the next request is handled
 STREAM_BYTES = 64 * 1024  # output not yet taken before streams hold back
@@ -64,7 +65,8 @@ def _spends(work: "Callable[Concatenate[Session, P], None]") -> "Callable[Concat
 class Session:
     """A connection from accept to close. It belongs to the loop's thread.
 
-    Where `refusal` is given, everything but a stop is answered with it, and ends the connection.
+    Where `refusal` is given, everything but a stop, and the greeting that our own clients begin with, is
+    answered with it, and ends the connection.
     """
 
     def __init__(
@@ -89,7 +91,8 @@ class Session:
         self._handle = handle
         self._stuck_s = stuck_s
         self._refusal = refusal
-        self._queue: deque[bytes | wire.BadLine] = deque()
+        self.asked_ns = 0  # when the request came in that is handled now
+        self._queue: deque[tuple[int, bytes | wire.BadLine]] = deque()
         self._scheduled = False
         self._ran_in = 0  # the loop's turn
         self._pending = 0
@@ -196,10 +199,11 @@ class Session:
             log.info("%s: %s", self.peer, heard.lost)
             self.close()
             return
-        if self._refusal is None:
-            self._queue.extend(heard.lines)
-        elif heard.lines:
-            self._end_refused(heard.lines, self._refusal)
+        allowed = [one for one in heard.lines if self._refusal is None or _is_greeting(one[1])]
+        self._queue.extend(allowed)
+        if self._refusal is not None and len(allowed) < len(heard.lines):
+            refused = [line for _asked_ns, line in heard.lines if not _is_greeting(line)]
+            self._end_refused(refused, self._refusal)
         if heard.ended:
             self._end_input()
         if not self._scheduled:
@@ -256,11 +260,12 @@ class Session:
         self._scheduled = False
         if not self.closed and self._may_run and self._ran_in != self._loop.turns:
             self._ran_in = self._loop.turns
-            self._run(self._queue.popleft())
+            self._run(*self._queue.popleft())
         self._schedule()
         self._finish_if_done()
 
-    def _run(self, line: bytes | wire.BadLine) -> None:
+    def _run(self, asked_ns: int, line: bytes | wire.BadLine) -> None:
+        self.asked_ns = asked_ns
         self._inlet.done(1, wire.size(line))
         try:
             if isinstance(line, wire.BadLine):
@@ -372,3 +377,11 @@ class Session:
         else:
             log.warning("%s takes nothing for %g s; closed", self.peer, self._stuck_s)
             self.close()
+
+
+def _is_greeting(line: bytes | wire.BadLine) -> bool:
+    """What needs no module: a client of ours says it before it asks for a stop."""
+    try:
+        return isinstance(line, bytes) and wire.decode_request(line).method in GREETINGS
+    except wire.BadLine:
+        return False

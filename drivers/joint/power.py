@@ -3,12 +3,13 @@
 Whatever is on its way here ends when a stop is asked for: a way up is neither finished nor begun again.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from concurrent.futures import Future
 
 from drivers.bus.node import Node
 from drivers.bus.sdo import expedited
 from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sender import always
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import CONTROLWORD, STOPPED_STATES, Controlword
@@ -73,14 +74,14 @@ class PowerDrive:
         """Read its statusword once, behind all that is more urgent; no command is sent."""
         return self.node.run(lambda sdo: look(self._axis(sdo)))
 
-    def reset(self) -> Future[Led]:
-        """Lead it to SWITCH ON DISABLED, and never further."""
-        errand = self._errand(RESET_S)
+    def reset(self, wanted: Callable[[], bool] = always) -> Future[Led]:
+        """Lead it to SWITCH ON DISABLED, and never further, as long as that is `wanted`."""
+        errand = self._errand(RESET_S, wanted)
         return self.node.run(lambda sdo: lead_down(self._axis(sdo), errand))
 
-    def step_up(self, origin: DriveState) -> Future[Led]:
-        """Make the one transition up from `origin`."""
-        errand = self._errand(TRANSITION_S)
+    def step_up(self, origin: DriveState, wanted: Callable[[], bool] = always) -> Future[Led]:
+        """Make the one transition up from `origin`, if that is `wanted`."""
+        errand = self._errand(TRANSITION_S, wanted)
         return self.node.run(lambda sdo: step_up(self._axis(sdo), errand, origin))
 
     def _stop(
@@ -118,7 +119,8 @@ class PowerDrive:
     def _axis(self, sdo: SdoChannel) -> Axis:
         return Axis(sdo, self._offset)
 
-    def _errand(self, timeout_s: float) -> Errand:
+    def _errand(self, timeout_s: float, wanted: Callable[[], bool]) -> Errand:
+        """It ends with the next stop; one that was asked for before this began is the caller's to know."""
         last_stop = self._last_stop
         counts_per_turn = self.settings.counts_per_revolution * self.settings.gear_ratio
-        return Errand(lambda: self._last_stop is last_stop, timeout_s, counts_per_turn)
+        return Errand(lambda: self._last_stop is last_stop and wanted(), timeout_s, counts_per_turn)

@@ -71,6 +71,7 @@ class ControlModule:
         self._stop.start()
         loop.post(lambda: self._tuning.resume(left))
         self._context.stops_by(self.stop_robot)
+        loop.post(self._hold_changed)  # a stop that is held keeps the module from its first moment on
 
     def stop(self) -> None:
         self._context.stops_by(None)
@@ -138,7 +139,7 @@ class ControlModule:
 
     def _store(self, command: Command, session: "Session", component: str) -> "Future[messages.Stored]":
         self._leases.require(session)
-        return self._tuning.store(command, session.who, component)
+        return self._tuning.store(command, session, component)
 
     @property
     def drives(self) -> Mapping[str, Drive]:
@@ -164,12 +165,16 @@ class ControlModule:
 
     def _reset(self, session: "Session") -> "Future[messages.Reset]":
         self._leases.require(session)
-        return self._stop.reset(session.who)
+        return self._stop.reset(session.who, session.asked_ns)
 
     def _enable(self, session: "Session", joints: list[str] | None) -> "Future[messages.Enabled]":
         self._leases.require(session)
         return self._stop.enable(
-            session.who, joints, lambda: self._lost_lease(session), self._tuning.enabling_objection
+            session.who,
+            session.asked_ns,
+            joints,
+            lambda: self._lost_lease(session),
+            self._tuning.enabling_objection,
         )
 
     def _lost_lease(self, session: "Session") -> str | None:

@@ -158,16 +158,22 @@ class Tuning:
         if len({change.parameter.name for change in changes}) != len(changes):
             raise refuse(Kind.BAD_PARAMS, "a parameter is written twice, by its name and by its address")
         ready = self._component.when_ready({one.parameter.component for one in changes})
-        asked = _Asked(changes, session.who, trial_s, self.trials.expect(session), self._authority.permit())
+        asked = _Asked(
+            changes,
+            session.who,
+            trial_s,
+            self.trials.expect(session),
+            self._authority.permit(session.asked_ns),
+        )
         self._asked.add(asked)
         answer = then(ready, lambda _none: self._begin(asked))
         answer.add_done_callback(lambda _answer: self._end(asked))
         return answer
 
-    def store(self, command: Command, who: str, component: str) -> "Future[Stored]":
+    def store(self, command: Command, session: "Session", component: str) -> "Future[Stored]":
         """Let a device keep its values, or forget them; see `Storage.run`."""
-        leave = Leave(self._authority.permit(), lambda: self._ending)
-        return self._storage.run(command, who, component, leave)
+        leave = Leave(self._authority.permit(session.asked_ns), lambda: self._ending)
+        return self._storage.run(command, session.who, component, leave)
 
     # Reading
 

@@ -4,6 +4,7 @@ A stop takes effect here first: from the instant in which `feed` returns, whatev
 at the last moment before it would go out (`SdoChannel.download`), and only then are the drives asked to stop.
 """
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -23,11 +24,11 @@ class Permit:
     """What one write may do: everything that it may when it is asked for, until the next stop."""
 
     authority: "Authority"
-    stops: int
+    asked_ns: int  # when it came in
 
     def objection(self, address: Address) -> str | None:
         """Why the object must not be written now, in words; `None` where it may. From any thread."""
-        if self.authority.state.stops != self.stops:
+        if self.authority.state.asked_ns >= self.asked_ns:
             return "the robot was stopped before this was written"
         return self.authority.objection_to(address) or self.authority.frozen()
 
@@ -67,6 +68,10 @@ class Authority:
                 act(after)
         return after
 
+    def settled(self) -> "contextlib.AbstractContextManager[object]":
+        """While inside, nothing happens."""
+        return self._lock
+
     def is_newest(self, number: int) -> bool:
         """Whether nothing has begun since the undertaking of this number."""
         return self.state.number == number
@@ -75,9 +80,9 @@ class Authority:
         """The targets that are not known to rest."""
         return list(unproved(self.state, findings))
 
-    def permit(self) -> Permit:
-        """For a write that is asked for now."""
-        return Permit(self, self.state.stops)
+    def permit(self, asked_ns: int) -> Permit:
+        """For a write that came in at that time (monotonic)."""
+        return Permit(self, asked_ns)
 
     def objection_to(self, address: Address) -> str | None:
         """Why an object must not be written now, whoever wants it and since when."""

@@ -1,5 +1,6 @@
 """What a stop needs of a joint's driver."""
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Protocol
 
@@ -39,11 +40,11 @@ class Drive(Protocol):
 
     def nmt_stop(self) -> None: ...
 
-    def reset(self) -> "Future[Led]": ...
+    def reset(self, wanted: Callable[[], bool]) -> "Future[Led]": ...
 
     def look(self) -> "Future[Led]": ...
 
-    def step_up(self, origin: DriveState) -> "Future[Led]": ...
+    def step_up(self, origin: DriveState, wanted: Callable[[], bool]) -> "Future[Led]": ...
 
 
 def quick_stop(drive: Drive, *, wake: bool = True) -> "Future[StopOutcome]":

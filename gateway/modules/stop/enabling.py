@@ -25,12 +25,20 @@ class Enabling:
     """One way up of some drives. It belongs to the loop's thread."""
 
     def __init__(
-        self, loop: Loop, drives: Mapping[str, Drive], who: str, objection: Objection, journal: Journal
+        self,
+        loop: Loop,
+        drives: Mapping[str, Drive],
+        who: str,
+        objection: Objection,
+        wanted: Callable[[], bool],
+        journal: Journal,
     ) -> None:
+        """`wanted`, asked from any thread, is false from the moment in which a stop overtakes it."""
         self._loop = loop
         self._drives = drives
         self._who = who
         self._objection = objection
+        self._wanted = wanted
         self._journal = journal
         self._led: dict[str, Led] = {}
         self._begun: dict[str, Drive] = {}  # those that were not enabled before
@@ -47,7 +55,7 @@ class Enabling:
             return self._give_up(dict.fromkeys(self._drives, objection))
         if not left:
             return done(self._told({}))
-        steps = {name: _step(drive, left[0]) for name, drive in self._drives.items()}
+        steps = {name: _step(drive, left[0], self._wanted) for name, drive in self._drives.items()}
         return then(back(self._loop, gather(steps)), lambda found: self._next(found, left[1:]))
 
     def _next(self, found: Mapping[str, Led | Exception], left: list[DriveState]) -> "Future[Enabled]":
@@ -66,7 +74,15 @@ class Enabling:
         stops = back(self._loop, gather(_quick_stop_all(self._begun)))
         return then(stops, lambda found: self._given_up(problems, found))
 
-    def _given_up(self, problems: dict[str, str], stops: Mapping[str, object]) -> Enabled:
+    def _given_up(self, problems: dict[str, str], stops: Mapping[str, object]) -> "Future[Enabled]":
+        """Where the drives are now is read once more."""
+        seen = {name: _call(drive.look) for name, drive in self._drives.items()}
+        return then(back(self._loop, gather(seen)), lambda found: self._seen(problems, stops, found))
+
+    def _seen(
+        self, problems: dict[str, str], stops: Mapping[str, object], found: Mapping[str, Led | Exception]
+    ) -> Enabled:
+        self._led = {name: as_led(one) for name, one in found.items()}
         others = "another drive was not led there"
         stopped = {
             name: f"{problems.get(name, others)}; its quick stop: {one}" for name, one in stops.items()
@@ -89,8 +105,12 @@ def _quick_stop_all(drives: Mapping[str, Drive]) -> "dict[str, Future[StopOutcom
     return stops
 
 
-def _step(drive: Drive, origin: DriveState) -> "Future[Led]":
+def _step(drive: Drive, origin: DriveState, wanted: Callable[[], bool]) -> "Future[Led]":
+    return _call(lambda: drive.step_up(origin, wanted))
+
+
+def _call(ask: "Callable[[], Future[Led]]") -> "Future[Led]":
     try:
-        return drive.step_up(origin)
+        return ask()
     except Exception as error:  # noqa: BLE001 - it is this drive's alone, and ends the way of all
         return failed(error)

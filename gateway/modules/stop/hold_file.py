@@ -14,7 +14,7 @@ from gateway.records import durable
 
 log = logging.getLogger(__name__)
 
-Wrote = Callable[["HeldStop", str | None], object]
+Wrote = Callable[["HeldStop", str | None], "Future[None]"]
 
 
 class HeldStop(msgspec.Struct, frozen=True):
@@ -30,7 +30,7 @@ class HeldStop(msgspec.Struct, frozen=True):
 class HoldFile:
     """Its own thread writes, so that no disk delays a stop. At most one stop is held; for any thread.
 
-    `wrote(held, problem)` is told when a record is on the disk, or why it is not.
+    `wrote(held, problem)` is told when a record is on the disk, or why it is not; it writes that down.
     """
 
     def __init__(self, path: Path, unusable: str | None, wrote: Wrote) -> None:
@@ -40,6 +40,7 @@ class HoldFile:
         self._path = path
         self._unusable = unusable
         self._wrote = wrote
+        self._waiting: Future[str | None] | None = None  # for the disk to turn to it
         self._lock = threading.Lock()
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hold")
 
@@ -47,27 +48,41 @@ class HoldFile:
         """Take up what the last gateway left; a file that cannot be read is a held stop of unknown reason."""
         try:
             self.held = msgspec.json.decode(self._path.read_bytes(), type=HeldStop)
-        except (FileNotFoundError, NotADirectoryError):
-            self.held = None
+        except (FileNotFoundError, NotADirectoryError) as error:
+            self.held = self._unreadable(error) if self._path.is_symlink() else None
         except (OSError, msgspec.DecodeError) as error:
-            log.error("%s cannot be read (%s): the stop is held", self._path, error)
-            self.held = HeldStop("unknown", f"{self._path.name} cannot be read: {error}", 0, 0, "")
+            self.held = self._unreadable(error)
         return self.held
 
+    def _unreadable(self, error: Exception) -> HeldStop:
+        log.error("%s cannot be read (%s): the stop is held", self._path, error)
+        return HeldStop("unknown", f"{self._path.name} cannot be read: {error}", 0, 0, "")
+
     def write(self, who: str, reason: str) -> None:
-        """Keep it: a second stop is the same one, for another reason."""
+        """Keep it: a second stop is the same one, for another reason.
+
+        Those that come before the disk has turned to the last one are written at once.
+        """
         now = HeldStop(who, reason, time.time_ns(), time.monotonic_ns(), boot_id())
-        kept: Future[str | None] = Future()
         with self._lock:
             before = self.held
-            held = now if before is None else msgspec.structs.replace(before, who=who, reason=reason)
-            self.held, self.kept = held, kept
-            written = self._writer.submit(self._write, msgspec.json.encode(held))
-        written.add_done_callback(lambda done: self._tell(held, kept, done.exception()))
+            self.held = now if before is None else msgspec.structs.replace(before, who=who, reason=reason)
+            if self._waiting is None:
+                kept = self.kept = self._waiting = Future()
+                self._writer.submit(self._write_newest, kept)
+
+    def write_again(self) -> None:
+        """Keep on what was to be removed, and could not be as a whole."""
+        with self._lock:
+            held = self.held
+        if held is not None:
+            self._writer.submit(self._keep, held)
 
     def remove(self) -> "Future[None]":
         """Keep it no longer; fails with `OSError`."""
-        return self._writer.submit(self._remove)
+        with self._lock:
+            self._waiting = None  # what is held from now on is written behind this
+            return self._writer.submit(self._remove)
 
     def forget(self) -> None:
         """Nothing is held any more."""
@@ -78,14 +93,25 @@ class HoldFile:
         """Write what was asked for, and end."""
         self._writer.shutdown(wait=True)
 
-    def _tell(self, held: HeldStop, kept: "Future[str | None]", found: BaseException | None) -> None:
-        problem = None
-        if found is not None:
-            why = getattr(found, "strerror", None) or str(found)
-            problem = f"this stop is held, but not beyond this gateway: {why}"
-        self.problem = problem
-        self._wrote(held, problem)
-        kept.set_result(problem)
+    def _write_newest(self, kept: "Future[str | None]") -> None:
+        with self._lock:
+            held = self.held
+            if self._waiting is kept:
+                self._waiting = None
+        if held is None:  # it was reset before its turn came
+            kept.set_result(None)
+            return
+        self._keep(held)
+        problem = self.problem
+        self._wrote(held, problem).add_done_callback(lambda _written: kept.set_result(problem))
+
+    def _keep(self, held: HeldStop) -> None:
+        try:
+            self._write(msgspec.json.encode(held))
+        except OSError as error:
+            self.problem = f"this stop is held, but not beyond this gateway: {error.strerror or error}"
+        else:
+            self.problem = None
 
     def _write(self, data: bytes) -> None:
         if self._unusable is not None:

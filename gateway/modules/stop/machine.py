@@ -107,7 +107,7 @@ TRANSITIONS: Mapping[Phase, Mapping[Input, tuple[Phase, tuple[Action, ...]]]] = 
         _I.SEEN: _NEW_STOP,
         _I.LOST: _NEW_STOP,
         _I.REMOVED: (_P.FREE, (_A.RELEASE,)),
-        _I.KEPT: (_P.HELD, ()),
+        _I.KEPT: (_P.HELD, (_A.RECORD,)),
     },
 }
 
@@ -122,6 +122,8 @@ _HELD = dict.fromkeys(HOLDING, "a stop is held; reset it first")
 REFUSALS: Mapping[Input, Mapping[Phase, str]] = {_I.RESET: _UNDER_WAY, _I.ENABLE: _UNDER_WAY | _HELD}
 
 _HOLD = frozenset({_A.STOP_ALL, _A.WATCH})  # from now on a stop is held
+OVERTAKEN = "the robot was stopped after this was asked for; ask again"
+
 _BEGIN = _HOLD | {_A.LOWER, _A.RAISE}  # what makes an undertaking
 _ENDS = frozenset({_I.ANSWERED, _I.PROVED, _I.UNPROVED, _I.REMOVED, _I.KEPT, _I.ENABLED})
 
@@ -142,7 +144,8 @@ class State:
     phase: Phase = Phase.FREE
     number: int = 0  # of the newest undertaking
     stops: int = 0  # so far
-    stopped_ns: int = 0  # when the newest stop was asked for
+    stopped_ns: int = 0  # when the newest stop was asked for, or found
+    asked_ns: int = 0  # when the newest was asked for: what came in before is overtaken
     disturbed_ns: Mapping[str, int] = field(default_factory=dict)  # target → last seen enabled, or lost
 
     @property
@@ -154,8 +157,9 @@ class State:
 class Event:
     """One input, with what belongs to it: `target` of `SEEN` and `LOST`, `number` of an end.
 
-    As long as a rule is `standing`, nothing is proved, reset or enabled; what `PROVED` says of rest counts
-    only where its findings show that, target for target.
+    What is asked for counts from when it came in, `at_ns`. As long as a rule is `standing`, nothing is
+    proved, reset or enabled; what `PROVED` says of rest counts only where its findings show that, target for
+    target.
     """
 
     input: Input
@@ -185,6 +189,8 @@ def step(state: State, event: Event) -> Step:
         return Step(state)
     if event.input in (Input.SEEN, Input.LOST):
         state = _disturbed(state, event)
+    if event.input in REFUSALS and event.at_ns <= state.asked_ns:
+        return Step(state, (), OVERTAKEN)
     if event.standing and event.input in REFUSALS:
         return Step(state, (), f"the guard's rule is tripped: {', '.join(event.standing)}")
     happened = event.input
@@ -196,7 +202,9 @@ def step(state: State, event: Event) -> Step:
     phase, actions = row
     state = replace(state, phase=phase, number=state.number + (not _BEGIN.isdisjoint(actions)))
     if not _HOLD.isdisjoint(actions):
-        state = replace(state, stops=state.stops + 1, stopped_ns=event.at_ns)
+        state = replace(state, stopped_ns=event.at_ns)
+    if Action.STOP_ALL in actions:
+        state = replace(state, stops=state.stops + 1, asked_ns=event.at_ns)
     return Step(state, actions)
 
 

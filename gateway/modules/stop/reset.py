@@ -4,12 +4,12 @@ Controllers are stopped, then the drives are led down, all at once; then every d
 read once more. Only what these last readings say is handed to the machine, which ends the hold or does not.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from drivers.joint.cia402 import DriveState
-from drivers.joint.leading import Led
+from drivers.joint.leading import OVERTAKEN, Led
 from gateway.futures import back, failed, gather, then
 from gateway.loop import Loop
 from gateway.modules.stop.controllers import Controllers
@@ -19,6 +19,7 @@ from gateway.modules.stop.target import stop_all
 
 # States in which a drive has no current; only what is known to be in one of them lets a hold end.
 AT_REST = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})
+NOT_SINCE = "it was not read at rest since the last stop, or since it was last seen enabled or booting"
 NOT_STOPPED = "it does not hold the value that stops it"
 
 
@@ -29,6 +30,11 @@ class Descent:
     drives: dict[str, str]
     problems: dict[str, str]
     findings: dict[str, Finding] = field(default_factory=dict)
+
+    def with_problems(self, unproved: Iterable[str]) -> "Descent":
+        """Each target that is not known to rest has its reason."""
+        reasons = dict.fromkeys(unproved, NOT_SINCE)
+        return replace(self, problems={**reasons, **self.problems})
 
 
 class Lowering:
@@ -43,14 +49,17 @@ class Lowering:
         self._joints = (*drives, *absent)
         self._controllers = controllers.targets
 
-    def run(self) -> "Future[Descent]":
-        """Lead all down, and read them."""
+    def run(self, wanted: Callable[[], bool]) -> "Future[Descent]":
+        """Lead all down as long as that is `wanted`, and read them."""
         quiet = back(self._loop, gather(stop_all(self._controllers)))  # nobody shall command against it
-        led = then(quiet, lambda _reports: back(self._loop, gather(self._begin("reset"))))
+        led = then(quiet, lambda _reports: back(self._loop, gather(self._down(wanted))))
         return then(led, self._look)
 
+    def _down(self, wanted: Callable[[], bool]) -> "dict[str, Future[Led]]":
+        return {name: _call(lambda drive=drive: drive.reset(wanted)) for name, drive in self._drives.items()}  # type: ignore[misc]
+
     def _look(self, led: Mapping[str, Led | Exception]) -> "Future[Descent]":
-        drives = back(self._loop, gather(self._begin("look")))
+        drives = back(self._loop, gather({name: _call(drive.look) for name, drive in self._drives.items()}))
         controllers = {name: one.look() for name, one in self._controllers.items()}
         return then(
             drives,
@@ -58,9 +67,6 @@ class Lowering:
                 back(self._loop, gather(controllers)), lambda found: self._descent(led, seen, found)
             ),
         )
-
-    def _begin(self, what: str) -> "dict[str, Future[Led]]":
-        return {name: _call(drive, what) for name, drive in self._drives.items()}
 
     def _descent(
         self,
@@ -84,15 +90,16 @@ class Lowering:
 
 def _last(led: Led, seen: Led) -> Led:
     """Where it is by the last reading; what its way down said stays the reason why it did not arrive."""
-    problem = seen.problem or led.problem
-    if problem is None and seen.state is not led.state:
+    overtaken = led.problem == OVERTAKEN and seen.state in AT_REST  # the stop has come to an end meanwhile
+    problem = seen.problem or (None if overtaken else led.problem)
+    if problem is None and seen.state not in (led.state, *AT_REST):
         problem = f"it was led to {state_words(led.state)}, and is in {state_words(seen.state)} now"
     return Led(seen.state, problem, asked_ns=seen.asked_ns)
 
 
-def _call(drive: Drive, what: str) -> "Future[Led]":
+def _call(ask: "Callable[[], Future[Led]]") -> "Future[Led]":
     try:
-        return drive.look() if what == "look" else drive.reset()
+        return ask()
     except Exception as error:  # noqa: BLE001 - it is this drive's alone
         return failed(error)
 

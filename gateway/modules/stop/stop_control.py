@@ -4,6 +4,8 @@ Whatever happens is told to the `Authority`; what follows is done by `_act`: sto
 the record in that of the disk, all else in the loop.
 """
 
+import contextlib
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -22,12 +24,12 @@ from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.enabling import Enabling
 from gateway.modules.stop.hold_file import HeldStop, HoldFile
-from gateway.modules.stop.machine import Action, Input, Step
+from gateway.modules.stop.machine import OVERTAKEN, Action, Input, Step
 from gateway.modules.stop.reset import Descent, Lowering
 from gateway.modules.stop.stop import StopAnswers
 from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Report, Target, stop_all
-from gateway.modules.stop.thread import StopThread
+from gateway.modules.stop.thread import Ended, StopThread
 from gateway.modules.stop.watch import LOOK_S, Watch
 from gateway.records.records import Records
 from gateway.sources import check_globs, matches
@@ -36,7 +38,17 @@ from gateway.wire import Kind, refuse
 if TYPE_CHECKING:
     from gateway.modules.component import ComponentModule
 
+REWRITE_S = 5.0  # how often a record is tried again that could not be written
 GATEWAY = "gateway"  # who the journal says it was, where nobody asked
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A stop that waits for the stop's thread."""
+
+    asked: "Asked"
+    number: int
+    recorded: bool  # whether it is to be written down: one that is held already stays whose it was
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +81,7 @@ class StopControl:
         self.claim: Callable[[], Future[None]] = lambda: done(None)
         self._claimed: Future[None] = done(None)
         self._closed = False
+        self._waiting: list[_Waiting] = []  # under the machine's lock
         components = component.robot.components
         self.drives = {name: cast("Drive", components[name]) for name in config.joint if name in components}
         self._absent = {name: why for name, why in component.absent.items() if name in config.joint}
@@ -85,7 +98,8 @@ class StopControl:
         self._watch = Watch(
             self.authority, stoppers, self._controllers.targets, self._happened, self._tell_again
         )
-        self._thread = StopThread(self._watch.look, lambda: self.authority.held, LOOK_S)
+        self._thread = StopThread(self._look, lambda: self.authority.held, LOOK_S)
+        self._rewrite_due = 0.0
         self._answers = StopAnswers(
             loop,
             config.stop,
@@ -114,8 +128,8 @@ class StopControl:
     def close(self) -> None:
         """End with the process; a held stop stays on disk."""
         self._closed = True
-        self._watch.end()
         self._thread.close()
+        self._watch.end()
         self._record.close()
 
     # Stop
@@ -131,7 +145,8 @@ class StopControl:
     def _happened(self, what: Input, target: str, stamp_ns: int) -> None:
         """What the watch has seen."""
         asked = Asked(GATEWAY, f"{target}: {what.value} while the hold was ending")
-        self.authority.feed(what, partial(self._act, asked, target), at_ns=stamp_ns, target=target)
+        with contextlib.suppress(Ended):
+            self.authority.feed(what, partial(self._act, asked, target), at_ns=stamp_ns, target=target)
 
     def _ask(self, what: Input, asked: Asked) -> "Future[messages.Stopped]":
         self.authority.feed(what, partial(self._act, asked, ""))
@@ -141,21 +156,34 @@ class StopControl:
         """Under the machine's lock: in the order of events, and without waiting for anything."""
         for action in step.actions:
             if action is Action.STOP_ALL:
-                recorded = Action.RECORD in step.actions
-                self._thread.put(partial(self._stop_all, asked, step.number, recorded=recorded))
+                self._wait(_Waiting(asked, step.number, recorded=Action.RECORD in step.actions))
             elif action is Action.STOP_AGAIN and not self._targets[target].running:
                 self._thread.put(partial(self._watch.stop_again, target))
             elif action is Action.WATCH:
                 self._thread.put(self._hold_on)
 
-    def _stop_all(self, asked: Asked, number: int, *, recorded: bool) -> None:
+    def _wait(self, waiting: "_Waiting") -> None:
+        """Those that come before the thread turns to them are one stop."""
+        self._waiting.append(waiting)
+        if len(self._waiting) == 1:
+            self._thread.put(self._stop_all)
+
+    def _stop_all(self) -> None:
         """In the stop's thread: it acts first, and is written down then."""
         first = stop_all(self._targets)
-        if recorded:
-            self._record.write(asked.who, asked.reason)
-        self._watch.begin()
-        self._claimed = self.claim()
-        self._loop.post(partial(self._follow, asked, number, first, recorded=recorded))
+        with self.authority.settled():
+            stops, self._waiting = tuple(self._waiting), []
+        try:
+            recorded = [one.asked for one in stops if one.recorded]
+            if recorded:
+                self._record.write(recorded[-1].who, recorded[-1].reason)
+            else:
+                newest = stops[-1].asked
+                self._journal.append(newest.who, "stopped again", reason=newest.reason)
+            self._watch.begin()
+            self._claimed = self.claim()
+        finally:
+            self._loop.post(partial(self._follow, stops, first))
 
     def _hold_on(self) -> None:
         """In the stop's thread: what is seen to be stopped since the last gateway's time is left alone."""
@@ -163,39 +191,48 @@ class StopControl:
         self._watch.begin()
         self._watch.look()
         self._claimed = self.claim()
-        self._loop.post(self._changed)
 
-    def _follow(
-        self, asked: Asked, number: int, first: "Mapping[str, Future[Report]]", *, recorded: bool
-    ) -> None:
+    def _look(self) -> None:
+        """In the stop's thread: see what says nothing by itself, and whether the disk has room again."""
+        self._watch.look()
+        if self._record.problem is not None and time.monotonic() >= self._rewrite_due:
+            self._rewrite_due = time.monotonic() + REWRITE_S
+            self._record.write_again()
+
+    def _follow(self, stops: "Sequence[_Waiting]", first: "Mapping[str, Future[Report]]") -> None:
         """In the loop."""
         self._changed()
         stopped = self._answers.follow(first, self._record.kept)
-        stopped.add_done_callback(lambda found: self._answered(asked, number, found, recorded=recorded))
+        stopped.add_done_callback(lambda found: self._answered(stops, found))
 
-    def _answered(
-        self, asked: Asked, number: int, stopped: "Future[messages.Stopped]", *, recorded: bool
-    ) -> None:
-        self.authority.feed(Input.ANSWERED, partial(self._act, asked, ""), number=number)
+    def _answered(self, stops: "Sequence[_Waiting]", stopped: "Future[messages.Stopped]") -> None:
+        for one in stops:
+            self.authority.feed(Input.ANSWERED, _nothing, number=one.number)
         found = outcome(stopped)
-        if isinstance(found, messages.Stopped) and recorded and not self._closed:
+        newest = next((one.asked for one in reversed(stops) if one.recorded), None)
+        if isinstance(found, messages.Stopped) and newest is not None and not self._closed:
             keys = ("controllers", "fallbacks", "problem")
             more = {key: value for key in keys if (value := getattr(found, key))}
-            self._journal.append(asked.who, "stop answered", result=found.drives, **more)
-        pass_on(stopped, asked.answer)
+            self._journal.append(newest.who, "stop answered", result=found.drives, **more)
+        for one in stops:
+            pass_on(stopped, one.asked.answer)
 
     # Reset; in the loop.
 
-    def reset(self, who: str) -> "Future[messages.Reset]":
+    def reset(self, who: str, asked_ns: int) -> "Future[messages.Reset]":
         """Lead every drive to SWITCH ON DISABLED; a held stop ends where all is shown to rest.
 
+        It came in at `asked_ns`: what is older than the newest stop is not done.
+
         Raises:
-            RpcError: stopped while a rule of the guard is tripped; wrong_state while another reset or an
-                enabling is under way; unavailable, as the future's error: the record cannot be removed.
+            RpcError: stopped while a rule of the guard is tripped, or where a stop came since; wrong_state
+                while another reset or an enabling is under way; unavailable, as the future's error: the
+                record cannot be removed.
 
         """
-        number = self._begin(Input.RESET)
-        down = then(self._settled(), lambda _settled: self._lowering.run())
+        number = self._begin(Input.RESET, asked_ns)
+        wanted = partial(self.authority.is_newest, number)
+        down = then(self._settled(), lambda _settled: self._lowering.run(wanted))
         down.add_done_callback(lambda ended: self._give_up(number, ended))
         return then(down, lambda descent: self._prove(who, number, descent))
 
@@ -217,13 +254,24 @@ class StopControl:
             if Action.REMOVE in step.actions:
                 removed.append(self._record.remove())
 
+        for target in self._gone():
+            self._happened(Input.LOST, target, time.monotonic_ns())
+        descent = descent.with_problems(self.authority.unproved(descent.findings))
         self.authority.feed(Input.PROVED, act, number=number, findings=descent.findings)
         if not removed:
-            return done(self._told(who, descent))
+            return self._told(who, descent)
         gone = gather({"hold": back(self._loop, removed[0])})
         return then(gone, lambda found: self._removed(who, number, descent, found["hold"]))
 
-    def _removed(self, who: str, number: int, descent: Descent, failure: Exception | None) -> messages.Reset:
+    def _gone(self) -> list[str]:
+        """Targets whose nodes have gone, or are booting, since they were read."""
+        nodes = {name: drive.node for name, drive in self.drives.items()}
+        nodes |= {name: one.node for name, one in self._controllers.targets.items()}
+        return [name for name, node in nodes.items() if not node.ready]
+
+    def _removed(
+        self, who: str, number: int, descent: Descent, failure: Exception | None
+    ) -> "Future[messages.Reset]":
         what = Input.REMOVED if failure is None else Input.KEPT
         step = self.authority.feed(what, self._release, number=number)
         if Action.RELEASE in step.actions:
@@ -240,28 +288,32 @@ class StopControl:
         if Action.RELEASE in step.actions:
             self._watch.end()
             self._record.forget()
+        elif Action.RECORD in step.actions:
+            self._record.write_again()
 
-    def _told(self, who: str, descent: Descent) -> messages.Reset:
+    def _told(self, who: str, descent: Descent) -> "Future[messages.Reset]":
+        """The answer, once it is written down."""
         reset = messages.Reset(descent.drives, descent.problems, held=self.held)
         problems = {"problems": reset.problems} if reset.problems else {}
-        self._journal.append(who, "reset", result=reset.drives, held=reset.held, **problems)
-        return reset
+        written = self._journal.append(who, "reset", result=reset.drives, held=reset.held, **problems)
+        return then(back(self._loop, gather({"journal": written})), lambda _written: reset)
 
-    def _begin(self, what: Input) -> int:
-        step = self.authority.feed(what, _nothing)
+    def _begin(self, what: Input, asked_ns: int) -> int:
+        step = self.authority.feed(what, _nothing, at_ns=asked_ns)
         if step.refusal is None:
             return step.number
         if what is Input.ENABLE and step.state.held:
             raise refuse(Kind.STOPPED, self._hold_words())
-        kind = Kind.STOPPED if self.authority.standing() else Kind.WRONG_STATE
-        said = f"the stop is not reset: {step.refusal}" if kind is Kind.STOPPED else step.refusal
-        raise refuse(kind, said)
+        stopped = step.refusal == OVERTAKEN or self.authority.standing()
+        said = f"the stop is not reset: {step.refusal}" if stopped and step.state.held else step.refusal
+        raise refuse(Kind.STOPPED if stopped else Kind.WRONG_STATE, said)
 
     # Enabling; in the loop.
 
     def enable(
         self,
         who: str,
+        asked_ns: int,
         globs: list[str] | None,
         objection: Callable[[], str | None],
         on_trial: Callable[[Sequence[str]], str | None],
@@ -286,13 +338,14 @@ class StopControl:
         pending = on_trial(list(chosen))
         if pending is not None:
             raise refuse(Kind.TRIAL_PENDING, pending)
-        number = self._begin(Input.ENABLE)
+        number = self._begin(Input.ENABLE, asked_ns)
 
         def objects() -> str | None:
             overtaken = None if self.authority.is_newest(number) else self._hold_words()
             return overtaken or objection() or on_trial(list(chosen))
 
-        enabling = Enabling(self._loop, chosen, who, objects, self._journal)
+        wanted = partial(self.authority.is_newest, number)
+        enabling = Enabling(self._loop, chosen, who, objects, wanted, self._journal)
         answer = self._explained(who, list(chosen), enabling)
         answer.add_done_callback(lambda _answer: self.authority.feed(Input.ENABLED, _nothing, number=number))
         return answer
@@ -333,10 +386,10 @@ class StopControl:
             return "a stop came in between; reset it first"
         return f"the stop of {held.who} is held ({held.reason or 'no reason given'}); reset it first"
 
-    def _wrote(self, held: HeldStop, problem: str | None) -> None:
+    def _wrote(self, held: HeldStop, problem: str | None) -> "Future[None]":
         """In the disk's thread: the record is there, or it is known why not."""
         details = {} if problem is None else {"problem": problem}
-        self._journal.append(held.who, "stop", reason=held.reason, **details)
+        return self._journal.append(held.who, "stop", reason=held.reason, **details)
 
     def _tell_again(self, target: str, times: int) -> None:
         self._journal.append(GATEWAY, "stopped again", drive=target, times=times)

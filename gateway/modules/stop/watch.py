@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from drivers.bus.emcy import Emcy
 from drivers.errors import DriverError
@@ -71,7 +72,9 @@ class Watch:
         with self._lock:
             if self._ends is None:
                 self._times = {}
-                self._ends = [end for name, one in self._stoppers.items() for end in self._listen(name, one)]
+                listening = [end for name, one in self._stoppers.items() for end in self._listen(name, one)]
+                boots = [self._hear_boots(name, one.node) for name, one in self._controllers.items()]
+                self._ends = [*listening, *boots]
 
     def end(self) -> None:
         with self._lock:
@@ -141,7 +144,11 @@ class Watch:
     def _listen(self, name: str, stopper: Stopper) -> Iterator[Callable[[], None]]:
         drive = stopper.drive
         yield drive.latest.subscribe(partial(self._on_sample, name, _statusword(drive)))
-        yield drive.node.life.subscribe(_Boots(partial(self._happened, Input.LOST, name)))
+        yield self._hear_boots(name, drive.node)
+
+    def _hear_boots(self, name: str, node: Any) -> Callable[[], None]:
+        end: Callable[[], None] = node.life.subscribe(_Boots(partial(self._happened, Input.LOST, name)))
+        return end
 
     def _on_sample(self, name: str, statusword: int | None, sample: Sample) -> None:
         """In the driver's thread."""

@@ -321,7 +321,7 @@ class FakeDrive(FakeComponent):
     def nmt_stop(self) -> None:
         self.nmt_stops += 1
 
-    def reset(self) -> "Future[Led]":
+    def reset(self, wanted: Callable[[], bool] = lambda: True) -> "Future[Led]":
         self.resets += 1
         if self.led.problem is None:
             self.set_state(DISABLED)
@@ -335,7 +335,7 @@ class FakeDrive(FakeComponent):
         statusword = int.from_bytes(self.node.objects[0x6041, 0], "little")
         return done(Led(drive_state(statusword), asked_ns=asked_ns))
 
-    def step_up(self, origin: DriveState) -> "Future[Led]":
+    def step_up(self, origin: DriveState, wanted: Callable[[], bool] = lambda: True) -> "Future[Led]":
         self.steps.append(origin)
         self.on_step(origin)
         return done(self.led_up.get(origin) or Led(WAY_UP[origin][1]))

@@ -103,7 +103,7 @@ def test_a_stop_between_two_transitions_ends_it(
     second: Future[Led] = Future()
     stops: list[int] = []
 
-    def step_up(origin: DriveState) -> Future[Led]:
+    def step_up(origin: DriveState, _wanted: object) -> Future[Led]:
         if origin is not S.READY_TO_SWITCH_ON:
             return done(Led(WAY_UP[origin][1]))
         stops.append(client.request("robot.stop", reason="now"))
@@ -124,7 +124,7 @@ def test_a_lease_that_ends_meanwhile_ends_it(
 ) -> None:
     first: Future[Led] = Future()
     with serving(config(tmp_path, MASTER)) as address, Client(address) as client:
-        monkeypatch.setattr(bench.left, "step_up", lambda _origin: first)
+        monkeypatch.setattr(bench.left, "step_up", lambda _origin, _wanted: first)
         client.call("control.acquire", ttl_s=60)
         enabling = client.request("robot.enable")
         until(lambda: bench.right.steps, "it is under way")

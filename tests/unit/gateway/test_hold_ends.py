@@ -62,7 +62,7 @@ def resetting(client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> 
     """While the left knee's way down takes its time; it arrives at the end."""
     led: Future[Led] = Future()
     with monkeypatch.context() as patch:
-        patch.setattr(bench.left, "reset", lambda: led)
+        patch.setattr(bench.left, "reset", lambda _wanted: led)
         request = client.request("robot.reset")
         until(lambda: bench.right.resets == 1, "it is under way")
         yield request

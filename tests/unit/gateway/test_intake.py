@@ -245,7 +245,7 @@ def test_who_sends_without_end_and_takes_nothing_is_bounded_and_can_still_stop(s
     def too_much() -> bool:
         flood.send(lines)
         session = serving.session_of(flood)
-        assert sum(map(wire.size, session._queue)) <= intake.QUEUED_BYTES
+        assert sum(wire.size(line) for _asked_ns, line in session._queue) <= intake.QUEUED_BYTES
         assert len(session._queue) <= intake.QUEUED_LINES
         assert session.waiting_bytes < 3 * 1024 * 1024
         return session._unanswered + session._inlet.unanswered > 0
@@ -382,7 +382,8 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
     assert sum(len(one.lines) for one in heard) == intake.QUEUED_LINES
     assert sum(len(one.refusals) for one in heard) == intake.ON_THE_WAY
     inlet.done(
-        intake.QUEUED_LINES + intake.ON_THE_WAY, sum(wire.size(line) for one in heard for line in one.lines)
+        intake.QUEUED_LINES + intake.ON_THE_WAY,
+        sum(wire.size(line) for one in heard for _, line in one.lines),
     )
     assert not inlet._is_full
     inlet.finish()

@@ -38,11 +38,20 @@ def test_beyond_the_last_place_a_stop_acts_and_is_answered(connect: Connect, ful
     assert late.call("robot.stop", reason="again")["held"]
 
 
+def test_beyond_the_last_place_our_own_clients_may_greet_and_stop(
+    connect: Connect, full: list[Client], bench: Bench
+) -> None:
+    late = connect()
+    assert late.call("hello", client="desk", protocol=1)["robot"] == "exo-test"
+    assert late.call("clock.read")
+    assert late.call("robot.stop", reason="late")["held"]
+
+
 def test_beyond_the_last_place_all_else_is_refused_and_ends_the_connection(
     connect: Connect, full: list[Client]
 ) -> None:
     late = connect()
-    error = late.refused("clock.read")
+    error = late.refused("robot.describe")
     assert error.kind == "unavailable"
     assert "this connection takes robot.stop only" in str(error)
     assert late.line() is None
@@ -63,7 +72,7 @@ def test_who_is_refused_and_goes_on_asking_is_ended_all_the_same(
     def ended() -> bool:
         nonlocal told
         try:
-            late.request("clock.read")
+            late.request("robot.describe")
             data = late.socket.recv(65536)
         except TimeoutError:
             return False
@@ -119,7 +128,7 @@ def test_who_has_never_said_anything_makes_room_for_who_comes(
 
 def test_who_has_only_just_come_keeps_its_place(connect: Connect) -> None:
     first, second, third = connect(), connect(), connect()
-    assert third.refused("clock.read").kind == "unavailable"
+    assert third.refused("robot.describe").kind == "unavailable"
     assert first.call("clock.read")
     assert second.call("clock.read")
 

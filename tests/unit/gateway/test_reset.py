@@ -87,7 +87,7 @@ def test_a_stop_that_comes_in_between_stays_held(
     client: Client, bench: Bench, hold: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     led: Future[Led] = Future()
-    monkeypatch.setattr(bench.left, "reset", lambda: led)
+    monkeypatch.setattr(bench.left, "reset", lambda _wanted: led)
     resetting = client.request("robot.reset")
     until(lambda: bench.right.resets == 1, "it is under way")
     client.call("robot.stop", reason="no, wait")
@@ -99,7 +99,7 @@ def test_a_stop_that_comes_in_between_stays_held(
 
 def test_two_resets_do_not_run_at_once(client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     led: Future[Led] = Future()
-    monkeypatch.setattr(bench.left, "reset", lambda: led)
+    monkeypatch.setattr(bench.left, "reset", lambda _wanted: led)
     first = client.request("robot.reset")
     until(lambda: bench.right.resets == 1, "it is under way")
     assert client.refused("robot.reset").kind == "wrong_state"
@@ -112,7 +112,7 @@ def test_two_resets_do_not_run_at_once(client: Client, bench: Bench, monkeypatch
 def test_a_driver_that_fails_is_told_and_keeps_it_held(
     client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail() -> Future[Led]:
+    def fail(_wanted: object) -> Future[Led]:
         raise RuntimeError("driver bug")
 
     monkeypatch.setattr(bench.left, "reset", fail)
@@ -138,7 +138,7 @@ def test_a_drive_that_only_sdo_shows_is_not_overtaken_by_the_watch(
 ) -> None:
     """The watch asks what it cannot see to stop, which would end the reset of just that drive."""
     led: Future[Led] = Future()
-    monkeypatch.setattr(bench.left, "reset", lambda: led)
+    monkeypatch.setattr(bench.left, "reset", lambda _wanted: led)
     bench.left.latest.clear()
     resetting = client.request("robot.reset")
     until(lambda: bench.right.resets == 1, "it is under way")

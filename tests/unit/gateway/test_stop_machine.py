@@ -8,6 +8,7 @@ import pytest
 
 from gateway.modules.stop.machine import (
     HOLDING,
+    OVERTAKEN,
     REFUSALS,
     TRANSITIONS,
     Action,
@@ -52,13 +53,15 @@ def test_a_guards_stop_leaves_a_held_one_as_it_is_but_never_one_whose_record_goe
 
 def test_only_enabling_and_a_reset_can_be_refused() -> None:
     asked = {Input.RESET, Input.ENABLE}
-    refused = {what for what in Input for phase in Phase if step(at(phase), Event(what)).refusal is not None}
+    refused = {
+        what for what in Input for phase in Phase if step(at(phase), Event(what, 100)).refusal is not None
+    }
     assert refused == asked == set(REFUSALS)
 
 
 @pytest.mark.parametrize("phase", Phase)
 def test_drives_are_led_up_only_where_nothing_is_held_or_under_way(phase: Phase) -> None:
-    after = step(at(phase), Event(Input.ENABLE))
+    after = step(at(phase), Event(Input.ENABLE, 100))
     assert (Action.RAISE in after.actions) is (phase is Phase.FREE)
     assert (after.refusal is None) is (phase is Phase.FREE)
 
@@ -66,9 +69,23 @@ def test_drives_are_led_up_only_where_nothing_is_held_or_under_way(phase: Phase)
 @pytest.mark.parametrize("what", [Input.RESET, Input.ENABLE])
 @pytest.mark.parametrize("phase", Phase)
 def test_nothing_is_reset_or_enabled_while_a_rule_that_stops_is_tripped(phase: Phase, what: Input) -> None:
-    after = step(at(phase), Event(what, standing=("tilt (1 rad)",)))
+    after = step(at(phase), Event(what, 100, standing=("tilt (1 rad)",)))
     assert (after.actions, after.state.phase) == ((), phase)
     assert "tilt (1 rad)" in str(after.refusal)
+
+
+@pytest.mark.parametrize("what", [Input.RESET, Input.ENABLE])
+@pytest.mark.parametrize("phase", Phase)
+@pytest.mark.parametrize("asked_ns", [99, 100])
+def test_what_came_in_before_the_newest_stop_is_not_done(phase: Phase, what: Input, asked_ns: int) -> None:
+    stopped = at(phase, asked_ns=100)
+    assert step(stopped, Event(what, asked_ns)) == Step(stopped, (), OVERTAKEN)
+
+
+def test_a_record_that_is_found_overtakes_nothing() -> None:
+    found = step(State(TARGETS), Event(Input.FOUND, 100)).state
+    assert (found.phase, found.stopped_ns, found.asked_ns) == (Phase.HELD, 100, 0)
+    assert step(found, Event(Input.RESET, 50)).state.phase is Phase.RESETTING
 
 
 @pytest.mark.parametrize("what", [Input.ANSWERED, Input.PROVED, Input.UNPROVED, Input.REMOVED, Input.KEPT])

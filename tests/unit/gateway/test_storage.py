@@ -216,7 +216,7 @@ def test_without_a_journal_nothing_is_stored(resting: Bench, tmp_path: Path) -> 
 
 def test_what_was_asked_for_before_a_stop_is_not_stored_after_it(resting: Bench, tmp_path: Path) -> None:
     def stop(_index: int, _data: bytes) -> None:
-        robot.do(lambda: stored.append(robot.tuning.store(STORING, "tester", "left_knee")))
+        robot.do(lambda: stored.append(robot.tuning.store(STORING, robot.session, "left_knee")))
         robot.stop()
 
     stored: list[Any] = []
@@ -237,7 +237,7 @@ def test_a_stop_at_the_last_moment_keeps_the_command_from_the_bus(resting: Bench
 
     resting.left.node.download = stopped  # type: ignore[method-assign]
     with tuned(tmp_path) as robot:
-        error = robot.refused(lambda: robot.tuning.store(STORING, "tester", "left_knee"))
+        error = robot.refused(lambda: robot.tuning.store(STORING, robot.session, "left_knee"))
         assert [one["what"] for one in robot.told("store", "store FAILED")] == ["store", "store FAILED"]
     assert (error.kind, "nothing was sent" in str(error)) == ("stopped", True)
     assert resting.left.node.written() == []
@@ -255,7 +255,10 @@ def test_a_drive_that_was_enabled_while_the_command_was_recorded_is_not_disturbe
 
     monkeypatch.setattr(Journal, "append", slow)
     with tuned(tmp_path) as robot:
-        assert robot.refused(lambda: robot.tuning.store(STORING, "tester", "left_knee")).kind == "wrong_state"
+        assert (
+            robot.refused(lambda: robot.tuning.store(STORING, robot.session, "left_knee")).kind
+            == "wrong_state"
+        )
     assert resting.left.node.written() == []
 
 

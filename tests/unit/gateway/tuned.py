@@ -2,10 +2,10 @@
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -35,6 +35,16 @@ TOE: Address = ("main", 16, 0x2003, 0)
 TORQUE: Address = ("main", 2, 0x6072, 0)
 
 
+class _Asking:
+    """A session whose requests come in at the moment in which they are handled."""
+
+    who = "tester"
+
+    @property
+    def asked_ns(self) -> int:
+        return time.monotonic_ns()
+
+
 class Tuned:
     """Between `start` and `close`; methods are called in the loop, and wait for what comes of them."""
 
@@ -42,7 +52,7 @@ class Tuned:
         self.authority = Authority(targets=(), locked=locked)
         self.records = Records(settings.records)
         self.loop = Loop()
-        self.session: Any = SimpleNamespace(who="tester")
+        self.session: Any = _Asking()
         self._thread = threading.Thread(target=self.loop.run, name="loop")
         self.component = ComponentModule(Context(settings, self.loop, {}, lambda _on: None))
         self.component.start()
