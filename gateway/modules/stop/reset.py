@@ -7,10 +7,11 @@ read once more. Only what these last readings say is handed to the machine, whic
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import OVERTAKEN, Led
-from gateway.futures import back, failed, gather, then
+from gateway.futures import back, done, failed, gather, then
 from gateway.loop import Loop
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
@@ -56,7 +57,9 @@ class Lowering:
         return then(led, self._look)
 
     def _down(self, wanted: Callable[[], bool]) -> "dict[str, Future[Led]]":
-        return {name: _call(lambda drive=drive: drive.reset(wanted)) for name, drive in self._drives.items()}  # type: ignore[misc]
+        if not wanted():
+            return {name: done(Led(None, OVERTAKEN)) for name in self._drives}
+        return {name: _call(partial(drive.reset, wanted)) for name, drive in self._drives.items()}
 
     def _look(self, led: Mapping[str, Led | Exception]) -> "Future[Descent]":
         drives = back(self._loop, gather({name: _call(drive.look) for name, drive in self._drives.items()}))

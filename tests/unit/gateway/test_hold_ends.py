@@ -1,9 +1,11 @@
 """What ends a held stop when things happen at the same moment, and what keeps it."""
 
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,8 @@ from drivers.component import Kind
 from drivers.errors import DeviceTimeout
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import Led
+from drivers.joint.quick_stop import StopOutcome
+from gateway.modules.stop.target import Report
 from gateway.records.folder import RecordsFolder
 from tests.unit.gateway.harness import (
     DISABLED,
@@ -18,6 +22,7 @@ from tests.unit.gateway.harness import (
     HEAD,
     QUICK_STOPPED,
     ROBOT,
+    Answered,
     Bench,
     Client,
     config,
@@ -145,6 +150,71 @@ class TestControllers:
             for _ in range(2):
                 bench.gait.node.objects[GAIT_COMMAND] = b"\x01"
                 until(lambda: bench.gait.node.objects[GAIT_COMMAND] == b"\x00", "stopped again")
+
+
+class TestOvertaken:
+    """What came in before a stop, and is handled later."""
+
+    def test_a_reset_is_not_begun(self, bench: Bench, tmp_path: Path) -> None:
+        with stopped(tmp_path, "") as client:
+            client.send(_lines("robot.reset", "robot.stop"))
+            assert client.answer(1001)["held"] is True
+            with pytest.raises(Answered, match="the robot was stopped after this was asked for") as refused:
+                client.answer(1000)
+            assert refused.value.kind == "stopped"
+            assert (held(client), bench.left.resets) == (True, 0)
+            assert client.call("robot.reset")["held"] is False
+
+    def test_a_reset_leads_nothing_down_after_a_stop(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        hanging: Future[Report] = Future()
+        usual, asked = bench.gait.node.run, list[bool]()
+
+        def run(job: Any, *, urgent: bool = False, **how: Any) -> Future[Any]:
+            if not urgent or asked:
+                return usual(job, urgent=urgent, **how)
+            asked.append(True)
+            return hanging
+
+        with stopped(tmp_path, CONTROLLER) as client, Client(client.socket.getpeername()) as other:
+            monkeypatch.setattr(bench.gait.node, "run", run)
+            request = client.request("robot.reset")
+            until(lambda: asked, "the controllers are asked first")
+            stops = bench.left.stops
+            stop = other.request("robot.stop", reason="wait")
+            until(lambda: bench.left.stops > stops, "stopped")
+            hanging.set_result(Report(StopOutcome.CONFIRMED))
+            assert client.answer(request)["held"] is True
+            assert other.answer(stop)["held"] is True
+            assert (bench.left.resets, bench.right.resets) == (0, 0)
+
+    def test_a_controller_that_boots_after_it_was_read_keeps_the_hold(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        seen: Future[Led] = Future()
+        with stopped(tmp_path, CONTROLLER) as client:
+            looks = list[bool]()
+
+            def look() -> Future[Led]:
+                looks.append(True)
+                return seen
+
+            monkeypatch.setattr(bench.left, "look", look)
+            request = client.request("robot.reset")
+            until(lambda: looks, "it is under way")
+            bench.gait.node.life.on_heartbeat(time.monotonic_ns(), b"\x00")
+            seen.set_result(Led(DriveState.SWITCH_ON_DISABLED, asked_ns=time.monotonic_ns()))
+            answer = client.answer(request)
+            assert (answer["held"], list(answer["problems"])) == (True, ["gait"])
+
+
+def _lines(*methods: str) -> bytes:
+    """Requests 1000, 1001, … in one piece."""
+    return b"".join(
+        b'{"jsonrpc":"2.0","id":%d,"method":"%s","params":{}}\n' % (number, method.encode())
+        for number, method in enumerate(methods, 1000)
+    )
 
 
 @pytest.mark.parametrize("statusword", [ENABLED, QUICK_STOPPED])
