@@ -12,6 +12,8 @@ from typing import Any
 import msgspec
 
 FIRST = "0" * 64  # what stands in place of the line before the first
+# What msgspec raises for bytes that are no such JSON: bad UTF-8 and deep nesting are no `DecodeError`.
+UNDECODABLE = (ValueError, RecursionError)
 _HASH = b',"hash":"'
 _END = b'"}'
 
@@ -45,10 +47,14 @@ def check(number: int, previous: str | None, data: bytes) -> tuple[Head, dict[st
     digest = hashlib.sha256(body).hexdigest()
     if not found or rest != digest.encode() + _END:
         raise Broken(f"line {number} was altered: its hash does not fit")
-    fields: dict[str, Any] = msgspec.json.decode(data)
-    if previous is not None and (fields["n"] != number or fields["previous"] != previous):
+    try:
+        fields = msgspec.json.decode(data, type=dict[str, Any])
+        head, follows = Head(fields["n"], digest), (fields["n"], fields["previous"]) == (number, previous)
+    except (*UNDECODABLE, KeyError) as error:
+        raise Broken(f"line {number} is no entry: {error}") from error
+    if previous is not None and not follows:
         raise Broken(f"line {number} does not follow the line before it: lines were removed, added or moved")
-    return Head(fields["n"], digest), fields
+    return head, fields
 
 
 def verify(lines: Iterable[bytes], head: Head | None) -> Iterator[dict[str, Any]]:

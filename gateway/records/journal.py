@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import msgspec
 
 from gateway.records import durable
-from gateway.records.chain import Broken, Head, check, line, verify
+from gateway.records.chain import UNDECODABLE, Broken, Head, check, line, verify
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ def read_head(journal: Path) -> Head | None:
         return msgspec.json.decode(head_file(journal).read_bytes(), type=Head)
     except FileNotFoundError:
         return None
-    except msgspec.DecodeError as error:
+    except UNDECODABLE as error:
         raise Broken(f"{head_file(journal).name} is damaged: {error}") from error
 
 
@@ -110,12 +110,11 @@ class Journal:
                 _append(file, data + b"\n")
                 durable.write(head_file(self.path), msgspec.json.encode(head))
             self._head = head
-        except OSError as error:
-            self.problem = (
-                f"{self.path} cannot be written: {error.strerror or error}; make room or correct its rights"
-            )
+        except Exception as error:  # whatever it is, who waits is told that nothing was written
+            why = getattr(error, "strerror", None) or error
+            self.problem = f"{self.path} cannot be written: {why}; make room or correct its rights"
             log.error("the journal: %s; lost: %s", self.problem, fields)
-            raise OSError(error.errno, self.problem) from error
+            raise OSError(getattr(error, "errno", None), self.problem) from error
         self.problem = None
 
     @contextlib.contextmanager
@@ -124,7 +123,7 @@ class Journal:
         size = file.seek(0, os.SEEK_END)
         try:
             yield
-        except OSError:
+        except Exception:
             self._file = None  # whatever is there now, the next entry follows it
             with contextlib.suppress(OSError), file:
                 os.ftruncate(file.fileno(), size)
@@ -177,7 +176,10 @@ class Journal:
         if self._unusable is not None:
             raise OSError(None, self._unusable)
         file = self._file or self._open()
-        return [msgspec.json.decode(one) for one in _last_lines(file, count)]
+        try:
+            return [msgspec.json.decode(one, type=Entry) for one in _last_lines(file, count)]
+        except UNDECODABLE as error:
+            raise OSError(None, f"{self.path} is damaged: {error}") from error
 
 
 def _append(file: BinaryIO, data: bytes) -> None:

@@ -12,6 +12,7 @@ from typing import Annotated
 import msgspec
 
 from gateway.records import durable
+from gateway.records.chain import UNDECODABLE
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +79,7 @@ class UndoFile:
             found = msgspec.json.decode(self._path.read_bytes(), type=list[Undo])
         except FileNotFoundError:
             return [], None
-        except (OSError, msgspec.DecodeError) as error:
+        except (OSError, *UNDECODABLE) as error:
             return [], self._put_aside(error)
         self._undos = {undo.write: undo for undo in found}
         return found, None

@@ -11,6 +11,7 @@ import msgspec
 
 from gateway.boot import boot_id
 from gateway.records import durable
+from gateway.records.chain import UNDECODABLE
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +51,7 @@ class HoldFile:
             self.held = msgspec.json.decode(self._path.read_bytes(), type=HeldStop)
         except (FileNotFoundError, NotADirectoryError) as error:
             self.held = self._unreadable(error) if self._path.is_symlink() else None
-        except (OSError, msgspec.DecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             self.held = self._unreadable(error)
         return self.held
 

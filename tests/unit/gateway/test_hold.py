@@ -81,7 +81,17 @@ def test_a_gateway_with_nothing_unfinished_opens_nothing(bench: Bench, tmp_path:
         assert bench.assembled == 0
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b'{"who": 5}', b"\xff\xfe"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b'{"who": 5}',
+        b"\xff\xfe",
+        pytest.param(b'{"who": "\xff"}', id="no-utf-8"),
+        pytest.param(b'{"z": ' + b"[" * 100_000, id="deep"),
+    ],
+)
 def test_a_record_that_cannot_be_read_is_a_held_stop(bench: Bench, tmp_path: Path, content: bytes) -> None:
     (tmp_path / "records").mkdir()
     folder(tmp_path).hold.write_bytes(content)

@@ -146,6 +146,18 @@ def test_what_is_no_entry_makes_the_file_a_damaged_one(calm: Bench, tmp_path: Pa
     assert list(path.parent.glob("undo.json.broken-*"))
 
 
+@pytest.mark.parametrize(
+    "content",
+    [pytest.param(b'[{"write": 7, "who": "\xff"}]', id="no-utf-8"), pytest.param(b"[" * 100_000, id="deep")],
+)
+def test_a_file_that_is_not_even_json_is_a_damaged_one(calm: Bench, tmp_path: Path, content: bytes) -> None:
+    path = write_undo(tmp_path)
+    path.write_bytes(content)
+    with tuned(tmp_path) as robot:
+        assert (robot.trials(), len(robot.told("undo file damaged"))) == ([], 1)
+    assert list(path.parent.glob("undo.json.broken-*"))
+
+
 def test_a_write_never_has_the_number_of_what_is_to_be_taken_back(calm: Bench, tmp_path: Path) -> None:
     future = 2**60
     write_undo(tmp_path, entry(future, change(TORQUE, MAX_TORQUE, 1000, 500)))

@@ -1,5 +1,6 @@
 """The journal: durable, hash-chained, and it finds one altered byte."""
 
+import hashlib
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -89,11 +90,58 @@ def test_a_missing_journal_is_told_from_one_that_never_was(path: Path) -> None:
         read_verified(path)
 
 
-def test_a_damaged_head_is_found(path: Path) -> None:
+DAMAGED = [
+    pytest.param(b"{}x", id="no-json"),
+    pytest.param(b'{"n":1,"hash":"\xff"}', id="no-utf-8"),
+    pytest.param(b'{"z":' + b"[" * 100_000, id="deep"),
+]
+
+
+@pytest.mark.parametrize("damaged", DAMAGED)
+def test_a_damaged_head_is_found_and_the_journal_begins_anew(path: Path, damaged: bytes) -> None:
     fill(path)
-    head_file(path).write_bytes(b"{}x")
+    head_file(path).write_bytes(damaged)
     with pytest.raises(Broken, match="damaged"):
         read_verified(path)
+    fill(path, 1)
+    assert [entry["what"] for entry in read_verified(path)] == ["journal damaged", "write"]
+
+
+@pytest.mark.parametrize("damaged", [*DAMAGED, pytest.param(b"[]", id="no-entry")])
+def test_a_damaged_line_whose_hash_fits_is_found(path: Path, damaged: bytes) -> None:
+    body = damaged[:-1]
+    digest = hashlib.sha256(body).hexdigest().encode()
+    path.write_bytes(body + b',"hash":"' + digest + b'"}\n')
+    with pytest.raises(Broken, match="line 1 is no entry"):
+        read_verified(path)
+    fill(path, 1)
+    assert [entry["what"] for entry in read_verified(path)] == ["journal damaged", "write"]
+
+
+def test_a_damaged_line_in_the_tail_is_said(journal: Journal, path: Path) -> None:
+    fill(path, 3)
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b"tester", b"t\xffster", 1))
+    assert len(journal.tail(2).result(10)) == 2
+    with pytest.raises(OSError, match="is damaged"):
+        journal.tail(3).result(10)
+
+
+def test_whatever_fails_in_writing_an_entry_is_a_problem(
+    journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal.append("tester", "before").result(10)
+    with monkeypatch.context() as failing:
+        failing.setattr("gateway.records.durable.sync_folder", _broken)
+        with pytest.raises(OSError, match="cannot be written: oops"):
+            journal.append("tester", "lost").result(10)
+    assert journal.problem is not None
+    assert [entry["what"] for entry in read_verified(path)] == ["before"]
+    with pytest.raises(OSError, match="cannot be written"):
+        journal.append("tester", "lost", result=object()).result(10)
+    journal.append("tester", "after").result(10)
+    assert journal.problem is None
+    assert [entry["what"] for entry in read_verified(path)] == ["before", "after"]
 
 
 @pytest.mark.parametrize("cut", [1, 2, 40])
@@ -181,6 +229,10 @@ def _fails_for(name: str) -> Callable[[int], None]:
         fsync(descriptor)
 
     return fails
+
+
+def _broken(_what: object) -> None:
+    raise RuntimeError("oops")
 
 
 def _no_space(_what: object) -> None:
