@@ -184,7 +184,8 @@ class SdoChannel:
 
         `permitted` says why it may not be written, `None` where it may: then it is in the bus's hands before
         anything that interrupts this. It must return at once, and wait for nothing that such a caller has.
-        Where it objects, nothing is sent and `NotPermitted` is raised.
+        Where it objects, nothing is sent and `NotPermitted` is raised. It is asked before each frame of a
+        longer write; once that has begun, an objection aborts it, and it is one that was not answered.
         """
         patience_s = timeout_s or self.timeout_s
         transfer = write(self.label, index, subindex, data, patience_s, permitted or nothing)
@@ -193,7 +194,7 @@ class SdoChannel:
         except DeviceAbort:
             self._written.withdraw()
             raise
-        except (Interrupted, DeviceTimeout, StillLeaving) as error:
+        except (Interrupted, DeviceTimeout, NotPermitted, StillLeaving) as error:
             if not transfer.write_begun:
                 raise
             why = str(error) or f"{transfer.what}: interrupted by an urgent request"
@@ -228,6 +229,10 @@ class SdoChannel:
             raise SdoProtocolBroken(
                 f"{transfer.what}: the device {error}, against the SDO protocol"
             ) from error
+        except NotPermitted:
+            if transfer.write_begun:
+                self._abort(transfer, sdo.GENERAL_ERROR)
+            raise
         except queue.Empty as error:
             self.counters.timeouts += 1
             self._abort(transfer, sdo.TIMED_OUT)
@@ -314,7 +319,7 @@ class SdoChannel:
             self._check_interrupted()
             ahead, self._ahead = self._ahead, None
             is_sent = ahead is not None and ahead.frame == frame
-            if begins and not is_sent:
+            if not is_sent:
                 self._check_permitted(transfer)
             if begins:
                 self._written.begin((transfer.index, transfer.subindex))
@@ -333,7 +338,7 @@ class SdoChannel:
         """Where it has to wait for its turn, it is asked again then whether it may go."""
 
         def wanted() -> bool:
-            return not self._interrupted.is_set() and not (begins and self._objection(transfer))
+            return not self._interrupted.is_set() and not self._objection(transfer)
 
         request = self._outstanding.add(transfer.about, frame)  # before it can be answered
         try:
@@ -356,8 +361,7 @@ class SdoChannel:
             raise
         self._forget_unsent(request, begins=begins)
         self._check_interrupted()
-        if begins:
-            self._check_permitted(transfer)
+        self._check_permitted(transfer)
         raise Unavailable(f"{transfer.what}: it was not sent")
 
     def _forget_unsent(self, request: Request, *, begins: bool) -> None:
@@ -366,12 +370,14 @@ class SdoChannel:
             self._written.withdraw()
 
     def _check_permitted(self, transfer: Transfer[Any]) -> None:
-        """Raise `NotPermitted` where a write that is about to begin must not."""
+        """Raise `NotPermitted` where a write that is about to begin, or go on, must not."""
         why = self._objection(transfer)
         if why is not None:
-            raise NotPermitted(f"{transfer.what}: not sent: {why}")
+            raise NotPermitted(f"{transfer.what}: {'ended' if transfer.write_begun else 'not sent'}: {why}")
 
     def _objection(self, transfer: Transfer[Any]) -> str | None:
+        if transfer.data is None:
+            return None
         return transfer.permitted() or (None if self._urgent else self._distrust())
 
     def _abort(self, transfer: Transfer[Any], abort_code: int) -> None:

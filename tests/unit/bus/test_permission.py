@@ -8,7 +8,7 @@ import pytest
 
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
-from drivers.errors import DriverError, NotPermitted
+from drivers.errors import DeviceTimeout, DriverError, NotPermitted
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import VALUE, LateServer
 from tests.unit.bus.waiting import WAIT_S
@@ -101,8 +101,8 @@ def test_whenever_a_stop_comes_no_write_follows_it(machine: Machine) -> None:
         assert machine.server.asked()[before:][-1] == CONTROLWORD
 
 
-def test_it_is_asked_once_a_write_and_not_for_its_segments(machine: Machine) -> None:
-    """What has begun is finished, or ended by the stop itself."""
+def test_it_is_asked_for_each_segment_of_a_write(machine: Machine) -> None:
+    """A stop that does not concern this device does not interrupt its channel."""
     asked: list[int] = []
 
     def permitted() -> str | None:
@@ -113,8 +113,33 @@ def test_it_is_asked_once_a_write_and_not_for_its_segments(machine: Machine) -> 
         sdo.download(VALUE, 0, bytes(20), permitted=permitted)
 
     machine.worker.submit(write).result(WAIT_S)
-    assert asked == [0, 0]
+    assert asked == [0, 0, 1, 1, 2, 2, 3, 3]  # before it is offered to the bus, and when its turn has come
     assert len(machine.server.requests) == 4
+
+
+@pytest.mark.parametrize("asked", [3, 4, 7, 8])
+def test_a_write_that_is_no_longer_permitted_is_aborted_and_unknown(machine: Machine, asked: int) -> None:
+    """Before a segment, the last one too: whichever the device has, none follows the stop."""
+    decisions = itertools.count(1)
+    heard: list[bytes] = []
+
+    def hear(frame: bytes) -> None:
+        heard.append(frame)
+        machine.server.hear(frame)
+
+    channel = machine.server.channel = SdoChannel("node 1", Direct(hear), WAIT_S)
+
+    def permitted() -> str | None:
+        machine.stopped = machine.stopped or next(decisions) == asked
+        return machine.permitted()
+
+    with pytest.raises(
+        DeviceTimeout, match=r"0x2001:00: ended: a stop is held; whether the device took it is"
+    ):
+        channel.download(VALUE, 0, bytes(20), permitted=permitted)
+    assert len(machine.server.requests) == (asked - 1) // 2
+    assert heard[-1] == bytes.fromhex("80 01 20 00 00 00 00 08")
+    assert channel.is_unsure(VALUE, 0)
 
 
 def test_a_stop_is_sent_whoever_answers() -> None:
