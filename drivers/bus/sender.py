@@ -25,7 +25,11 @@ _SDO_HEAD = 4  # command, index and subindex: what an SDO request is about
 Key = tuple[int, bytes]
 
 
-class StillLeaving(Unavailable):
+class BusFull(Unavailable):
+    """The bus is open, and takes nothing: the frame was not sent."""
+
+
+class StillLeaving(BusFull):
     """The bus takes nothing, and the frame is in its interface's hands: nobody knows whether it leaves."""
 
 
@@ -98,7 +102,7 @@ class Sender:
 
         `wanted` is asked under a lock when the frame's turn has come; where it says no, nothing is sent. What
         is returned waits, `SEND_TIMEOUT_S` at most, and says whether the frame was sent; it raises
-        `Unavailable` where the bus takes nothing, `StillLeaving` where the frame can no longer be kept back.
+        `BusFull` where the bus takes nothing, `StillLeaving` where the frame can no longer be kept back.
         """
         with self._changed:
             transport = self._transport
@@ -139,7 +143,7 @@ class Sender:
                 if frame not in self._normal:
                     raise StillLeaving(f"{full} It may still leave")
                 self._normal.remove(frame)
-                raise Unavailable(full)
+                raise BusFull(full)
         return frame.taken.result()
 
     # The thread.

@@ -8,6 +8,7 @@ import time
 from collections.abc import Collection
 from enum import StrEnum
 
+from drivers.bus.sender import BusFull
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
@@ -80,7 +81,7 @@ class Stopping:
             return
 
     def _look(self, axis: Axis) -> bool:
-        """Whether the bus carried it. What does not say that the axis stops is asked again."""
+        """Whether the bus is open. What does not say that the axis stops is asked again."""
         began_ns = time.monotonic_ns()
         try:
             state = axis.state(self._take_patience(axis))
@@ -88,7 +89,7 @@ class Stopping:
             self._reads = self._reads + 1 if state in self._confirmed_by else 0
         except DeviceAbort:
             self._answered = True
-        except DeviceTimeout:
+        except (DeviceTimeout, BusFull):
             self._reads = 0
         except Unavailable:
             return False

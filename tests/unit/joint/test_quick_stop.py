@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sender import BusFull, StillLeaving
 from drivers.errors import Unavailable
 from drivers.joint.axis import Axis
 from drivers.joint.commands import CONTROLWORD, STATUSWORD, STOPPED_STATES, Controlword
@@ -46,11 +47,14 @@ class Drive:
         self.axis_offset = axis_offset
         self.controlwords: list[int] = []
         self.refuses = self.mute = self.gone = False
+        self.full: list[BusFull] = []  # as long as it is, the bus takes no request
         self.deaf_requests = 0
         self.master_enables = False  # another master sends 000Fh between any two of our requests
         self.channel = SdoChannel("left_knee", Direct(self.hear), timeout_s=0.02)
 
     def hear(self, request: bytes) -> None:
+        if self.full and request[0] != 0x80:
+            raise self.full.pop()
         if self.gone:
             raise Unavailable("bus main is not open")
         index = int.from_bytes(request[1:3], "little") - self.axis_offset
@@ -111,6 +115,14 @@ def test_a_bus_that_is_gone_makes_it_unreachable_at_once() -> None:
     drive = Drive(0x0027)
     drive.gone = True
     assert quick_stop(drive.channel, 0, 1000.0) is StopOutcome.UNREACHABLE
+
+
+@pytest.mark.parametrize("full", [BusFull, StillLeaving])
+def test_a_bus_that_takes_nothing_for_a_while_ends_no_stop(full: type[BusFull]) -> None:
+    drive = Drive(0x0027)
+    drive.full = [full("interface can9 does not send")] * 6
+    assert quick_stop(drive.channel, 0, 5.0) is StopOutcome.CONFIRMED
+    assert not drive.full
 
 
 def test_a_drive_that_refuses_is_unconfirmed() -> None:
