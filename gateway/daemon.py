@@ -118,8 +118,9 @@ class Daemon:
             return Session(self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, refusal)
 
         opened = self._places.admit(session)
-        opened.on_close(self._left)
-        self._service.opened(opened)
+        if opened is not None:
+            opened.on_close(self._left)
+            self._service.opened(opened)
 
     def _left(self) -> None:
         """Somebody has gone, or nobody has come yet: `linger_s` from now it may be idle."""

@@ -1,13 +1,14 @@
 """Who may be connected: so many clients, and beyond them always somebody who may stop the robot."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from gateway import wire
 from gateway.session import Session
 
 CLIENTS = 64
-STOPPERS = 16  # beyond them, who may only stop
+STOPPERS = 256  # beyond them, who may only stop; half of them at most from one address
+FRESH_S = 1.0  # how long one of these keeps its place whoever comes: its stop is still on its way
 SILENT_S = 10.0  # who has said nothing for so long since it came makes room where all places are taken
 
 
@@ -23,15 +24,26 @@ class Places:
         """Those who are connected."""
         return (*self._clients, *self._stoppers)
 
-    def admit(self, open_: Callable[[wire.RpcError | None], Session]) -> Session:
-        """Open a session, as a client where a place is free; else with the refusal of all but a stop."""
+    def admit(self, open_: Callable[[wire.RpcError | None], Session]) -> Session | None:
+        """Open a session, as a client where a place is free; else with the refusal of all but a stop.
+
+        `None` where even for that no place is free: it is told so and closed, and a stop that has come with
+        it acts.
+        """
         if self._has_place():
             return self._placed(open_(None), self._clients)
-        if len(self._stoppers) >= STOPPERS:
-            # One that waits for an answer has been heard: what it asked for is being done.
-            silent = min(self._stoppers, key=lambda one: (one.waits, one.heard_ns))
-            silent.close(_refusal("others come; connect again"))
-        return self._placed(open_(_refusal("this connection takes robot.stop only")), self._stoppers)
+        opened = open_(_refusal("this connection takes robot.stop only"))
+        if not self._has_place_to_stop(_address(opened)):
+            opened.close(_refusal("and as many who may only stop; connect again"))
+            return None
+        return self._placed(opened, self._stoppers)
+
+    def _has_place_to_stop(self, address: str) -> bool:
+        """One address that opens connections without end takes no place from the others."""
+        neighbours = [one for one in self._stoppers if _address(one) == address]
+        if len(neighbours) >= STOPPERS // 2:
+            return _make_room(neighbours)
+        return len(self._stoppers) < STOPPERS or _make_room(self._stoppers)
 
     def _has_place(self) -> bool:
         if len(self._clients) < CLIENTS:
@@ -49,6 +61,21 @@ class Places:
         places.add(session)
         session.on_close(lambda: places.discard(session))
         return session
+
+
+def _make_room(stoppers: Iterable[Session]) -> bool:
+    """Close the one that has been silent for longest, unless all have only just come or spoken."""
+    before_ns = time.monotonic_ns() - round(FRESH_S * 1e9)
+    silent = [one for one in stoppers if one.heard_ns <= before_ns]
+    if not silent:
+        return False
+    # One that waits for an answer has been heard: what it asked for is being done.
+    min(silent, key=lambda one: (one.waits, one.heard_ns)).close(_refusal("others come; connect again"))
+    return True
+
+
+def _address(session: Session) -> str:
+    return session.peer.rpartition(":")[0]
 
 
 def _refusal(what: str) -> wire.RpcError:

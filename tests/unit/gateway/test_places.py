@@ -16,9 +16,9 @@ Connect = Callable[[], Client]
 
 @pytest.fixture
 def connect(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Connect]:
-    """Of a gateway with two places, and two more for who only stops."""
+    """Of a gateway with two places, and four more for who only stops: two for each address."""
     monkeypatch.setattr(places, "CLIENTS", 2)
-    monkeypatch.setattr(places, "STOPPERS", 2)
+    monkeypatch.setattr(places, "STOPPERS", 4)
     with serving(config(tmp_path)) as address, ExitStack() as clients:
         yield lambda: clients.enter_context(Client(address))
 
@@ -100,8 +100,9 @@ def test_who_may_only_stop_and_says_nothing_is_not_kept(
 
 
 def test_the_longest_silent_of_those_who_may_only_stop_makes_room(
-    connect: Connect, full: list[Client]
+    connect: Connect, full: list[Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(places, "FRESH_S", 0.0)
     silent = connect()
     for _ in range(4):
         late = connect()
@@ -110,6 +111,31 @@ def test_the_longest_silent_of_those_who_may_only_stop_makes_room(
     assert message is not None
     assert "others come" in message["error"]["message"]
     assert silent.line() is None
+
+
+def test_who_has_only_just_come_to_stop_is_not_sent_away_for_others(
+    connect: Connect, full: list[Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "FRESH_S", 1000.0)
+    early = connect()
+    others = [connect() for _ in range(4)]
+    for other in others[1:]:
+        message = other.line()
+        assert message is not None
+        assert "connect again" in message["error"]["message"]
+        assert other.line() is None
+    assert early.call("robot.stop", reason="early")["held"]
+
+
+def test_one_address_that_takes_all_places_it_can_leaves_some_to_others(
+    connect: Connect, full: list[Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "FRESH_S", 1000.0)
+    address = full[0].socket.getpeername()
+    with ExitStack() as flood:
+        for _ in range(8):
+            flood.enter_context(socket.create_connection(address, source_address=("127.0.0.2", 0)))
+        assert connect().call("robot.stop", reason="from elsewhere")["held"]
 
 
 def test_who_has_never_said_anything_makes_room_for_who_comes(
