@@ -15,7 +15,8 @@ FOLLOWS_NS = 50_000_000  # from a trip to the hold of its stop
 ON_THE_BUS_NS = 20_000_000  # from a stop to its last controlword
 # A stop that is under way need not be sent anew; one who does not answer is asked less and less often.
 UNDER_WAY_NS = {True: 500_000_000, False: 1_200_000_000}
-STANDS_S = 3.0  # how long what answers may go on under a held stop
+STANDS_S = 3.0  # how long what answers may go on under a held stop …
+LED_S = 7.0  # … and while a reset leads the drives down, one axis after the other
 HELD_AGAIN_NS = 500_000_000  # from the start of the control module to the hold that was left
 COLD_S = 2.0  # more for a stop that has to start its module
 
@@ -34,7 +35,7 @@ def nobody_enables(facts: Facts) -> Complaints:
 def _has_stopped(facts: Facts, one: Commanded) -> bool:
     stopped = one.state is DriveState.QUICK_STOP_ACTIVE and facts.now_ns - one.since_ns > BRAKES_NS
     reset = facts.open["robot.reset"] > 0 or facts.now_ns - facts.reset_ns < BRAKES_NS
-    return stopped and not reset and facts.healthy_for(JOINTS[one.joint][0], 0.5)
+    return stopped and not reset and facts.healthy_for(JOINTS[one.joint][0], 2.0)
 
 
 @always
@@ -53,15 +54,14 @@ def a_hold_ends_knowing(facts: Facts) -> Complaints:
     ended, facts.hold_ended = facts.hold_ended, False
     if not ended:
         return
+    stop_ns = facts.last_stop_ns(facts.now_ns - NOTICED_NS)
     for joint in JOINTS:
         last = facts.newest(joint, facts.now_ns - NOTICED_NS)
         if last is None or last.state not in AT_REST:
             yield f"the hold has ended, and {joint} was last said to be {last and last.state}"
-        elif not any(
-            facts.last_stop_ns < one.sampled_ns and one.state in AT_REST for one in facts.known[joint]
-        ):
+        elif not any(stop_ns < one.sampled_ns and one.state in AT_REST for one in facts.known[joint]):
             yield f"the hold has ended, and {joint} has not been read at rest since the last stop"
-    since = [value for sampled_ns, value in facts.run_read if sampled_ns > facts.last_stop_ns]
+    since = [value for sampled_ns, value in facts.run_read if sampled_ns > stop_ns]
     if not since:
         yield "the hold has ended, and the controller has not been read since the last stop"
     elif since[-1] != 0:
@@ -102,15 +102,16 @@ def _is_missed(facts: Facts, joint: str, asked_ns: int) -> bool:
 @always
 def what_is_held_stands(facts: Facts) -> Complaints:
     """While a stop is held, no drive that answers stays enabled, and no controller that answers runs on."""
-    long_ago_ns = facts.now_ns - round(STANDS_S * 1e9)
+    patience_s = LED_S if facts.open["robot.reset"] else STANDS_S
+    long_ago_ns = facts.now_ns - round(patience_s * 1e9)
     if not facts.held or facts.held_since_ns > long_ago_ns:
         return
     for joint, since_ns in facts.enabled_since.items():
-        if since_ns < long_ago_ns and facts.healthy_for(JOINTS[joint][0], STANDS_S):
-            yield f"{joint} has been enabled for {STANDS_S:g} s under a held stop, and answers"
+        if since_ns < long_ago_ns and facts.healthy_for(JOINTS[joint][0], patience_s):
+            yield f"{joint} has been enabled for {patience_s:g} s under a held stop, and answers"
     runs_since_ns = facts.runs_since
-    if runs_since_ns is not None and runs_since_ns < long_ago_ns and facts.healthy_for("gait", STANDS_S):
-        yield f"the controller has run for {STANDS_S:g} s under a held stop, and answers"
+    if runs_since_ns is not None and runs_since_ns < long_ago_ns and facts.healthy_for("gait", patience_s):
+        yield f"the controller has run for {patience_s:g} s under a held stop, and answers"
 
 
 @always
@@ -140,7 +141,7 @@ def what_a_stop_says_is_true(facts: Facts, asked: Asked) -> Complaints:
         axis = facts.world.axes[joint]
         stands = axis.state in STOPPED and facts.now_ns - axis.since_ns > 5 * BRAKES_NS
         healthy_ns = facts.healthy_since.get(JOINTS[joint][0], facts.now_ns)
-        if outcome != "confirmed" and stands and healthy_ns <= asked.asked_ns:
+        if outcome != "confirmed" and stands and healthy_ns < asked.asked_ns - NOTICED_NS:
             yield f"{joint} is called {outcome}, though it has stopped and answers"
         last = facts.newest(joint, facts.now_ns - NOTICED_NS)
         since = [one for one in facts.known[joint] if one.sampled_ns >= asked.asked_ns]

@@ -8,8 +8,8 @@ from tests.explore.gateway_life import Asked
 from tests.explore.invariants import Complaints, always, at_answers, at_the_end
 from tests.explore.parameters import PARAMETERS, counts
 
-TAKEN_BACK_S = 7.0  # how long after its end a trial may be in force, where its device answers
-KEEPS_TRYING_S = 12.0  # between two attempts to take back, at most, and one more
+TAKEN_BACK_S = 7.0  # how long after its end a write may be in force, where its device answers
+BEHIND_S = 14.0  # the same while another device or bus is not well: one is asked after the other
 _LEFT = ("unchanged", "taken back", "not written")  # what an answer calls a value that is the old one
 
 
@@ -27,7 +27,7 @@ def nothing_forbidden_is_written(facts: Facts) -> Complaints:
             yield f"{one.name} was changed by {step} counts at once; allowed are {parameter.most_step}"
         if parameter.rests is not None and _is_known_enabled(facts, parameter.rests, one.stamp_ns):
             yield f"{one.name} is not live, and was written while {parameter.rests} is known to be enabled"
-        if one.stamp_ns - facts.last_stop_ns > NOTICED_NS and not _is_wanted(facts, one):
+        if not _is_wanted(facts, one, facts.last_stop_ns(one.stamp_ns - NOTICED_NS)):
             yield f"{one.name} = {one.value} was sent after the stop, which nobody has asked for since"
 
 
@@ -37,13 +37,13 @@ def _is_known_enabled(facts: Facts, joint: str, stamp_ns: int) -> bool:
     return known and joint in facts.enabled_since
 
 
-def _is_wanted(facts: Facts, one: Download) -> bool:
+def _is_wanted(facts: Facts, one: Download, stop_ns: int) -> bool:
     """A write that was asked for after the last stop; else it takes back, or stops the controller."""
     if PARAMETERS[one.name].starts and one.value == 0:
         return True
     for asked in facts.life.asked:
         wanted = _wanted(asked, one.name)
-        if wanted == one.value and asked.asked_ns >= facts.last_stop_ns:
+        if wanted == one.value and asked.asked_ns >= stop_ns:
             return True
     changes = (change for (_, name), change in facts.undo.items() if name == one.name)
     before = [counts(one.name, change.before_value) for change in changes]
@@ -71,8 +71,8 @@ def _may_go(facts: Facts, write: int, change: UndoChange, left: tuple[Undo, ...]
     written, before = counts(name, change.written_value), counts(name, change.before_value)
     if held != written or held == before or not facts.is_ours(name):
         return True
-    if PARAMETERS[name].starts and facts.held and held == 0:
-        return True
+    if PARAMETERS[name].starts and facts.held:
+        return True  # it belongs to the stop
     taken_over = (one for undo in left for one in undo.changes if one.parameter == name)
     if any(one.before == change.before for one in taken_over):
         return True
@@ -91,18 +91,18 @@ def _keeps(asked: Asked, write: int, name: str, written: int) -> bool:
 @always
 def a_trial_ends(facts: Facts) -> Complaints:
     """What is to be taken back is, soon after its time, where its device answers."""
+    patience_s = TAKEN_BACK_S if facts.all_well else BEHIND_S
+    long_ago_ns = facts.now_ns - round(patience_s * 1e9)
+    if facts.control_since_ns is None or facts.control_since_ns > long_ago_ns:
+        return
     for (write, name), change in facts.undo.items():
+        device, rests = PARAMETERS[name].device, PARAMETERS[name].rests
         trial = facts.trials.get(write)
         due_ns = facts.undo_since[write, name] if trial is None else trial.due_ns
-        patience_s = KEEPS_TRYING_S if trial is None else TAKEN_BACK_S
-        long_ago_ns = facts.now_ns - round(patience_s * 1e9)
-        if due_ns > long_ago_ns or facts.control_since_ns is None or facts.control_since_ns > long_ago_ns:
-            continue
-        device, rests = PARAMETERS[name].device, PARAMETERS[name].rests
-        if rests is not None and facts.enabled_since.get(rests, facts.now_ns) < facts.now_ns:
-            continue  # it must not be written now
+        if rests is not None:  # it must not be written while that is enabled
+            due_ns = max(due_ns, facts.rests_since.get(rests, facts.now_ns))
         in_force = facts.value(name) == counts(name, change.written_value) and facts.is_ours(name)
-        if in_force and facts.healthy_for(device, patience_s):
+        if due_ns < long_ago_ns and in_force and facts.healthy_for(device, patience_s):
             yield f"{name} of write {write} is in force {patience_s:g} s after its end, and {device} answers"
 
 

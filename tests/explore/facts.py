@@ -11,6 +11,7 @@ import msgspec
 from drivers.joint.cia402 import DriveState, drive_state
 from gateway.records.undo import Undo, UndoChange
 from tests.explore.can import GATEWAY, Sent
+from tests.explore.disk import SYNC_NS
 from tests.explore.drive import CONTROLWORD, MAX_TORQUE, RUN, STATUSWORD, statusword_of
 from tests.explore.gateway_life import Asked, Life
 from tests.explore.node import RPDO1, SDO_REQUEST, TPDO1, Address, Device
@@ -18,7 +19,7 @@ from tests.explore.parameters import NAMES, PARAMETERS, counts
 from tests.explore.world import JOINTS, World
 
 LOOK_NS = 5_000_000  # how often the guard and the devices are asked how they are
-SEEN_NS = 500_000_000  # how long before a write a value may have been read
+SEEN_NS = 2_000_000_000  # how long before a write a value may have been read, answers late or not
 LOST_S = 5.0  # how long the gateway may go on with what somebody asked for who has left
 KNOWN = 1000  # statuswords of a drive that are remembered
 
@@ -72,7 +73,7 @@ class Facts:
     world: World
     life: Life
     # Stops and holds
-    last_stop_ns: int = 0  # when the last one was asked for, or a rule tripped
+    stops_ns: list[int] = field(default_factory=list)  # when they were asked for, or a rule tripped
     stops: list[Asked] = field(default_factory=list)  # that nobody has judged yet
     held: bool = False
     held_since_ns: int = 0
@@ -91,6 +92,7 @@ class Facts:
     healthy_since: dict[str, int] = field(default_factory=dict)  # since when it answers in time
     whole_since: dict[str, int] = field(default_factory=dict)  # and says by itself what it should
     enabled_since: dict[str, int] = field(default_factory=dict)
+    rests_since: dict[str, int] = field(default_factory=dict)
     runs_since: int | None = None  # the controller
     # Writes
     undo: dict[tuple[int, str], UndoChange] = field(default_factory=dict)  # by write and parameter
@@ -146,6 +148,15 @@ class Facts:
     def newest(self, joint: str, before_ns: int) -> Known | None:
         return next((one for one in reversed(self.known[joint]) if one.told_ns <= before_ns), None)
 
+    def last_stop_ns(self, before_ns: int) -> int:
+        """When the last one was asked for, or a rule tripped, that came before."""
+        return max((at_ns for at_ns in self.stops_ns if at_ns <= before_ns), default=0)
+
+    @property
+    def all_well(self) -> bool:
+        """Whether every device answers, and the disk does in time."""
+        return len(self.healthy_since) == len(self.world.devices) and self.world.disk.sync_ns <= SYNC_NS
+
     # What is told
 
     def on_frame(self, sent: Sent) -> None:
@@ -165,7 +176,7 @@ class Facts:
 
     def on_asked(self, asked: Asked) -> None:
         if asked.method == "robot.stop":
-            self.last_stop_ns = self.now_ns
+            self.stops_ns.append(self.now_ns)
             self.stops.append(asked)
         self.open[asked.method] += 1
         self.last_change_ns = self.now_ns
@@ -240,6 +251,7 @@ class Facts:
             _follow(self.whole_since, name, now_ns, holds=answers and not device.faults.no_tpdo)
         for joint, axis in self.world.axes.items():
             _follow(self.enabled_since, joint, now_ns, holds=axis.enabled)
+            _follow(self.rests_since, joint, now_ns, holds=not axis.enabled)
         self.runs_since = (self.runs_since or now_ns) if self.world.gait.runs else None
 
     # What follows from it
@@ -333,7 +345,7 @@ class Facts:
         tripped = {one.name: one.since_ns or 0 for one in rules if one.state == "tripped"}
         trips = sum(one.trips for one in rules)
         if trips > self.trips:
-            self.last_stop_ns = max(self.last_stop_ns, *tripped.values(), 0)
+            self.stops_ns += tripped.values()
         self.trips = trips
         self.tripped_since = {name: self.tripped_since.get(name, self.now_ns) for name in tripped}
 

@@ -92,8 +92,9 @@ class Device:
     def answers(self) -> bool:
         """Whether who asks it gets one answer in time."""
         faults = self.faults
-        well = not (faults.dead or faults.no_sdo or faults.late_s > SLOW_S or faults.lose or faults.doubled)
-        return well and self.nmt != STOPPED and not self.wire.blocked and not self.wire.gone
+        deaf = faults.dead or faults.no_sdo or self.nmt == STOPPED or self.wire.blocked or self.wire.gone
+        odd = faults.late_s > SLOW_S or faults.lose or faults.doubled or self.distrusted
+        return not deaf and not odd
 
     # What happens to it
 
@@ -146,7 +147,8 @@ class Device:
 
     def _forget(self) -> None:
         self.values = {address: entry.data for address, entry in self.entries.items()}
-        self.writers = {}
+        self.writers = dict.fromkeys(self.entries, ("power", self.wire.runtime.now_ns))
+        self.distrusted = False
         self.on_power()
 
     def _answer(self, data: bytes, asked_ns: int) -> None:
@@ -169,6 +171,7 @@ class Device:
 
         runtime.call_at(due_ns, send)
         if faults.doubled:
+            self.distrusted = True  # whoever has seen it may wait until it boots
             runtime.call_at(due_ns + round(DOUBLED_AFTER_S * 1e9), send)
 
     def _serve(self, request: bytes) -> bytes | None:
