@@ -51,7 +51,7 @@ class HoldFile:
             self.held = msgspec.json.decode(self._path.read_bytes(), type=HeldStop)
         except (FileNotFoundError, NotADirectoryError) as error:
             self.held = self._unreadable(error) if self._path.is_symlink() else None
-        except (OSError, ValueError, RecursionError) as error:
+        except (OSError, *UNDECODABLE) as error:
             self.held = self._unreadable(error)
         return self.held
 
