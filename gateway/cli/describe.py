@@ -107,7 +107,12 @@ def _stop_beyond(stop: StopInfo) -> str:
     lines = [f"a stop is held: {stop.reason or 'no reason given'}" if stop.held else "no stop is held"]
     lines += [] if stop.problem is None else [stop.problem]
     for name, why_not in stop.controllers.items():
-        lines.append(f"it goes to {name} too" + ("" if why_not is None else f", but cannot: {why_not}"))
+        what = f"a stop also stops the controller {name}"
+        lines.append(what if why_not is None else f"a stop CANNOT stop the controller {name}: {why_not}")
+    again = {name: times for name, times in stop.stopped_again.items() if times}
+    lines += [
+        f"{name} was enabled {times} times meanwhile, and stopped again" for name, times in again.items()
+    ]
     lines += [f"where a quick stop is not confirmed: {fallback}" for fallback in stop.fallbacks]
     return "".join(f"{line}\n" for line in lines)
 

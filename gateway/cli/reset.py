@@ -1,13 +1,13 @@
 """`gwrms reset`: ends a held stop."""
 
 from gateway.cli.reach import parser, reach
-from gateway.cli.text import say, say_json, table, warn
+from gateway.cli.text import NONE, say, say_json, table, warn
 from gateway.messages import Reset
 
 EPILOG = """Each drive is led to "switch on disabled": one that moves is stopped before, a fault is reset, and
 one that held its position lets go of it. Nothing is enabled: that is the controller's part, or
-gwrms enable's. A drive that does not get there is named; the stop stays held unless it is known
-of every drive that its motor has no current."""
+gwrms enable's. The stop stays held unless it is known of every drive that its motor has no
+current, and of every controller that it is stopped; what stands against that is named."""
 
 
 def main(argv: list[str]) -> int:
@@ -25,11 +25,13 @@ def main(argv: list[str]) -> int:
 
 def _text(reset: Reset) -> str:
     rows = [(name, state, reset.problems.get(name, "")) for name, state in reset.drives.items()]
+    rows += [(name, NONE, why) for name, why in reset.problems.items() if name not in reset.drives]
     held = "The stop is STILL HELD." if reset.held else "No stop is held."
-    return table(("DRIVE", "STATE", "PROBLEM"), rows) + f"\n{held}\n"
+    return table(("OF", "STATE", "PROBLEM"), rows) + f"\n{held}\n"
 
 
 def _verdict(reset: Reset) -> int:
     if reset.problems:
-        warn("reset", f"not every drive is switched off: {', '.join(reset.problems)}")
+        what = "the stop is still held" if reset.held else "no stop is held, but"
+        warn("reset", f"{what}: {'; '.join(f'{name}: {why}' for name, why in reset.problems.items())}")
     return 1 if reset.held or reset.problems else 0

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Iterable, Mapping
 from typing import Self
 
 from gateway.client.address import Address
-from gateway.client.errors import LinkLost, NotConnected
+from gateway.client.errors import LinkLost, NotConnected, RemoteError
 from gateway.client.link import Link, LinkSettings, OnState
 from gateway.client.subscription import Subscription
 from gateway.messages import (
@@ -69,6 +69,7 @@ class Client:
     ) -> None:
         where = Address.parse(address) if isinstance(address, str) else address
         self.link = Link(where, settings or LinkSettings(), on_state)
+        self._writing: list[float] = []  # blocks that hold the lease, each with how long it asked for it
 
     async def __aenter__(self) -> Self:
         self.link.start()
@@ -174,7 +175,21 @@ class Client:
             await robot.confirm(written.write)
         """
         async with self.writing(min(trial_s + LEASE_MARGIN_S, LONGEST_LEASE_S)):
-            yield await self.write(changes, trial_s)  # giving back the lease takes back what is on trial
+            written = await self.write(changes, trial_s)
+            try:
+                yield written
+            finally:  # giving back the lease takes back what is on trial; within another block it is kept
+                if len(self._writing) > 1:
+                    await self._take_back(written.write)
+
+    async def _take_back(self, write: int) -> None:
+        try:
+            await self.revert(write)
+        except (NotConnected, LinkLost):  # the lease went with the connection, and the trial with it
+            return
+        except RemoteError as error:
+            if error.kind != "unknown_name":  # it has ended: confirmed, or taken over
+                raise
 
     async def store(self, component: str) -> Stored:
         """Make a device keep its parameters over a reset (1010h). Needs the lease.
@@ -195,13 +210,19 @@ class Client:
 
     @contextlib.asynccontextmanager
     async def writing(self, ttl_s: float = 60.0) -> AsyncIterator[None]:
-        """Hold the lease for a block: `async with robot.writing(): await robot.write(…)`."""
-        await self.acquire(ttl_s)
+        """Hold the lease for a block: `async with robot.writing(): await robot.write(…)`.
+
+        Within such a block another one keeps it: what is on trial in the outer one stays so.
+        """
+        await self.acquire(max(ttl_s, *self._writing, 0.0))
+        self._writing.append(ttl_s)
         try:
             yield
         finally:
-            with contextlib.suppress(NotConnected, LinkLost):  # the lease went with the connection
-                await self.release()
+            self._writing.remove(ttl_s)
+            if not self._writing:
+                with contextlib.suppress(NotConnected, LinkLost):  # the lease went with the connection
+                    await self.release()
 
     async def stop(self, reason: str) -> Stopped:
         """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed.

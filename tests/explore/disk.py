@@ -115,6 +115,10 @@ class DiskPath(PurePosixPath):
 
     is_file = exists
 
+    def is_symlink(self) -> bool:
+        """It has no links."""
+        return False
+
     def mkdir(self, **_options: bool) -> None:
         """Folders need no making."""
 
