@@ -157,6 +157,11 @@ class SdoChannel:
         self._answers.forget_doubles()
         self._unassigned = 0
 
+    def pause(self, seconds: float) -> None:
+        """Wait between two transfers of a job, as long as nothing more urgent wants the channel."""
+        if self._interrupted.wait(seconds):
+            raise Interrupted
+
     # Transfers.
 
     def upload(

@@ -98,7 +98,7 @@ class _Descent:
                 return Led(None, str(error))
             except DriverError as error:
                 self._led = replace(self._led, problem=str(error))
-            time.sleep(LOOK_S)
+            self._axis.sdo.pause(LOOK_S)
         return self._led
 
     def _look(self) -> None:
@@ -125,7 +125,7 @@ class _Descent:
 
     def _stands(self) -> bool:
         before = self._axis.position()
-        time.sleep(STANDS_S)
+        self._axis.sdo.pause(STANDS_S)
         return abs(self._axis.position() - before) <= STANDS_SHARE * self._errand.counts_per_turn
 
 
@@ -150,7 +150,7 @@ def _await(axis: Axis, errand: Errand, origin: DriveState, target: DriveState) -
     deadline = time.monotonic() + errand.timeout_s
     led = _read(axis)
     while led.state is origin and time.monotonic() < deadline and errand.wanted():
-        time.sleep(LOOK_S)
+        axis.sdo.pause(LOOK_S)
         led = _read(axis)
     if led.state is target:
         return led
