@@ -24,6 +24,14 @@ class Defect:
 
 
 DEFECTS: dict[str, Defect] = {
+    "stop-that-enables": Defect(
+        "a quick stop enables the drive (never was there: it shows that the explorer looks)",
+        ("nobody_enables",),
+        ("resting",),
+        ("ben stops",),
+        parts=(Part("drivers.joint.commands", "QUICK_STOP = 0x0002", "QUICK_STOP = 0x000F"),),
+        depth=1,
+    ),
     "trip-lost-in-reset": Defect(
         "a guard trip during a reset is lost: the hold ends, the rule stays tripped",
         ("a_trip_is_held",),
@@ -166,6 +174,33 @@ DEFECTS: dict[str, Defect] = {
         ("walking",),
         ("bus left breaks",),
         text="thread can left",
+        depth=1,
+    ),
+    "half-closed-streams": Defect(
+        "a client that has ended and streams is taken for half-closed: its trial stays in force",
+        ("a_trial_ends",),
+        ("lasting",),
+        ("ada says no more", "ada dies"),
+        depth=1,
+    ),
+    "no-place-for-a-stop": Defect(
+        "when all places are taken by silent connections, a stop is refused",
+        ("a_stop_is_on_the_bus", "a_stop_is_answered"),
+        ("resting",),
+        ("a crowd comes", "ben stops"),
+    ),
+    "stop-behind-a-full-queue": Defect(
+        "a stop behind a full queue of its own client is not read",
+        ("a_stop_is_on_the_bus",),
+        ("resting",),
+        ("gait dies", "gait is late", "ada floods", "ada stops"),
+        depth=3,
+    ),
+    "stop-refused-for-its-form": Defect(
+        "a stop is refused for its form",
+        ("a_stop_is_on_the_bus",),
+        ("resting",),
+        ("ben stops oddly",),
         depth=1,
     ),
 }

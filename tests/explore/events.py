@@ -15,6 +15,8 @@ Act = Callable[[Stage], object]
 Possible = Callable[[Stage], bool]
 
 LEASE_S, TRIAL_S = 6.0, 1.5
+LONG_S = 60.0
+CROWD, FLOOD = 70, 320
 PUSHED = 1.5  # rad, beyond every limit
 SLOW_SYNC_NS = 800_000_000
 LEADER, OTHER = "ada", "ben"
@@ -40,11 +42,11 @@ def _event(name: str, act: Act, possible: Possible = lambda _stage: True, *, wei
 # People
 
 
-def _write(*names: str, trial: bool = False, who: str = LEADER) -> Act:
+def _write(*names: str, trial_s: float | None = None) -> Act:
     def act(stage: Stage) -> None:
         changes = {name: following(name, stage.facts.value(name)) for name in names}
-        more = {"trial_s": TRIAL_S} if trial else {}
-        stage.ask(who, "parameter.write", changes=changes, **more)
+        more = {} if trial_s is None else {"trial_s": trial_s}
+        stage.ask(LEADER, "parameter.write", changes=changes, **more)
 
     return act
 
@@ -74,6 +76,8 @@ _event("ada gives back", _asks(LEADER, "control.release"))
 _event("ben leads", _asks(OTHER, "control.acquire", ttl_s=LEASE_S))
 _event("ben resets", _asks(OTHER, "robot.reset"))
 _event("ada dies", lambda stage: stage.leave(LEADER), lambda stage: LEADER in stage.life.people)
+_event("ada leads for long", _asks(LEADER, "control.acquire", ttl_s=LONG_S), weight=0.3)
+_event("try for long", _write("gait.cycle_time", trial_s=LONG_S), weight=0.3)
 _event(
     "ada says no more",
     lambda stage: stage.leave(LEADER, gone=False),
@@ -91,12 +95,44 @@ _event("write step", _write("gait.step_length"))
 _event("write torque", _write("knee.max_torque"))
 _event("write run", _write("gait.run"))
 _event("write both", _write("gait.cycle_time", "ankle.max_torque"))
-_event("try step", _write("gait.step_length", trial=True))
-_event("try torque", _write("knee.max_torque", trial=True))
-_event("try run", _write("gait.run", trial=True))
-_event("try both", _write("gait.step_length", "ankle.max_torque", trial=True))
+_event("try step", _write("gait.step_length", trial_s=TRIAL_S))
+_event("try torque", _write("knee.max_torque", trial_s=TRIAL_S))
+_event("try run", _write("gait.run", trial_s=TRIAL_S))
+_event("try both", _write("gait.step_length", "ankle.max_torque", trial_s=TRIAL_S))
 _event("confirm", _about_trial("parameter.confirm"), _has_trial)
 _event("revert", _about_trial("parameter.revert"), _has_trial)
+
+
+# Forms in which a stop may come that are no request, strictly.
+_ODD = (
+    b'{"jsonrpc":"2.0","id":9001,"method":"robot.stop","params":["odd"]}',
+    b'{"id":9001,"method":"robot.stop","params":{"reason":"odd"}}',
+    b'{"jsonrpc":"2.0","id":9001,"method":"robot.stop","params":{"reason":"odd","now":true}}',
+    b'{"jsonrpc":"2.0","id":9001.5,"method":"robot.stop"}',
+    b'[{"jsonrpc":"2.0","id":9001,"method":"robot.stop"}]',
+    b'{"jsonrpc":"2.0","id":9001,"method":"robot.stop","params":{"reason":"\xe9"}}',
+)
+
+
+def _stop_oddly(stage: Stage) -> None:
+    stage.stop_by(OTHER, _ODD[stage.runtime.steps % len(_ODD)] + b"\n")
+
+
+def _crowd(stage: Stage) -> None:
+    """So many connect that nobody else finds a place, and say nothing."""
+    for _ in range(CROWD):
+        stage.life.connect()
+
+
+def _flood(stage: Stage) -> None:
+    """More requests than may wait."""
+    line = b'{"jsonrpc":"2.0","id":"flood","method":"parameter.read","params":{"names":["gait.run"]}}\n'
+    stage.life.say(LEADER, line * FLOOD)
+
+
+_event("ben stops oddly", _stop_oddly, weight=0.5)
+_event("a crowd comes", _crowd, weight=0.2)
+_event("ada floods", _flood, weight=0.2)
 
 
 # What the robot does

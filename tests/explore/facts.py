@@ -176,10 +176,13 @@ class Facts:
 
     def on_asked(self, asked: Asked) -> None:
         if asked.method == "robot.stop":
-            self.stops_ns.append(self.now_ns)
-            self.stops.append(asked)
+            self.on_stop(asked)
         self.open[asked.method] += 1
         self.last_change_ns = self.now_ns
+
+    def on_stop(self, asked: Asked) -> None:
+        self.stops_ns.append(self.now_ns)
+        self.stops.append(asked)
 
     def on_answer(self, asked: Asked) -> None:
         self.last_change_ns = self.now_ns

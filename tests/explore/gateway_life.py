@@ -47,6 +47,7 @@ class Life:
         self.people: dict[str, Connection] = {}  # those who are connected
         self.asked: list[Asked] = []
         self.answered: Callable[[Asked], object] = lambda _asked: None
+        self.cut: Callable[[str], object] = lambda _who: None  # told whose connection the gateway has ended
         self._numbers = itertools.count(1)
         self._listener = Listener(world.system)
         world.runtime.owner = self
@@ -69,12 +70,21 @@ class Life:
         """Send a request, over a new connection where there is none."""
         asked = Asked(next(self._numbers), who, method, params, self.world.runtime.now_ns)
         self.asked.append(asked)
+        self.say(who, wire.encode_request(asked.number, method, params))
+        return asked
+
+    def say(self, who: str, lines: bytes) -> None:
+        """Send whatever it is."""
         connection = self.people.get(who)
         if connection is None or connection.closed:
-            connection = self.people[who] = Connection(self.world.system, self._hear)
-            self._listener.connect(connection)
-        connection.say(wire.encode_request(asked.number, method, params))
-        return asked
+            connection = self.people[who] = self.connect(lambda: self.cut(who))
+        connection.say(lines)
+
+    def connect(self, cut: Callable[[], object] = bool) -> Connection:
+        """Somebody comes; `cut` is told when the gateway ends it."""
+        connection = Connection(self.world.system, self._hear, cut)
+        self._listener.connect(connection)
+        return connection
 
     def leave(self, who: str, *, gone: bool = True) -> None:
         """Close a person's connection; or say nothing more, and still take what comes."""

@@ -10,10 +10,13 @@ from tests.explore.system import READ, WRITE, Channel, System
 
 
 class Connection(Channel):
-    """The gateway's end of one; `told` is the client, and hears whatever is sent to it."""
+    """The gateway's end of one; `told` is the client, and hears whatever is sent to it, `cut` its end."""
 
-    def __init__(self, system: System, told: Callable[[bytes], object]) -> None:
+    def __init__(
+        self, system: System, told: Callable[[bytes], object], cut: Callable[[], object] = bool
+    ) -> None:
         super().__init__(system)
+        self._cut = cut
         self.closed = False
         self.ended = False  # the client says nothing more
         self.gone = False  # nobody is there any more
@@ -51,7 +54,9 @@ class Connection(Channel):
         return len(data)
 
     def close(self) -> None:
-        self.closed = True
+        if not self.closed:
+            self.closed = True
+            self._cut()
 
     def setblocking(self, _blocking: bool) -> None:
         """It never blocks."""

@@ -45,6 +45,7 @@ _SCENES = (
     Scene("restarted", (*_WALKS, "ben stops", "gateway is killed"), settles=False),
     Scene("resting", ("ada leads",)),
     Scene("bench", ("ada leads",), role="master"),
+    Scene("lasting", ("gait is started", "ada leads for long", "ada streams", "try for long")),
     Scene("cold", ("gait is started",), guard=""),
     Scene("dark", ("ada leads",), guard=GUARD + BLIND, dark=True),
 )

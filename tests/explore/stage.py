@@ -35,8 +35,8 @@ class Stage:
         self.runtime = world.runtime
         self.life = Life(world)
         self.facts = Facts(world, self.life)
+        self._listen(self.life)
         self.findings: list[Finding] = []
-        self.life.answered = self._on_answer
         self._judged = judged
         self._judges = tuple(KNOWN.always.items())
         self.runtime.after_task = self.judge
@@ -68,6 +68,12 @@ class Stage:
         self.facts.on_asked(asked)
         return asked
 
+    def stop_by(self, who: str, line: bytes) -> None:
+        """A stop in whatever form; nobody waits for its answer."""
+        self.life.say(who, line)
+        asked = Asked(0, who, "robot.stop", {}, self.runtime.now_ns, lost=True)
+        self.facts.on_stop(asked)
+
     def leave(self, who: str, *, gone: bool = True) -> None:
         self.life.leave(who, gone=gone)
         self.facts.on_left(who)
@@ -80,7 +86,7 @@ class Stage:
             for wire in self.world.wires.values():
                 wire.lose_power()
         life = Life(self.world)
-        life.answered = self._on_answer
+        self._listen(life)
         self.facts.on_new_life(life)
         self.life = life
 
@@ -141,6 +147,9 @@ class Stage:
         if self.findings:
             raise Violation(f"{self.findings[0].invariant}: {self.findings[0].text}")
         return found
+
+    def _listen(self, life: Life) -> None:
+        life.answered, life.cut = self._on_answer, self.facts.on_left
 
     def _on_answer(self, asked: Asked) -> None:
         self.facts.on_answer(asked)

@@ -1,0 +1,54 @@
+"""Every interleaving that two minutes allow is tried, and nothing is violated that must never be."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SECONDS = 100
+FEWEST_ORDERS, FEWEST_STATES = 500, 1000
+
+
+def _explore(*options: str, timeout_s: float = 50.0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tests.explore", "--workers", "2", *options]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout_s, check=False
+    )
+
+
+def _number(what: str, said: str) -> int:
+    found = re.search(rf"(\d+) {what}", said)
+    assert found is not None, said
+    return int(found[1])
+
+
+@pytest.mark.timeout(200)
+def test_no_order_of_events_violates_an_invariant() -> None:
+    done = _explore("--seconds", str(SECONDS), timeout_s=190.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert _number("orders tried", done.stdout) >= FEWEST_ORDERS
+    assert _number("distinct states", done.stdout) >= FEWEST_STATES
+
+
+def test_a_defect_put_back_is_found_and_its_order_can_be_played_again() -> None:
+    where = ("--scenes", "resting", "--events", "ben stops", "--first")
+    found = _explore("--with-defect", "stop-that-enables", *where)
+    assert found.returncode == 1, found.stdout + found.stderr
+    assert "[nobody_enables]" in found.stdout
+    order = re.search(r"--replay '(.*)'", found.stdout)
+    assert order is not None
+    again = _explore("--with-defect", "stop-that-enables", "--replay", order[1])
+    assert again.returncode == 1
+    assert "[nobody_enables]" in again.stdout
+
+
+def test_a_search_is_the_same_each_time() -> None:
+    options = ("--seconds", "0", "--depth", "1", "--scenes", "resting", "--workers", "1", "--only", "none")
+    said = [re.sub(r"\d+ s,", "", _explore(*options).stdout) for _ in range(2)]
+    assert said[0] == said[1]
+    assert "orders tried" in said[0]
