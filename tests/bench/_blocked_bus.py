@@ -32,7 +32,7 @@ def _serve(master: int, slave: int, ending: threading.Event) -> None:
     os.set_blocking(master, False)
     os.set_blocking(slave, False)
     heard = b""
-    while not heard.endswith(_OPENED):
+    while _OPENED not in heard:  # the first frames may come with it
         if ending.wait(0.001):
             return
         try:

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 SECONDS = 100
-FEWEST_ORDERS, FEWEST_STATES = 500, 1000
+FEWEST_ORDERS, FEWEST_STATES = 100, 300  # also on a computer that does much else
 
 
 def _explore(*options: str, timeout_s: float = 50.0) -> subprocess.CompletedProcess[str]:
