@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
@@ -60,15 +61,19 @@ class ControlModule:
         }
 
     def start(self) -> None:
-        self._records = Records(self._context.config.records)
         config, loop = self._context.config, self._context.loop
-        self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
-        self._tuning = Tuning(
-            config, self._component, loop, self._records, self._stop.authority, self._trials_changed
-        )
-        self._stop.claim = self._tuning.claim
-        left = self._tuning.load()
-        self._stop.start()
+        with ExitStack() as opened:  # what was opened before something failed
+            self._records = Records(config.records)
+            opened.callback(self._records.close)
+            self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
+            self._tuning = Tuning(
+                config, self._component, loop, self._records, self._stop.authority, self._trials_changed
+            )
+            opened.callback(self._tuning.close)
+            self._stop.claim = self._tuning.claim
+            left = self._tuning.load()
+            self._stop.start()
+            opened.pop_all()
         loop.post(lambda: self._tuning.resume(left))
         self._context.stops_by(self.stop_robot)
         loop.post(self._hold_changed)  # a stop that is held keeps the module from its first moment on

@@ -117,8 +117,8 @@ class StopControl:
 
     def start(self) -> None:
         """Begin; a stop that the last gateway held is held on."""
-        self._thread.start()
         left = self._record.load()
+        self._thread.start()
         if left is None:
             return
         details = {"by": left.who, "reason": left.reason, "since_utc_ns": left.utc_ns}
