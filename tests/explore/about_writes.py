@@ -8,8 +8,9 @@ from tests.explore.gateway_life import Asked
 from tests.explore.invariants import Complaints, always, at_answers, at_the_end
 from tests.explore.parameters import PARAMETERS, counts
 
-TAKEN_BACK_S = 7.0  # how long after its end a write may be in force, where its device answers
-BEHIND_S = 14.0  # the same while another device or bus is not well: one is asked after the other
+TAKEN_BACK_S = (
+    14.0  # how long after its end a write may be in force: one device or disk is asked after the other
+)
 _LEFT = ("unchanged", "taken back", "not written")  # what an answer calls a value that is the old one
 
 
@@ -91,7 +92,7 @@ def _keeps(asked: Asked, write: int, name: str, written: int) -> bool:
 @always
 def a_trial_ends(facts: Facts) -> Complaints:
     """What is to be taken back is, soon after its time, where its device answers."""
-    patience_s = TAKEN_BACK_S if facts.all_well else BEHIND_S
+    patience_s = TAKEN_BACK_S
     long_ago_ns = facts.now_ns - round(patience_s * 1e9)
     if facts.control_since_ns is None or facts.control_since_ns > long_ago_ns:
         return

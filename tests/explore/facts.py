@@ -11,7 +11,6 @@ import msgspec
 from drivers.joint.cia402 import DriveState, drive_state
 from gateway.records.undo import Undo, UndoChange
 from tests.explore.can import GATEWAY, Sent
-from tests.explore.disk import SYNC_NS
 from tests.explore.drive import CONTROLWORD, MAX_TORQUE, RUN, STATUSWORD, statusword_of
 from tests.explore.gateway_life import Asked, Life
 from tests.explore.node import RPDO1, SDO_REQUEST, TPDO1, Address, Device
@@ -151,11 +150,6 @@ class Facts:
     def last_stop_ns(self, before_ns: int) -> int:
         """When the last one was asked for, or a rule tripped, that came before."""
         return max((at_ns for at_ns in self.stops_ns if at_ns <= before_ns), default=0)
-
-    @property
-    def all_well(self) -> bool:
-        """Whether every device answers, and the disk does in time."""
-        return len(self.healthy_since) == len(self.world.devices) and self.world.disk.sync_ns <= SYNC_NS
 
     # What is told
 

@@ -102,9 +102,9 @@ class Life:
     def _hear(self, data: bytes) -> None:
         for line in data.splitlines():
             if b'"id"' in line:
-                self._answer(msgspec.json.decode(line, type=wire.Response))
+                self._answer(msgspec.json.decode(line, type=_Answer))
 
-    def _answer(self, response: wire.Response) -> None:
+    def _answer(self, response: "_Answer") -> None:
         found = next((one for one in self.asked if one.number == response.id), None)
         if found is None or found.answered_ns is not None:
             return
@@ -114,3 +114,11 @@ class Life:
         elif isinstance(response.result, msgspec.Raw):
             found.result = msgspec.json.decode(response.result, type=METHODS[found.method].result)
         self.answered(found)
+
+
+class _Answer(msgspec.Struct, frozen=True):
+    """An answer to whatever was asked, with whatever id."""
+
+    id: Any = None
+    result: msgspec.Raw | msgspec.UnsetType = msgspec.UNSET
+    error: wire.ErrorBody | msgspec.UnsetType = msgspec.UNSET
