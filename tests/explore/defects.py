@@ -1,11 +1,13 @@
 """The defects that were proved once, each with how it would be put back and by which invariant it is found.
 
-`parts` are the texts that put it back; without any it is looked for in the code as it is. `scenes` and
-`events` are where the search looks, so that a defect takes seconds and not hours; nothing says in which
-order.
+`parts` are the texts that put it back (`defects.toml`); without any it is looked for in the code as it is.
+`scenes` and `events` are where the search looks, so that a defect takes seconds and not hours; nothing says
+in which order.
 """
 
-from dataclasses import dataclass
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from tests.explore.mutating import Part
 
@@ -23,7 +25,7 @@ class Defect:
     depth: int = 2
 
 
-DEFECTS: dict[str, Defect] = {
+_DEFECTS: dict[str, Defect] = {
     "stop-that-enables": Defect(
         "a quick stop enables the drive (never was there: it shows that the explorer looks)",
         ("nobody_enables",),
@@ -204,3 +206,12 @@ DEFECTS: dict[str, Defect] = {
         depth=1,
     ),
 }
+
+
+def _with_parts() -> dict[str, Defect]:
+    told = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    parts = {name: tuple(Part(**part) for part in some) for name, some in told.items()}
+    return {name: replace(one, parts=one.parts + parts.get(name, ())) for name, one in _DEFECTS.items()}
+
+
+DEFECTS = _with_parts()
