@@ -235,8 +235,7 @@ class ControlMachine(RuleBasedStateMachine):
     def right_knee_bends_too_far(self) -> None:
         """Its rule stops the robot; the stop is held, and not reset as long as the knee is bent."""
         self.bends(self.bench.right, "stops")
-        if not self.stopped:
-            self.happened += ["stop", "stop answered"]
+        self.happened += ["stopped again"] if self.stopped else ["stop", "stop answered"]
         self.stopped, self.at_rest = True, False
         until(self.stop_held, "the guard's stop is held")
         if self.lease is not None:

@@ -118,7 +118,7 @@ def test_a_run_that_is_terminated_leaves_no_gateway_behind(tmp_path: Path) -> No
             time.sleep(0.05)
         running.terminate()
         assert running.wait(DEADLINE_S) == 128 + signal.SIGTERM
-    assert not any(gateway.is_running() for gateway in gateways)
+    assert psutil.wait_procs(gateways, DEADLINE_S)[1] == []
 
 
 def test_a_script_happens_to_a_robot_without_a_gateway(tmp_path: Path) -> None:
