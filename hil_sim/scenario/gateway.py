@@ -5,10 +5,12 @@ The link speaks the wire as any program would: one line of JSON-RPC 2.0 each way
 
 import json
 import selectors
+import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,21 +35,28 @@ class GatewayProcess:
 
     def __init__(self, config: Path, log: Path) -> None:
         self._log = log
-        command = [sys.executable, "-P", "-m", "gateway.main", "gateway", str(config), "--port", "0"]
-        with log.open("wb") as errors:
-            self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, process_group=0
-            )
+        self._command = [sys.executable, "-P", "-m", "gateway.main", "gateway", str(config), "--port", "0"]
+        self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> tuple[str, int]:
-        """Its address, once it listens."""
+        """Its address, once it listens. In the main thread: signals that come meanwhile act afterwards."""
         try:
-            return self._wait()
+            with _signals_later(), self._log.open("wb") as errors:
+                self._process = subprocess.Popen(
+                    self._command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=errors,
+                    process_group=0,
+                )
+            return self._wait(self._process)
         except BaseException:
             self.__exit__()
             raise
 
     def __exit__(self, *_: object) -> None:
+        if self._process is None:
+            return
         self._process.terminate()
         try:
             self._process.communicate(timeout=_END_S)
@@ -55,12 +64,12 @@ class GatewayProcess:
             self._process.kill()
             self._process.communicate()
 
-    def _wait(self) -> tuple[str, int]:
+    def _wait(self, process: "subprocess.Popen[bytes]") -> tuple[str, int]:
         said = b""
-        if self._process.stdout is not None:
+        if process.stdout is not None:
             with selectors.DefaultSelector() as selector:
-                selector.register(self._process.stdout, selectors.EVENT_READ)
-                said = self._process.stdout.readline() if selector.select(READY_S) else b""
+                selector.register(process.stdout, selectors.EVENT_READ)
+                said = process.stdout.readline() if selector.select(READY_S) else b""
         if not said.startswith(_LISTENING):
             raise GatewayFailed(f"the gateway did not start; it said:\n{self._last_words()}")
         host, _, port = said[len(_LISTENING) :].decode().strip().rpartition(":")
@@ -68,6 +77,21 @@ class GatewayProcess:
 
     def _last_words(self) -> str:
         return self._log.read_text(encoding="utf-8", errors="replace")[-2000:] or "nothing"
+
+
+@contextmanager
+def _signals_later() -> Iterator[None]:
+    """What would end this process in the middle does so at the end, when what was begun is known."""
+    came: list[int] = []
+    ends = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, lambda came_in, _frame: came.append(came_in)) for number in ends}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for late in came:
+            signal.raise_signal(late)
 
 
 class GatewayLink:
