@@ -66,7 +66,15 @@ def drive_entries(axes: int, node_id: int, quick_stop_option: int) -> dict[Addre
             (0x6061 + offset, 0): Entry(I8, "ro", 8),
             (POSITION + offset, 0): Entry(I32, "ro"),
             (MAX_TORQUE + offset, 0): Entry(U16, "rw", 1000),
+            (0x6075 + offset, 0): Entry(U32, "rw", 5000),
+            (0x6076 + offset, 0): Entry(U32, "rw", 200),
             (0x607A + offset, 0): Entry(I32, "rww"),
+            (0x608F + offset, 0): Entry(U8, "const", 2),
+            (0x608F + offset, 1): Entry(U32, "rw", 4096),
+            (0x608F + offset, 2): Entry(U32, "rw", 1),
+            (0x6091 + offset, 0): Entry(U8, "const", 2),
+            (0x6091 + offset, 1): Entry(U32, "rw", 100),
+            (0x6091 + offset, 2): Entry(U32, "rw", 1),
         }
     return found
 
