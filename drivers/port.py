@@ -16,6 +16,7 @@ from pathlib import Path
 import serial
 
 from drivers.errors import Unavailable
+from drivers.urgency import make_urgent
 
 FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
@@ -74,6 +75,7 @@ class SerialPort:
         self.problem = None
 
     def _run(self) -> None:
+        make_urgent()
         retry_s = FIRST_RETRY_S
         while True:
             try:

@@ -13,6 +13,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
+from drivers.urgency import make_urgent
 from gateway import wire
 from gateway.acceptor import Acceptor
 from gateway.loop import HANGUP, READ, Loop
@@ -223,7 +224,7 @@ class Intake:
         self._inlets: set[Inlet] = set()
         self._spent_ns = 0
         self._acceptor = Acceptor(self._front, listener, self._accepted)
-        self._thread = threading.Thread(target=self._front.run, name="intake")
+        self._thread = threading.Thread(target=self._run, name="intake")
 
     def start(self) -> None:
         """Begin to accept."""
@@ -244,6 +245,10 @@ class Intake:
         self._front.post(self._finish)
         self._thread.join()
         self._front.close()
+
+    def _run(self) -> None:
+        make_urgent()
+        self._front.run()
 
     def _finish(self) -> None:
         self._acceptor.end()

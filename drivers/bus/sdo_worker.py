@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 from drivers.bus.sdo_channel import Interrupted, SdoChannel
 from drivers.errors import Unavailable
+from drivers.urgency import make_urgent
 
 T = TypeVar("T")
 Job = Callable[[SdoChannel], T]
@@ -143,6 +144,7 @@ class SdoWorker:
         return Unavailable(f"{self.channel.label}: its bus is not open, nothing can be asked of it")
 
     def _run(self) -> None:
+        make_urgent()  # a stop waits for what this holds
         while (task := self._next()) is not None:
             self._do(task)
         for task in self._tasks:

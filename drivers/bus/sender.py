@@ -1,7 +1,8 @@
-"""The one way out to a bus: no caller ever waits for another one's frame while it holds a lock.
+"""The one way out to a bus: nobody waits for another one's frame with a lock that a stop needs.
 
-A frame leaves in its caller's own thread where nothing waits and the interface takes it at once. Else it
-waits here, and the bus's sender thread hands it over as soon as there is room: urgent frames first.
+A frame is queued, and leaves in the thread of whoever finds nobody else sending: in its owner's as a rule.
+Whoever is sending takes the urgent ones first that came meanwhile. Where the interface has no room, or may
+block, the bus's sender thread does it, as soon as there is some.
 """
 
 import contextlib
@@ -9,12 +10,11 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from drivers.bus.frames import Transport
-from drivers.bus.urgency import make_urgent
 from drivers.errors import Unavailable
+from drivers.urgency import make_urgent
 
 SEND_TIMEOUT_S = 0.1  # how long a frame waits for a bus that takes none
 URGENT_S = 1.0  # how long an urgent one does, which nobody waits for
@@ -38,22 +38,26 @@ def always() -> bool:
     return True
 
 
-def _not_sent() -> bool:
-    return False
-
-
 @dataclass(slots=True, eq=False)
 class _Frame:
     can_id: int
     data: bytes
     until: float = float("inf")
     wanted: Callable[[], bool] = always
-    taken: Future[bool] = field(default_factory=Future)
+    taken: bool | Unavailable | None = None  # whether it was sent, or why not; `None` as long as it waits
+    settled: threading.Event | None = None  # of who waits for that
 
     @property
     def key(self) -> Key:
         """What a newer urgent frame must share with this one to stand for it."""
         return self.can_id, self.data[:_SDO_HEAD]
+
+    def settle(self, taken: bool | Unavailable) -> None:
+        """Say what has become of it; the first word counts."""
+        if self.taken is None:
+            self.taken = taken
+            if self.settled is not None:
+                self.settled.set()
 
 
 class Sender:
@@ -67,29 +71,33 @@ class Sender:
         self.sent = self.sent_bytes = 0  # frames, and what they carried
         self._name = name
         self._why_closed = why_closed
-        self._changed = threading.Condition(threading.Lock())  # guards all of this; never held for long
+        self._lock = threading.Lock()  # guards the queues; nobody sends or waits with it
         self._normal: deque[_Frame] = deque()
         self._urgent: dict[Key, _Frame] = {}
         self._transport: Transport | None = None
+        self._in_hand: _Frame | None = None  # it is being sent just now
+        self._at_work = threading.Lock()  # of who is sending; who does not get it at once leaves it to him
+        self._order = threading.Event()  # for the thread: there is something that nobody else does
         self._thread: threading.Thread | None = None
 
     def start(self, transport: Transport) -> None:
         """Send by it from now on."""
-        run = self._push if transport.blocks else self._feed
-        with self._changed:
+        with self._lock:
             self._transport = transport
-        self._thread = threading.Thread(target=run, args=(transport,), name=f"{self._name} out", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(transport,), name=f"{self._name} out", daemon=True
+        )
         self._thread.start()
 
     def stop(self) -> None:
         """Send nothing more; who waits is told. Idempotent."""
-        with self._changed:
+        with self._lock:
             self._transport = None
             for frame in (*self._urgent.values(), *self._normal):
-                frame.taken.set_exception(Unavailable(self._why_closed()))
+                frame.settle(Unavailable(self._why_closed()))
             self._urgent.clear()
             self._normal.clear()
-            self._changed.notify()
+        self._order.set()
 
     def join(self) -> None:
         """After `stop`, and after a transport that may block was closed."""
@@ -98,23 +106,17 @@ class Sender:
             self._thread = None
 
     def offer(self, can_id: int, data: bytes, wanted: Callable[[], bool] = always) -> Callable[[], bool]:
-        """Send it now, or let it wait its turn, without waiting for that; raises `Unavailable`.
+        """Let it wait its turn, without waiting for that; raises `Unavailable`.
 
         `wanted` is asked under a lock when the frame's turn has come; where it says no, nothing is sent. What
-        is returned waits, `SEND_TIMEOUT_S` at most, and says whether the frame was sent; it raises
-        `BusFull` where the bus takes nothing, `StillLeaving` where the frame can no longer be kept back.
+        is returned is to be called, and sends it, or waits, `SEND_TIMEOUT_S` at most, until it was sent; it
+        says whether it was. It raises `BusFull` where the bus takes nothing, `StillLeaving` where the frame
+        can no longer be kept back.
         """
-        with self._changed:
-            transport = self._transport
-            if transport is None:
-                raise Unavailable(self._why_closed())
-            waits = transport.blocks or self._normal or self._urgent
-            if not waits and not wanted():
-                return _not_sent
-            if not waits and self._hand_over(transport, can_id, data):
-                return always
+        with self._lock:
+            transport = self._open()
             frame = self._queue(_Frame(can_id, data, wanted=wanted))
-        return lambda: self._await(frame, transport.full)
+        return lambda: self._see_off(transport, frame)
 
     def send(self, can_id: int, data: bytes) -> None:
         """Return when the frame was taken; raises `Unavailable`, after `SEND_TIMEOUT_S` at most."""
@@ -125,121 +127,86 @@ class Sender:
 
         Never blocks and never raises. Where the bus is not open, nothing is sent.
         """
-        with self._changed:
+        frame = _Frame(can_id, data, until=time.monotonic() + URGENT_S)
+        with self._lock:
             transport = self._transport
             if transport is None:
                 return False
-            with contextlib.suppress(Unavailable):
-                if not (transport.blocks or self._urgent) and self._hand_over(transport, can_id, data):
-                    return True
-            self._queue_urgent(_Frame(can_id, data, until=time.monotonic() + URGENT_S))
-        return False
+            self._queue_urgent(frame)
+        self._work(transport, only_urgent=True)
+        return frame.taken is True
 
-    def _await(self, frame: _Frame, full: str) -> bool:
-        with contextlib.suppress(TimeoutError):
-            return frame.taken.result(SEND_TIMEOUT_S)
-        with self._changed:
-            if not frame.taken.done():
-                if frame not in self._normal:
-                    raise StillLeaving(f"{full} It may still leave")
+    def _see_off(self, transport: Transport, frame: _Frame) -> bool:
+        self._work(transport)
+        if frame.taken is None:
+            self._await(frame, transport.full)
+        if isinstance(frame.taken, Unavailable):
+            raise frame.taken
+        return frame.taken is True
+
+    def _await(self, frame: _Frame, full: str) -> None:
+        with self._lock:
+            frame.settled = frame.settled or threading.Event()
+        if frame.taken is not None or frame.settled.wait(SEND_TIMEOUT_S):
+            return
+        with self._lock:
+            if frame.taken is not None:
+                return
+            if frame is self._in_hand:
+                raise StillLeaving(f"{full} It may still leave")
+            with contextlib.suppress(ValueError):  # an urgent one stays
                 self._normal.remove(frame)
-                raise BusFull(full)
-        return frame.taken.result()
+            raise BusFull(full)
 
-    # The thread.
+    # Who sends.
 
-    def _feed(self, transport: Transport) -> None:
-        """Hand over what waits whenever there is room."""
+    def _work(self, transport: Transport, *, only_urgent: bool = False) -> None:
+        """Send what waits, unless somebody does: then he does that too, or leaves it to the thread."""
+        if transport.blocks:
+            self._order.set()
+        elif self._at_work.acquire(blocking=False):
+            self._empty_and_leave(transport, only_urgent=only_urgent)
+
+    def _run(self, transport: Transport) -> None:
+        """The thread: does what nobody else can."""
         make_urgent()
-        while True:
-            with self._changed:
-                if not self._await_work(transport):
-                    return
-                room = self._empty(transport)
-            if not room:
+        while self._transport is transport:
+            self._order.wait()
+            self._order.clear()
+            self._at_work.acquire()
+            if not self._empty_and_leave(transport):
                 transport.await_room(ROOM_S)
 
-    def _push(self, transport: Transport) -> None:
-        """Send one frame after the other where that may block: without the lock."""
-        make_urgent()
-        while True:
-            with self._changed:
-                if not self._await_work(transport):
-                    return
-                frame = self._first()
-                if frame is None:
-                    continue
-                self._remove(frame)
+    def _empty_and_leave(self, transport: Transport, *, only_urgent: bool = False) -> bool:
+        """Hand over what waits, and leave work; the thread does what is left. Whether there was room."""
+        try:
+            room = self._empty(transport, only_urgent=only_urgent)
+        finally:
+            self._at_work.release()
+        if self._urgent or self._normal or not room:  # also what came in this very moment
+            self._order.set()
+        return room
+
+    def _empty(self, transport: Transport, *, only_urgent: bool = False) -> bool:
+        """Hand over what waits; whether the interface took it all. For who is at work."""
+        while (frame := self._take(transport, only_urgent=only_urgent)) is not None:
+            taken: bool | Unavailable
             try:
-                self._hand_over(transport, frame.can_id, frame.data)
+                taken = self._hand_over(transport, frame.can_id, frame.data)
             except Unavailable as error:
-                frame.taken.set_exception(error)
-            else:
-                frame.taken.set_result(True)
-
-    # What follows is for who has the lock.
-
-    def _queue(self, frame: _Frame) -> _Frame:
-        """The frame to wait for: where the same one waits already, urgently, it does not leave twice."""
-        urgent = self._urgent.get(frame.key)
-        if urgent is not None and urgent.data == frame.data:
-            return urgent
-        self._normal.append(frame)
-        self._changed.notify()
-        return frame
-
-    def _queue_urgent(self, frame: _Frame) -> None:
-        older = self._urgent.get(frame.key)
-        if older is None and len(self._urgent) == MAX_URGENT:
-            older = self._urgent.pop(next(iter(self._urgent)))
-        self._urgent[frame.key] = frame
-        if older is not None:
-            older.taken.set_exception(Unavailable(f"bus {self._name}: a newer request took its place"))
-        self._changed.notify()
-
-    def _await_work(self, transport: Transport) -> bool:
-        """Wait for something to send; `False` when the bus was closed."""
-        self._changed.wait_for(
-            lambda: (
-                self._transport is not transport or self._urgent or self._normal or not _is_flushed(transport)
-            )
-        )
-        return self._transport is transport
-
-    def _empty(self, transport: Transport) -> bool:
-        """Hand over what waits; whether the interface took it all."""
-        while (frame := self._first()) is not None:
-            try:
-                if not self._hand_over(transport, frame.can_id, frame.data):
+                taken = error
+            with self._lock:
+                self._in_hand = None
+                if taken is False and self._transport is transport:
+                    self._put_back(frame)
                     return False
-            except Unavailable as error:
-                frame.taken.set_exception(error)
-            else:
-                frame.taken.set_result(True)
-            self._remove(frame)
+                frame.settle(taken or Unavailable(self._why_closed()))
         return _is_flushed(transport)
-
-    def _first(self) -> _Frame | None:
-        """Whose turn it is; what is over, or not wanted any more, is not sent."""
-        for frame in (*self._urgent.values(), *self._normal):
-            if frame.wanted() and time.monotonic() < frame.until:
-                return frame
-            self._remove(frame)
-            frame.taken.set_result(False)
-        return None
-
-    def _remove(self, frame: _Frame) -> None:
-        if self._urgent.get(frame.key) is frame:
-            del self._urgent[frame.key]
-        else:
-            self._normal.remove(frame)
 
     def _hand_over(self, transport: Transport, can_id: int, data: bytes) -> bool:
         """Whether the interface took it; raises `Unavailable`, whatever went wrong."""
         try:
             taken = transport.try_send(can_id, data)
-            if taken and not transport.flush():
-                self._changed.notify()
         except Unavailable:
             raise
         except Exception as error:
@@ -249,6 +216,53 @@ class Sender:
         self.sent += taken
         self.sent_bytes += taken * len(data)
         return taken
+
+    def _take(self, transport: Transport, *, only_urgent: bool) -> _Frame | None:
+        """Whose turn it is, out of its queue; what is over, or not wanted any more, is not sent."""
+        with self._lock:
+            while self._transport is transport and (self._urgent or (self._normal and not only_urgent)):
+                key = next(iter(self._urgent), None)
+                frame = self._normal.popleft() if key is None else self._urgent.pop(key)
+                if frame.wanted() and time.monotonic() < frame.until:
+                    self._in_hand = frame
+                    return frame
+                frame.settle(False)
+        return None
+
+    # What follows is for who has the lock.
+
+    def _open(self) -> Transport:
+        if self._transport is None:
+            raise Unavailable(self._why_closed())
+        return self._transport
+
+    def _queue(self, frame: _Frame) -> _Frame:
+        """The frame to wait for: where the same one waits already, urgently, it does not leave twice."""
+        urgent = self._urgent.get(frame.key)
+        if urgent is not None and urgent.data == frame.data:
+            return urgent
+        self._normal.append(frame)
+        return frame
+
+    def _queue_urgent(self, frame: _Frame) -> None:
+        older = self._urgent.get(frame.key)
+        if older is None and len(self._urgent) == MAX_URGENT:
+            older = self._urgent.pop(next(iter(self._urgent)))
+        self._urgent[frame.key] = frame
+        if older is not None:
+            older.settle(self._overtaken())
+
+    def _put_back(self, frame: _Frame) -> None:
+        """There was no room for it: it is still the first of its queue, unless a newer one stands for it."""
+        if frame.until == float("inf"):
+            self._normal.appendleft(frame)
+        elif frame.key in self._urgent:
+            frame.settle(self._overtaken())
+        else:
+            self._urgent = {frame.key: frame, **self._urgent}
+
+    def _overtaken(self) -> Unavailable:
+        return Unavailable(f"bus {self._name}: a newer request took its place")
 
 
 def _is_flushed(transport: Transport) -> bool:

@@ -42,7 +42,7 @@ def assemble(config: RobotConfig) -> Robot:
         _import_canopen(with_can=any(map(needs_python_can, config.can.values())))
         gc.freeze()  # so that what is collected below is looked for among little
     for name, settings in config.can.items():
-        robot.buses[name] = CanBus(name, settings, config.gateway.role)
+        robot.buses[name] = CanBus(name, settings, config.gateway.role, urgent=config.guard is not None)
     for kind, devices in ((Kind.JOINT, config.joint), (Kind.DEVICE, config.device)):
         for name, device in devices.items():
             _add(robot, kind, name, _can_component(robot, config.path, kind, name, device))

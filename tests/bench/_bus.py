@@ -5,6 +5,8 @@ drive's TPDO is sent in turn, at the rate that the first line of its standard in
 meanwhile. On standard output it tells of each controlword `word NODE CONTROLWORD NS`, stamped when its bytes
 were read, on the monotonic clock that all processes of a machine share. The line `trip NODE POSITION` sends
 one TPDO with that position (counts), and is answered by `trip NODE POSITION NS`.
+
+Real drives share no processor with the gateway: where the system allows it, these have a priority above it.
 """
 
 import contextlib
@@ -15,6 +17,7 @@ import struct
 import sys
 import time
 
+from drivers.urgency import PRIORITY
 from tests.bench._drives import DRIVES, MAPPED
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import drive_objects, tpdo
@@ -116,5 +119,7 @@ def accept() -> socket.socket:
 
 
 if __name__ == "__main__":
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
     with contextlib.suppress(ConnectionError):  # the client has gone
         Bus(accept()).run(float(sys.stdin.readline()))

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from drivers.bus.urgency import make_urgent
+from drivers.urgency import make_urgent
 from gateway.modules.stop.memory import MemoryLock
 
 log = logging.getLogger(__name__)

@@ -1,7 +1,7 @@
 """One worker a node: order, urgency, repetition, and what happens when it ends."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 
 import pytest
@@ -459,3 +459,44 @@ def test_a_worker_that_ends_during_a_long_job_ends_it_and_what_is_urgent(device:
     for future in (long, urgent):
         with pytest.raises(Unavailable, match="not open"):
             future.result(WAIT_S)
+
+
+class Full:
+    """A bus that takes nothing: who offered a frame waits for it; an urgent one is put down."""
+
+    def __init__(self) -> None:
+        self.waits, self.gone = threading.Event(), threading.Event()
+        self.urgent: list[bytes] = []
+
+    def offer(self, data: bytes, wanted: Callable[[], bool]) -> Callable[[], bool]:
+        def sent() -> bool:
+            self.waits.set()
+            self.gone.wait(WAIT_S)
+            raise Unavailable("closed")
+
+        return sent
+
+    def send_urgent(self, data: bytes) -> bool:
+        self.urgent.append(data)
+        return False
+
+
+def test_an_urgent_request_waits_for_no_bus_that_takes_nothing() -> None:
+    """Who stops the drives of several buses stands still at none of them."""
+    full = Full()
+    worker = SdoWorker(SdoChannel("node 1", full, timeout_s=0.2))
+    worker.start()
+    upload(worker, 0x2000)
+    assert full.waits.wait(WAIT_S)
+    quick_stop = bytes.fromhex("2B 40 60 00 02 00 00 00")
+    stop = threading.Thread(
+        target=lambda: worker.submit(lambda sdo: sdo.upload(0x6041, 0), urgent=True, ahead=quick_stop)
+    )
+    stop.start()
+    stop.join(WAIT_S / 2)
+    stands = stop.is_alive()
+    full.gone.set()
+    stop.join()
+    worker.stop()
+    assert not stands
+    assert [frame[:4].hex(" ") for frame in full.urgent[:2]] == ["80 00 20 00", "2b 40 60 00"]

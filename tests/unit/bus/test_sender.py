@@ -123,6 +123,35 @@ def test_an_urgent_frame_is_taken_at_once_though_others_wait(
     assert narrow.threads == [ME]
 
 
+class Held(NarrowTransport):
+    """Whoever sends is held up in the middle of it, as by other programs and threads."""
+
+    def __init__(self) -> None:
+        super().__init__(room=1000)
+        self.begun, self.go_on = threading.Event(), threading.Event()
+
+    def try_send(self, can_id: int, data: bytes) -> bool:
+        taken = super().try_send(can_id, data)
+        if not self.begun.is_set():
+            self.begun.set()
+            self.go_on.wait(WAIT_S)
+        return taken
+
+
+def test_an_urgent_frame_waits_for_nobody_who_is_sending_and_leaves_next(patient: None) -> None:
+    held = Held()
+    with sending(held) as sender, ThreadPoolExecutor(2) as threads:
+        first = threads.submit(sender.send, REQUEST, b"first")
+        assert held.begun.wait(WAIT_S)
+        second = threads.submit(sender.send, REQUEST, b"second")
+        until(lambda: sender._normal)
+        assert not sender.send_urgent(REQUEST, QUICK_STOP)
+        held.go_on.set()
+        first.result(WAIT_S)
+        second.result(WAIT_S)
+    assert held.sent == [(REQUEST, b"first"), (REQUEST, QUICK_STOP), (REQUEST, b"second")]
+
+
 def test_a_newer_urgent_request_about_the_same_object_takes_the_place_of_the_older(
     narrow: NarrowTransport, sender: Sender, patient: None
 ) -> None:
@@ -174,7 +203,7 @@ def test_a_request_that_waits_urgently_is_not_sent_twice(
     urgent = next(iter(sender._urgent.values()))
     with ThreadPoolExecutor(1) as threads:
         asked = threads.submit(sender.send, REQUEST, QUICK_STOP)
-        until(lambda: urgent.taken._condition._waiters or sender._normal)  # type: ignore[attr-defined]
+        until(lambda: urgent.settled or sender._normal)
         narrow.open()
         asked.result(WAIT_S)
         sender.send(REQUEST, b"next")

@@ -3,7 +3,7 @@
 import os
 import threading
 
-from drivers.bus.urgency import make_urgent
+from drivers.urgency import make_urgent
 
 
 def test_a_thread_gets_real_time_priority_or_says_why_not() -> None:

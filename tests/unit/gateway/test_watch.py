@@ -1,0 +1,56 @@
+"""The watch over a held stop: whom it asks to stop again, and whom it leaves alone for a while."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from gateway.modules.stop.authority import Authority
+from gateway.modules.stop.machine import Input
+from gateway.modules.stop.stopper import Stopper
+from gateway.modules.stop.watch import AT_LEAST_S, LOOK_S, Watch
+
+
+class Unseen:
+    """An axis of which nothing is heard; `idle_s` after its last stop."""
+
+    def __init__(self, node: object, idle_s: float) -> None:
+        latest = SimpleNamespace(read=lambda _index, _now_ns: (None, None))
+        self.drive = SimpleNamespace(node=node, channels=(), latest=latest)
+        self.idle_s = idle_s
+        self.running = False
+        self.asked = 0
+
+    def stop(self) -> None:
+        self.asked += 1
+
+
+def look(**axes: Unseen) -> None:
+    """One look over a stop that is held."""
+    authority = Authority(axes, ())
+    authority.feed(Input.STOP, lambda _step: None)
+    stoppers = cast("dict[str, Stopper]", axes)
+    nothing: Any = lambda *_what: None  # noqa: E731 - it takes whatever is told
+    Watch(authority, stoppers, {}, nothing, nothing).look()
+
+
+@pytest.mark.parametrize(("idle_s", "asked"), [(0.0, 0), (LOOK_S / 2, 0), (LOOK_S, 1), (AT_LEAST_S, 1)])
+def test_a_node_has_time_between_two_stops_to_come_up_and_to_be_read(idle_s: float, asked: int) -> None:
+    """A stop interrupts every read: asked again at once, a trial's end behind one would never come."""
+    knee = Unseen(object(), idle_s)
+    look(knee=knee)
+    assert knee.asked == asked
+
+
+@pytest.mark.parametrize(("idle_s", "asked"), [(LOOK_S, 0), (AT_LEAST_S, 1)])
+def test_the_stop_of_another_axis_keeps_a_node_busy_too_but_not_for_ever(idle_s: float, asked: int) -> None:
+    node = object()
+    first, second = Unseen(node, idle_s), Unseen(node, LOOK_S / 2)
+    look(first=first, second=second)
+    assert (first.asked, second.asked) == (asked, 0)
+
+
+def test_another_node_does_not() -> None:
+    first, second = Unseen(object(), LOOK_S), Unseen(object(), 0.0)
+    look(first=first, second=second)
+    assert (first.asked, second.asked) == (1, 0)
