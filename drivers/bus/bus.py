@@ -57,7 +57,7 @@ class BusUser:
 class CanBus:
     """A bus by its name in the robot's file.
 
-    An `urgent` one receives with real-time priority: it wakes for each frame, which costs twice the processor.
+    An `urgent` one receives with real-time priority: it wakes for each frame, which costs twice as much.
     """
 
     def __init__(
