@@ -16,17 +16,18 @@ from typing import Any
 from drivers.urgency import make_urgent
 from gateway import wire
 from gateway.acceptor import Acceptor
+from gateway.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
 from gateway.loop import HANGUP, READ, Loop
 from gateway.registry import StopNow
 from gateway.stop_lines import StopSplitter
 
 log = logging.getLogger(__name__)
 
-RECEIVE_BYTES = 64 * 1024
-QUEUED_LINES = 4096  # requests of one client that may wait to be handled …
-QUEUED_BYTES = 1024 * 1024  # … and their bytes; what comes beyond is refused
+RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it
 ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
-PACE_S = 0.005  # how long a client that sends more than that is left alone after each read
+PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read …
+COSTLY_NS = 300_000  # … and one whose read took more of the thread than this: so many times as long,
+PACE_FACTOR = 4  # for each client that is left alone just now. So they all together leave it most of its time
 LAST_READS = 16  # of a connection that ends: a stop may still be in it
 
 _TOO_MANY = wire.refuse(
@@ -61,6 +62,17 @@ class Heard:
         self.cpu_ns = 0
 
 
+class Pace:
+    """How many clients are left alone just now, of all."""
+
+    def __init__(self) -> None:
+        self.resting = 0
+
+    def rest_s(self, spent_ns: int) -> float:
+        """How long who has cost so much is left alone."""
+        return max(PACE_S, PACE_FACTOR * (self.resting + 1) * spent_ns / 1e9)
+
+
 class Inlet:
     """One client's incoming bytes, in the intake's thread; `receiver`, `done` and `close` are the loop's."""
 
@@ -73,6 +85,7 @@ class Inlet:
         stop_now: Callable[[], StopNow | None],
         spent: Callable[[], int],
         finished: "Callable[[Inlet], None]",
+        pace: Pace,
     ) -> None:
         self.socket = connection
         self.peer = peer
@@ -84,6 +97,9 @@ class Inlet:
         self._stop_now = stop_now
         self._spent = spent
         self._finished = finished
+        self._pace = pace
+        self._rests = False
+        self._bad = 0  # lines that are no requests, whatever is in them
         self._splitter = StopSplitter()
         self._ended = self._closed = False
         # Each is counted by one thread: by the intake what was handed over, by the loop what it has done.
@@ -113,6 +129,7 @@ class Inlet:
             if self._ended or not self._receive():
                 break
         self._closed = True
+        self._wake()
         self._front.watch(self.socket, 0, self._on_ready)
         self.socket.close()
         self._finished(self)
@@ -135,16 +152,32 @@ class Inlet:
         if not data:
             self._end(None, self._sorted(self._splitter.end()))
             return True
+        if not self.received_bytes and _is_foreign(data):
+            self._end("it speaks another protocol", Heard())
+            return True
         self.received_bytes += len(data)
         lines = self._splitter.feed(data)
         heard = self._sorted(lines)
-        if self._is_full or self._splitter.dropping:
-            self._front.watch(self.socket, HANGUP, self._on_ready)
-            self._front.call_later(PACE_S, self._go_on)
-        self._cpu_ns += self._spent()
-        if lines:
+        spent_ns = self._spent()
+        if self._is_full or self._splitter.dropping or spent_ns > COSTLY_NS:
+            self._rest(spent_ns)
+        self._cpu_ns += spent_ns
+        if self._bad >= BAD_LINES:
+            self._end(None, heard)
+        elif lines:
             self._hand_over(heard)
         return True
+
+    def _rest(self, spent_ns: int) -> None:
+        """Leave it alone for a while."""
+        self._front.watch(self.socket, HANGUP, self._on_ready)
+        self._front.call_later(self._pace.rest_s(spent_ns), self._go_on)
+        self._pace.resting += not self._rests
+        self._rests = True
+
+    def _wake(self) -> None:
+        self._pace.resting -= self._rests
+        self._rests = False
 
     def _end(self, lost: str | None, heard: Heard) -> None:
         """The end of what the client says, or of the client: `lost` says why."""
@@ -154,6 +187,7 @@ class Inlet:
         self._hand_over(heard)
 
     def _go_on(self) -> None:
+        self._wake()
         if not (self._ended or self._closed):
             self._front.watch(self.socket, READ, self._on_ready)
 
@@ -183,7 +217,10 @@ class Inlet:
                     self._handed += 1
                 else:  # it acts; only its answer is lost
                     self.unanswered += 1
+            elif self._bad >= BAD_LINES:
+                self.unanswered += 1
             elif not self._is_full:
+                self._bad += isinstance(line, wire.BadLine) or not line.startswith(b"{")
                 heard.lines.append((time.monotonic_ns(), line))
                 self._handed += 1
                 self._handed_bytes += wire.size(line)
@@ -223,6 +260,7 @@ class Intake:
         self._stop_now = stop_now
         self._inlets: set[Inlet] = set()
         self._spent_ns = 0
+        self._pace = Pace()
         self._acceptor = Acceptor(self._front, listener, self._accepted)
         self._thread = threading.Thread(target=self._run, name="intake")
 
@@ -263,10 +301,18 @@ class Intake:
 
     def _accepted(self, connection: socket.socket, address: Any) -> None:
         peer = f"{address[0]}:{address[1]}"
-        finished = self._inlets.discard
-        inlet = Inlet(self._front, self._loop, connection, peer, self._stop_now, self._spent, finished)
+        stop_now, spent, finished = self._stop_now, self._spent, self._inlets.discard
+        inlet = Inlet(self._front, self._loop, connection, peer, stop_now, spent, finished, self._pace)
         self._inlets.add(inlet)
         self._loop.post(lambda: self._opened(inlet))
+
+
+def _is_foreign(first: bytes) -> bool:
+    """Whether a connection begins as no client of ours does, but as a browser, TLS or SSH would.
+
+    What could be a stop in an odd form (a list, a blank, a quotation mark first) is not: it is read.
+    """
+    return first[:1].isalnum() or first[0] < ord("\t") or ord("\r") < first[0] < ord(" ")
 
 
 def _prepare(connection: socket.socket) -> None:

@@ -7,9 +7,11 @@ from typing import Annotated, Any, Final, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
+from gateway.limits import NAME_LENGTH
 from gateway.wire import PROTOCOL
 
 Globs = list[str]
+ClientName = Annotated[str, Meta(max_length=NAME_LENGTH)]
 Number = int | float
 Seconds = Annotated[float, Meta(gt=0, le=300)]
 ModuleName = Literal["component", "status", "resource"]
@@ -23,7 +25,7 @@ class Params(Struct, frozen=True, forbid_unknown_fields=True):
 class HelloParams(Params, frozen=True):
     """`hello`."""
 
-    client: str
+    client: ClientName
     protocol: int = PROTOCOL
     token: str | None = None
 

@@ -151,6 +151,8 @@ class Service:
             raise wire.refuse(
                 wire.Kind.BAD_PARAMS, f"this gateway speaks protocol {wire.PROTOCOL}, not {params.protocol}"
             )
+        if not params.client.isprintable():
+            raise wire.refuse(wire.Kind.BAD_PARAMS, "a client's name is of printable characters")
         session.who = f"{params.client} ({session.peer})"
         robot = self._config.robot.name
         return messages.Hello(wire.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)

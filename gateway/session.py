@@ -19,14 +19,13 @@ from msgspec import UNSET, UnsetType
 from gateway import wire
 from gateway.futures import outcome
 from gateway.intake import Heard, Inlet, Stopping
+from gateway.limits import BAD_LINES, OUTPUT_BYTES, PENDING, SPEAK_S
 from gateway.loop import WRITE, Loop, Timer
 from gateway.stop_lines import STOP
 
 log = logging.getLogger(__name__)
 
 GREETINGS = frozenset({"hello", "clock.read"})
-PENDING = 64  # requests waiting for a device before the next is handled
-OUTPUT_BYTES = 1024 * 1024  # answers not yet taken before the next request is handled
 STREAM_BYTES = 64 * 1024  # output not yet taken before streams hold back
 LAST_ANSWERS_S = 10.0  # how long a client that will say nothing more is waited for
 
@@ -106,8 +105,11 @@ class Session:
         self._moved_ns = 0
         self._farewells: list[Callable[[], None]] = []
         inlet.receiver = self.hear
+        self._bad = 0  # lines that were no requests
         if refusal is not None:
             self._end = loop.call_later(SILENCE_S, self._check_silence)
+        else:
+            self._end = loop.call_later(SPEAK_S, self._check_spoke)
 
     @property
     def who(self) -> str:
@@ -230,6 +232,12 @@ class Session:
         else:
             self._end = self._loop.call_later(max(SILENCE_S - silent_s, 0.1), self._check_silence)
 
+    def _check_spoke(self) -> None:
+        if not self.spoke:
+            self.close(
+                wire.refuse(wire.Kind.UNAVAILABLE, f"nothing was asked for in {SPEAK_S:g} s; connect again")
+            )
+
     # Answering
 
     def _stop(self, stopping: Stopping) -> None:
@@ -273,9 +281,16 @@ class Session:
             request = wire.decode_request(line)
         except wire.BadLine as error:
             self.send(wire.encode_error(error.id, error))
+            self._count_bad()
             return
         self.requests += 1
         self._follow(request.id, request.method, self._handled(request))
+
+    def _count_bad(self) -> None:
+        self._bad += 1
+        if self._bad == BAD_LINES:
+            why = f"{BAD_LINES} lines were no requests, so this connection ends; one JSON-RPC request a line"
+            self.close(wire.refuse(wire.Kind.BAD_PARAMS, why))
 
     def _handled(self, request: wire.Request) -> Answer:
         try:

@@ -1,7 +1,8 @@
 """What streams and snapshots read: sources of samples, and the channels of them that somebody wants."""
 
 import fnmatch
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,8 +10,11 @@ from msgspec import UNSET
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
+from gateway.limits import GLOBS, NAME_OR_GLOB_LENGTH, NAMES
 from gateway.messages import ChannelInfo
 from gateway.wire import Kind, refuse
+
+_WILD = frozenset("*?[")
 
 
 class Source(Protocol):
@@ -41,8 +45,42 @@ class Selection:
         return tuple(self.source.channels[index].name for index in self.indices)
 
 
+class Wanted:
+    """What names and globs mean, in time that does not grow with how many names there are.
+
+    Raises:
+        RpcError: bad_params, where there are more of them than anybody needs.
+
+    """
+
+    def __init__(self, globs: Sequence[str] | None) -> None:
+        named = globs or ()
+        if len(named) > NAMES or any(len(one) > NAME_OR_GLOB_LENGTH for one in named):
+            raise refuse(
+                Kind.BAD_PARAMS,
+                f"a request may list {NAMES} names and globs, each of {NAME_OR_GLOB_LENGTH} characters; "
+                "use a glob such as left_* for many",
+            )
+        patterns = dict.fromkeys(one for one in named if not _WILD.isdisjoint(one))
+        if len(patterns) > GLOBS:
+            raise refuse(Kind.BAD_PARAMS, f"a request may have {GLOBS} globs, not {len(patterns)}")
+        self._all = globs is None
+        self._exact = dict.fromkeys(named)
+        self._patterns = {one: re.compile(fnmatch.translate(one)) for one in patterns}
+
+    def __contains__(self, name: str) -> bool:
+        return self._all or name in self._exact or any(one.match(name) for one in self._patterns.values())
+
+    def meaningless(self, names: Collection[str]) -> Iterator[str]:
+        """Those of its names and globs that mean none of these."""
+        for one in self._exact:
+            pattern = self._patterns.get(one)
+            if one not in names and (pattern is None or not any(map(pattern.match, names))):
+                yield one
+
+
 def matches(name: str, globs: Sequence[str] | None) -> bool:
-    """Whether one of the globs means this name; no globs mean every name."""
+    """Whether one of the globs means this name; no globs mean every name. For many names: `Wanted`."""
     return globs is None or any(fnmatch.fnmatchcase(name, glob) for glob in globs)
 
 
@@ -53,9 +91,9 @@ def whole(source: Source) -> Selection:
 
 def narrow(selections: Iterable[Selection], globs: Sequence[str] | None) -> list[Selection]:
     """What the globs leave of the selections; those left empty are gone."""
-    narrowed = []
+    narrowed, wanted = [], Wanted(globs)
     for one in selections:
-        indices = tuple(index for index in one.indices if matches(one.source.channels[index].name, globs))
+        indices = tuple(index for index in one.indices if one.source.channels[index].name in wanted)
         if indices:
             narrowed.append(Selection(one.source, indices))
     return narrowed
@@ -79,13 +117,10 @@ def check_globs(
     `absent` says why components are not there that would otherwise have names.
 
     Raises:
-        RpcError: unknown_name, or unavailable where the component is absent.
+        RpcError: unknown_name; unavailable where the component is absent; bad_params, see `Wanted`.
 
     """
-    known = tuple(names)
-    for glob in globs or ():
-        if any(fnmatch.fnmatchcase(name, glob) for name in known):
-            continue
+    for glob in Wanted(globs).meaningless(dict.fromkeys(names)):
         component = glob.partition(".")[0]
         if absent and component in absent:
             raise refuse(Kind.UNAVAILABLE, f"{glob}: {absent[component]}", component=component)

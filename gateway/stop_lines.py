@@ -10,12 +10,13 @@ from typing import Any, Final
 import msgspec
 from msgspec import UNSET, UnsetType
 
+from gateway.limits import REASON_LENGTH
 from gateway.wire import Id, Line, LineSplitter, StopRequest
 
 STOP: Final = "robot.stop"
-REASON_LENGTH: Final = 200  # characters
 
 _BLANK = bytes(range(33))  # white space, and what no text should hold
+_MARKS = (b"stop", b"\\", b"\0")  # one of these is in every line that asks for a stop: letters may be escaped
 _KEPT_BYTES = 160  # of what was dropped: more than a method takes with every letter escaped
 _ESCAPED = re.compile(rb"\\u00([2-7][0-9A-Fa-f])")
 _METHOD = re.compile(rb"""(?<![\w.])method["']{0,2}:["']{0,2}robot\.stop(?=[^\w.])""")
@@ -28,8 +29,8 @@ _REASON = re.compile(rb'"reason"\s{0,64}:\s{0,64}"((?:[^"\\]|\\.){0,800})', re.D
 
 def stop_in(line: bytes) -> StopRequest | None:
     """The stop that a line asks for, in time that grows with its length only."""
-    if b"stop" not in line and b"\\" not in line and b"\0" not in line:
-        return None  # as nearly all are; letters may be escaped
+    if not any(mark in line for mark in _MARKS):
+        return None  # as nearly all are
     try:
         found = msgspec.json.decode(line)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -113,10 +114,15 @@ class StopSplitter(LineSplitter):
 
     def __init__(self) -> None:
         super().__init__()
+        self._suspect = True  # whether there may be a stop in what comes
         self._search: StopSearch | None = None
 
+    def feed(self, data: bytes) -> list[Line]:
+        self._suspect = bool(self._rest) or any(mark in data for mark in _MARKS)
+        return super().feed(data)
+
     def _take(self, line: bytes, lines: list[Line]) -> None:
-        lines.append(stop_in(line) or line)
+        lines.append((stop_in(line) if self._suspect else None) or line)
 
     def _begin_dropping(self, lines: list[Line]) -> None:  # noqa: ARG002 - it is reported at its end
         self._search = StopSearch()

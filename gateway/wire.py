@@ -4,6 +4,7 @@ The parameters and results of each method are in `gateway.messages`. Numbers tha
 the wire: msgspec encodes NaN and infinities as `null`.
 """
 
+import json
 from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Final, Literal, TypeVar
@@ -11,8 +12,9 @@ from typing import Any, Final, Literal, TypeVar
 import msgspec
 from msgspec import UNSET, Raw, Struct, UnsetType
 
+from gateway.limits import LINE_LIMIT, NAME_LENGTH
+
 PROTOCOL: Final = 1
-LINE_LIMIT: Final = 64 * 1024  # bytes of one inbound line at the gateway, without its newline
 ANSWER_LIMIT: Final = 16 * 1024 * 1024  # what a client accepts as one line
 
 Id = int | str | None
@@ -157,7 +159,8 @@ class LineSplitter:
         """The lines that `data` completes, in order."""
         lines: list[Line] = []
         *ended, rest = data.split(b"\n")
-        for piece in ended:
+        whole = ended if self._rest or self.dropping else filter(None, ended)  # blank lines cost nothing
+        for piece in whole:
             if self._rest or self.dropping or len(piece) > self.limit:
                 self._add(piece, lines)
                 self._end_line(lines)
@@ -283,9 +286,33 @@ def decode_request(line: bytes) -> Request:
     try:
         if not line.isascii():
             line.decode()
-        return _request_decoder.decode(line)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        request = _request_decoder.decode(line)
+        _strict.decode(line.decode())
+    except (ValueError, RecursionError) as error:
         raise _explain(line, error) from error
+    return request
+
+
+class _Ambiguous(ValueError):
+    """JSON that another reader may take for something else."""
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for key, value in pairs:
+        if key in found:
+            raise _Ambiguous(f"the key {key[:NAME_LENGTH]!r} stands in it twice")
+        found[key] = value
+    return found
+
+
+def _in_64_bits(digits: str) -> int:
+    if len(digits) > 20 or not -(2**63) <= int(digits) < 2**64:
+        raise _Ambiguous(f"an integer of {len(digits)} digits is more than 64 bits hold")
+    return int(digits)
+
+
+_strict = json.JSONDecoder(object_pairs_hook=_once, parse_int=_in_64_bits)
 
 
 def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
@@ -301,6 +328,8 @@ def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
 
 def _explain(line: bytes, error: Exception) -> BadLine:
     """The slow way, taken only by what is no request: find out why, and whose it was."""
+    if isinstance(error, _Ambiguous):
+        return BadLine(f"this is no request: {error}", PARSE_ERROR)
     try:
         found = msgspec.json.decode(line.decode())
     except RecursionError:

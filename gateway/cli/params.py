@@ -14,9 +14,10 @@ from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.trial import wait_for_decision
 from gateway.client import Robot
 from gateway.coding import Number
+from gateway.limits import LINE_LIMIT
 from gateway.messages import ParameterValue, ParameterWriteParams
 from gateway.records import durable
-from gateway.wire import LINE_LIMIT, encode_request
+from gateway.wire import encode_request
 
 USAGE = """\
 usage: gwrms params save FILE [GLOB ...]

@@ -1,6 +1,5 @@
 """Every parameter of a robot by its name: those that its file describes, and those that an EDS offers."""
 
-import fnmatch
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from eds import Description
@@ -9,7 +8,7 @@ from gateway.coding import NUMBERS, Number, scaled
 from gateway.config import STORE, ParameterSettings, RobotConfig
 from gateway.modules.offer import offered
 from gateway.modules.parameters import Parameter, contradiction
-from gateway.sources import check_globs
+from gateway.sources import Wanted, check_globs
 
 
 class Catalogue(Mapping[str, Parameter]):
@@ -42,8 +41,8 @@ class Catalogue(Mapping[str, Parameter]):
         meant = {self._by_address.get(name, name) for name in names} & self._by_name.keys()
         globs = [name for name in names if name not in self]
         check_globs("parameter", self._by_name, globs)
-        for glob in globs:
-            meant.update(fnmatch.filter(self._by_name, glob))
+        wanted = Wanted(globs)
+        meant.update(name for name in self._by_name if name in wanted)
         return [one for name, one in self._by_name.items() if name in meant]
 
 

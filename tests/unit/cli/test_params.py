@@ -13,10 +13,10 @@ from drivers.errors import DeviceTimeout
 from eds import dcf
 from gateway.cli.params_diff import Verdict, compare
 from gateway.cli.params_file import COMMANDS
+from gateway.limits import LINE_LIMIT
 from gateway.main import main
 from gateway.messages import ParameterInfo, ParameterValue
 from gateway.modules.parameters import Lock
-from gateway.wire import LINE_LIMIT
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, config, serving
 
 EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'

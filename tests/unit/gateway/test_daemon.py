@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from drivers.joint.quick_stop import StopOutcome
 from gateway import session, wire
+from gateway.limits import BAD_LINES, LINE_LIMIT
 from gateway.listeners import listen
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
@@ -67,7 +68,7 @@ def test_a_method_that_does_not_exist_is_named(client: Client, method: str) -> N
         (b'[{"jsonrpc":"2.0","id":1,"method":"clock.read"}]\n', -32600, None),
         (b'{"jsonrpc":"2.0","id":7,"method":"clock.read","params":[]}\n', -32602, 7),
         (b'{"jsonrpc":"2.0","id":7,"method":"clock.read","params":{"x":1}}\n', -32602, 7),
-        (b"x" * (wire.LINE_LIMIT + 1) + b"\n", -32600, None),
+        (b"{" * (LINE_LIMIT + 1) + b"\n", -32600, None),
         (b'{"jsonrpc":"2.0","id":7,"method":"clock.read","params":' + b"[" * 60000 + b"}\n", -32700, None),
     ],
 )
@@ -91,7 +92,7 @@ def test_a_notification_is_done_and_not_answered(client: Client) -> None:
 
 
 def test_ids_come_back_as_they_were_sent(client: Client) -> None:
-    for id_ in (0, -5, 2**70, "a", "ü\u2028", "", None):
+    for id_ in (0, -5, 2**64 - 1, -(2**63), "a", "ü\u2028", "", None):
         client.send(json.dumps({"jsonrpc": "2.0", "id": id_, "method": "clock.read"}).encode() + b"\n")
         answer = client.line()
         assert answer is not None
@@ -217,13 +218,17 @@ def test_garbage_in_any_pieces_hurts_neither_the_daemon_nor_another_session(
 ) -> None:
     stream = b"".join(pieces)
     with Client(garbage_gateway) as bad, Client(garbage_gateway) as good:
+        assert bad.call("clock.read")
         start = 0
         for cut in sorted(cuts):
             bad.send(stream[start:cut])
             start = max(start, cut)
             assert good.call("clock.read")
         bad.send(stream[start:] + b"\n" + CLOCK % 99)
-        assert bad.answer(99)["monotonic_ns"] > 0
+        try:
+            assert bad.answer(99)["monotonic_ns"] > 0
+        except (ConnectionError, Answered):  # it was ended, for so much that was no request
+            assert stream.count(b"\n") >= BAD_LINES - 1
         assert good.call("clock.read")
 
 

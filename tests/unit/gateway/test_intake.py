@@ -13,7 +13,8 @@ import pytest
 
 from gateway import intake, wire
 from gateway.daemon import Daemon
-from gateway.intake import Heard, Inlet
+from gateway.intake import Heard, Inlet, Pace
+from gateway.limits import QUEUED_BYTES, QUEUED_LINES
 from gateway.listeners import listen
 from gateway.loop import HANGUP, READ, Loop
 from gateway.messages import Stopped
@@ -220,7 +221,7 @@ def test_a_thousand_requests_at_once_are_answered_in_order(serving: Serving) -> 
 
 def test_a_stop_behind_more_than_may_wait_acts_and_what_is_too_much_is_refused(serving: Serving) -> None:
     client = serving.connect()
-    most, more = intake.QUEUED_LINES, 500
+    most, more = QUEUED_LINES, 500
     with serving.hung():
         client.send(b"".join(CLOCK % number for number in range(most + more)) + STOP % b"behind")
         serving.wait_for_stop("behind")
@@ -245,8 +246,8 @@ def test_who_sends_without_end_and_takes_nothing_is_bounded_and_can_still_stop(s
     def too_much() -> bool:
         flood.send(lines)
         session = serving.session_of(flood)
-        assert sum(wire.size(line) for _asked_ns, line in session._queue) <= intake.QUEUED_BYTES
-        assert len(session._queue) <= intake.QUEUED_LINES
+        assert sum(wire.size(line) for _asked_ns, line in session._queue) <= QUEUED_BYTES
+        assert len(session._queue) <= QUEUED_LINES
         assert session.waiting_bytes < 3 * 1024 * 1024
         return session._unanswered + session._inlet.unanswered > 0
 
@@ -260,11 +261,11 @@ def test_what_waits_for_a_loop_that_hangs_is_bounded_too(serving: Serving) -> No
     client = serving.connect()
     client.call("clock.read")
     with serving.hung():
-        client.send((CLOCK % 1 + STOP % b"many") * (intake.QUEUED_LINES + intake.ON_THE_WAY))
+        client.send((CLOCK % 1 + STOP % b"many") * (QUEUED_LINES + intake.ON_THE_WAY))
         client.send(STOP % b"last")
         serving.wait_for_stop("last")
         inlet = serving.session_of(client)._inlet
-        assert inlet._handed - inlet._done <= intake.QUEUED_LINES + intake.ON_THE_WAY
+        assert inlet._handed - inlet._done <= QUEUED_LINES + intake.ON_THE_WAY
         assert inlet.unanswered > 0
     assert client.answer("stop")["held"] is True
 
@@ -307,6 +308,10 @@ def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
             yield client, accepted
 
 
+def _nothing(_inlet: Inlet) -> None:
+    """Nobody wants to know that it is over."""
+
+
 def inlet_of(connection: socket.socket, asked: list[str]) -> tuple[Inlet, Loop, Loop]:
     """An inlet whose two loops a test turns by hand."""
     front, loop = Loop(), Loop()
@@ -316,7 +321,7 @@ def inlet_of(connection: socket.socket, asked: list[str]) -> tuple[Inlet, Loop, 
         asked.append(reason)
         return answer
 
-    return Inlet(front, loop, connection, "x", lambda: stop_now, lambda: 0, lambda _inlet: None), front, loop
+    return Inlet(front, loop, connection, "x", lambda: stop_now, lambda: 0, _nothing, Pace()), front, loop
 
 
 def test_a_stop_that_has_arrived_acts_though_the_loop_has_closed_its_client(
@@ -362,7 +367,7 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
     heard: list[Heard] = []
     inlet.receiver = heard.append
     client.setblocking(False)
-    rest = CLOCK % 1 * 2 * intake.QUEUED_LINES + STOP % b"paced"
+    rest = CLOCK % 1 * 2 * QUEUED_LINES + STOP % b"paced"
     watched_for: set[int] = set()
 
     def paced() -> bool:
@@ -379,10 +384,10 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
     while (patience_s := loop._patience_s()) == 0.0:
         loop._turn()
     assert patience_s is None
-    assert sum(len(one.lines) for one in heard) == intake.QUEUED_LINES
+    assert sum(len(one.lines) for one in heard) == QUEUED_LINES
     assert sum(len(one.refusals) for one in heard) == intake.ON_THE_WAY
     inlet.done(
-        intake.QUEUED_LINES + intake.ON_THE_WAY,
+        QUEUED_LINES + intake.ON_THE_WAY,
         sum(wire.size(line) for one in heard for _, line in one.lines),
     )
     assert not inlet._is_full

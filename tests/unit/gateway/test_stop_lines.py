@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from msgspec import UNSET
 
 from gateway import wire
-from gateway.stop_lines import REASON_LENGTH, StopSplitter, stop_in
+from gateway.limits import LINE_LIMIT, REASON_LENGTH
+from gateway.stop_lines import StopSplitter, stop_in
 
 PLAIN = b'{"jsonrpc":"2.0","id":1,"method":"robot.stop","params":{"reason":"fall"}}'
-LONG = b"x" * wire.LINE_LIMIT
+LONG = b"x" * LINE_LIMIT
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,7 @@ def test_no_line_is_too_odd_to_be_looked_at(before: bytes, inside: bytes, after:
     ],
 )
 def test_the_longest_line_is_read_in_no_time_whatever_is_in_it(piece: bytes) -> None:
-    line = (b'{"stop"' + piece * wire.LINE_LIMIT)[: wire.LINE_LIMIT]
+    line = (b'{"stop"' + piece * LINE_LIMIT)[:LINE_LIMIT]
     began_s = time.thread_time()
     for _ in range(5):
         stop_in(line)
@@ -174,7 +175,7 @@ def test_a_stop_is_found_wherever_the_bytes_are_cut(data: bytes, expected: list[
     whole = split(data, [])
     assert shapes(whole) == expected
     tail = data.rfind(b"method")
-    for cut in {*range(max(0, tail - 3), min(len(data), tail + 560)), 1, wire.LINE_LIMIT, len(data) - 1}:
+    for cut in {*range(max(0, tail - 3), min(len(data), tail + 560)), 1, LINE_LIMIT, len(data) - 1}:
         assert shapes(split(data, [cut])) == expected
         assert shapes(split(data, sorted({cut, min(cut + 2, len(data))}))) == expected
 
