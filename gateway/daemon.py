@@ -17,6 +17,7 @@ from gateway.registry import MODULES, Spec
 from gateway.resting import ENDING
 from gateway.service import Service
 from gateway.session import Session
+from gateway.sharing import Sharing
 
 log = logging.getLogger(__name__)
 
@@ -43,6 +44,7 @@ class Daemon:
         self._service = Service(config, self._loop, specs)
         self._service.registry.when_off = self._look_whether_idle
         self._places = Places()
+        self._sharing = Sharing(self._loop)
         self._ending = False
         self._told = False
         self._ends_idle = ends_idle
@@ -115,9 +117,11 @@ class Daemon:
             return
 
         def session(refusal: wire.RpcError | None) -> Session:
-            return Session(self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, refusal)
+            return Session(
+                self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, self._sharing, refusal
+            )
 
-        opened = self._places.admit(session)
+        opened = self._places.admit(inlet.peer.rpartition(":")[0], session)
         if opened is not None:
             opened.on_close(self._left)
             self._service.opened(opened)

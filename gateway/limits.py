@@ -6,7 +6,7 @@ error that names it; a stop is subject to none of them.
 
 # Connections
 CLIENTS = 64  # who may ask for everything …
-CLIENTS_OF_ONE_ADDRESS = 48  # … and how many of these from one address
+CLIENTS_OF_ONE_ADDRESS = 56  # … and how many of these from one address
 STOPPERS = 256  # beyond them, who may only stop; half of them at most from one address
 SPEAK_S = 20.0  # how long a client may say nothing at first
 BAD_LINES = 8  # that are no requests, and the connection is ended

@@ -17,6 +17,8 @@ log = logging.getLogger(__name__)
 # What a file can be watched for; that its peer is gone is told in any case.
 READ, WRITE, HANGUP = select.POLLIN, select.POLLOUT, select.POLLHUP | select.POLLERR
 
+TIMERS_NS = 5_000_000  # what the timers of one turn may take; those that are left follow in the next
+
 Callback = Callable[[], object]
 
 
@@ -131,7 +133,8 @@ class Loop:
             if watched is not None:
                 self._call(watched[1], found)
         now_ns = time.monotonic_ns()
-        while self._timers and self._timers[0][0] <= now_ns:
+        until_ns = now_ns + TIMERS_NS
+        while self._timers and self._timers[0][0] <= now_ns and time.monotonic_ns() < until_ns:
             callback = heapq.heappop(self._timers)[2].callback
             if callback is not None:
                 self._call(callback)

@@ -4,10 +4,9 @@ import time
 from collections.abc import Callable, Iterable
 
 from gateway import wire
+from gateway.limits import CLIENTS, CLIENTS_OF_ONE_ADDRESS, STOPPERS
 from gateway.session import Session
 
-CLIENTS = 64
-STOPPERS = 256  # beyond them, who may only stop; half of them at most from one address
 FRESH_S = 1.0  # how long one of these keeps its place whoever comes: its stop is still on its way
 SILENT_S = 10.0  # who has said nothing for so long since it came makes room where all places are taken
 
@@ -24,37 +23,32 @@ class Places:
         """Those who are connected."""
         return (*self._clients, *self._stoppers)
 
-    def admit(self, open_: Callable[[wire.RpcError | None], Session]) -> Session | None:
+    def admit(self, address: str, open_: Callable[[wire.RpcError | None], Session]) -> Session | None:
         """Open a session, as a client where a place is free; else with the refusal of all but a stop.
 
         `None` where even for that no place is free: it is told so and closed, and a stop that has come with
         it acts.
         """
-        if self._has_place():
+        if self._has_place(address):
             return self._placed(open_(None), self._clients)
         opened = open_(_refusal("this connection takes robot.stop only"))
-        if not self._has_place_to_stop(_address(opened)):
+        if not self._has_place_to_stop(address):
             opened.close(_refusal("and as many who may only stop; connect again"))
             return None
         return self._placed(opened, self._stoppers)
 
     def _has_place_to_stop(self, address: str) -> bool:
         """One address that opens connections without end takes no place from the others."""
-        neighbours = [one for one in self._stoppers if _address(one) == address]
+        neighbours = [one for one in self._stoppers if one.address == address]
         if len(neighbours) >= STOPPERS // 2:
             return _make_room(neighbours)
         return len(self._stoppers) < STOPPERS or _make_room(self._stoppers)
 
-    def _has_place(self) -> bool:
-        if len(self._clients) < CLIENTS:
-            return True
-        before_ns = time.monotonic_ns() - round(SILENT_S * 1e9)
-        silent = [one for one in self._clients if not one.spoke and one.heard_ns <= before_ns]
-        if not silent:
-            return False
-        why = f"this connection has said nothing for {SILENT_S:g} s, and made room"
-        min(silent, key=lambda one: one.heard_ns).close(_refusal(why))
-        return True
+    def _has_place(self, address: str) -> bool:
+        neighbours = [one for one in self._clients if one.address == address]
+        if len(neighbours) >= CLIENTS_OF_ONE_ADDRESS:
+            return _one_silent_leaves(neighbours)
+        return len(self._clients) < CLIENTS or _one_silent_leaves(self._clients)
 
     @staticmethod
     def _placed(session: Session, places: set[Session]) -> Session:
@@ -74,9 +68,17 @@ def _make_room(stoppers: Iterable[Session]) -> bool:
     return True
 
 
-def _address(session: Session) -> str:
-    return session.peer.rpartition(":")[0]
+def _one_silent_leaves(clients: Iterable[Session]) -> bool:
+    """Close one that has said nothing since it came; false where each has."""
+    before_ns = time.monotonic_ns() - round(SILENT_S * 1e9)
+    silent = [one for one in clients if not one.spoke and one.heard_ns <= before_ns]
+    if not silent:
+        return False
+    why = f"this connection has said nothing for {SILENT_S:g} s, and made room"
+    min(silent, key=lambda one: one.heard_ns).close(_refusal(why))
+    return True
 
 
 def _refusal(what: str) -> wire.RpcError:
-    return wire.refuse(wire.Kind.UNAVAILABLE, f"{CLIENTS} clients are connected, which is the most; {what}")
+    most = f"{CLIENTS} clients are connected, or {CLIENTS_OF_ONE_ADDRESS} of your address, which is the most"
+    return wire.refuse(wire.Kind.UNAVAILABLE, f"{most}; {what}")

@@ -21,6 +21,7 @@ from gateway.futures import outcome
 from gateway.intake import Heard, Inlet, Stopping
 from gateway.limits import BAD_LINES, OUTPUT_BYTES, PENDING, SPEAK_S
 from gateway.loop import WRITE, Loop, Timer
+from gateway.sharing import Sharing
 from gateway.stop_lines import STOP
 
 log = logging.getLogger(__name__)
@@ -31,6 +32,11 @@ LAST_ANSWERS_S = 10.0  # how long a client that will say nothing more is waited 
 
 MOST_STOPS = 1024  # whose answer is waited for
 SILENCE_S = 5.0  # how long one that may only stop may say nothing
+
+_NO_REQUESTS = wire.refuse(
+    wire.Kind.BAD_PARAMS,
+    f"{BAD_LINES} lines were no requests, so this connection ends; send one JSON-RPC request a line",
+)
 
 Answer = object | Future[object]
 P = ParamSpec("P")
@@ -74,6 +80,7 @@ class Session:
         inlet: Inlet,
         handle: "Callable[[Session, wire.Request], Answer]",
         stuck_s: float,
+        sharing: Sharing,
         refusal: wire.RpcError | None = None,
     ) -> None:
         self.peer = inlet.peer
@@ -89,11 +96,11 @@ class Session:
         self._socket = inlet.socket
         self._handle = handle
         self._stuck_s = stuck_s
+        self._sharing = sharing
         self._refusal = refusal
         self.asked_ns = 0  # when the request came in that is handled now
         self._queue: deque[tuple[int, bytes | wire.BadLine]] = deque()
         self._scheduled = False
-        self._ran_in = 0  # the loop's turn
         self._pending = 0
         self._output: deque[memoryview] = deque()
         self._output_bytes = 0
@@ -110,6 +117,11 @@ class Session:
             self._end = loop.call_later(SILENCE_S, self._check_silence)
         else:
             self._end = loop.call_later(SPEAK_S, self._check_spoke)
+
+    @property
+    def address(self) -> str:
+        """Whence it comes, without the port."""
+        return self.peer.rpartition(":")[0]
 
     @property
     def who(self) -> str:
@@ -176,6 +188,7 @@ class Session:
             log.warning("%s sent more than it took: %d of its requests were dropped", self.who, unanswered)
         self._queue.clear()
         self._output.clear()
+        self._count_output(-self._output_bytes)
         self.outlets.clear()
         for farewell in reversed(self._farewells):  # a lease ends before the module that knows it
             try:
@@ -209,7 +222,8 @@ class Session:
         if heard.ended:
             self._end_input()
         if not self._scheduled:
-            self._run_next()
+            self._scheduled = True
+            self._sharing.take(self.address, self._run_next)
 
     def _end_refused(self, lines: list[bytes | wire.BadLine], refusal: wire.RpcError) -> None:
         self._inlet.done(len(lines), sum(map(wire.size, lines)))
@@ -258,16 +272,15 @@ class Session:
         return bool(self._queue) and self._pending < PENDING and self._output_bytes < OUTPUT_BYTES
 
     def _schedule(self) -> None:
-        """One request a turn of the loop, so that a client that sends a thousand does not keep the others."""
+        """One request at a time, so that a client that sends a thousand does not keep the others."""
         if not self._scheduled and self._may_run:
             self._scheduled = True
-            self._loop.post(self._run_next)
+            self._sharing.add(self.address, self._run_next)
 
     @_spends
     def _run_next(self) -> None:
         self._scheduled = False
-        if not self.closed and self._may_run and self._ran_in != self._loop.turns:
-            self._ran_in = self._loop.turns
+        if not self.closed and self._may_run:
             self._run(*self._queue.popleft())
         self._schedule()
         self._finish_if_done()
@@ -280,17 +293,17 @@ class Session:
                 raise line
             request = wire.decode_request(line)
         except wire.BadLine as error:
-            self.send(wire.encode_error(error.id, error))
-            self._count_bad()
+            self._answer_bad(error)
             return
         self.requests += 1
         self._follow(request.id, request.method, self._handled(request))
 
-    def _count_bad(self) -> None:
+    def _answer_bad(self, error: wire.BadLine) -> None:
         self._bad += 1
-        if self._bad == BAD_LINES:
-            why = f"{BAD_LINES} lines were no requests, so this connection ends; one JSON-RPC request a line"
-            self.close(wire.refuse(wire.Kind.BAD_PARAMS, why))
+        is_last = self._bad == BAD_LINES
+        self.send(wire.encode_error(error.id, error) + wire.encode_error(None, _NO_REQUESTS) * is_last)
+        if is_last:
+            self.close()
 
     def _handled(self, request: wire.Request) -> Answer:
         try:
@@ -345,7 +358,11 @@ class Session:
 
     def _enqueue(self, line: bytes) -> None:
         self._output.append(memoryview(line))
-        self._output_bytes += len(line)
+        self._count_output(len(line))
+
+    def _count_output(self, size: int) -> None:
+        self._output_bytes += size
+        self._sharing.hold(self, size)
 
     def _flush(self) -> None:
         """Send until the socket takes no more; what is left goes when it does."""
@@ -355,7 +372,7 @@ class Session:
                 sent = self._socket.send(self._output[0])
                 sent_any = True
                 self.sent_bytes += sent
-                self._output_bytes -= sent
+                self._count_output(-sent)
                 if sent < len(self._output[0]):
                     self._output[0] = self._output[0][sent:]
                 else:

@@ -20,6 +20,7 @@ from gateway.loop import HANGUP, READ, Loop
 from gateway.messages import Stopped
 from gateway.registry import Context, Spec
 from gateway.session import Session
+from gateway.sharing import Sharing
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config, until
 
@@ -346,7 +347,7 @@ def test_what_ends_with_a_client_ends_though_something_else_cannot(
     """What came last goes first: a lease is given back before the module that knows it stops."""
     inlet, front, loop = inlet_of(pair[1], [])
     ended: list[str] = []
-    session = Session(loop, inlet, lambda _session, _request: None, 30.0)
+    session = Session(loop, inlet, lambda _session, _request: None, 30.0, Sharing(loop))
     session.on_close(lambda: ended.append("module"))
     session.on_close(lambda: ended.remove("nothing"))
     session.on_close(lambda: ended.append("lease"))

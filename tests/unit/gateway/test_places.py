@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from gateway import places, session
+from gateway.limits import CLIENTS_OF_ONE_ADDRESS
 from tests.unit.gateway.harness import Bench, Client, config, serving, until
 
 Connect = Callable[[], Client]
@@ -162,13 +163,13 @@ def test_who_has_only_just_come_keeps_its_place(connect: Connect) -> None:
 def test_neither_silent_nor_killed_connections_keep_a_stop_out(bench: Bench, tmp_path: Path) -> None:
     """As many of each as there are places, at a gateway as it is."""
     with serving(config(tmp_path)) as address, ExitStack() as clients:
-        killed = [clients.enter_context(Client(address)) for _ in range(places.CLIENTS)]
+        killed = [clients.enter_context(Client(address)) for _ in range(CLIENTS_OF_ONE_ADDRESS)]
         for client in killed:
             client.call("stream.start", modules=["component"], rate_hz=0)
-        silent = [clients.enter_context(Client(address)) for _ in range(places.CLIENTS)]
+        silent = [clients.enter_context(Client(address)) for _ in range(CLIENTS_OF_ONE_ADDRESS)]
         assert clients.enter_context(Client(address)).call("robot.stop", reason="all taken")["held"]
         for client in killed:
             client.socket.shutdown(socket.SHUT_WR)
         assert all(all("method" in one for one in iter(client.line, None)) for client in killed)
-        silent += [clients.enter_context(Client(address)) for _ in range(places.CLIENTS)]
+        silent += [clients.enter_context(Client(address)) for _ in range(CLIENTS_OF_ONE_ADDRESS)]
         assert clients.enter_context(Client(address)).call("robot.stop", reason="silent ones")["held"]

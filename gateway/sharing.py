@@ -1,0 +1,109 @@
+"""What the clients of a gateway share: the loop's time, and the memory for what they have not taken yet.
+
+Requests are handled in turn: one of each address, one of each connection of an address, for as long as a
+turn of the loop has time for that. So nobody waits for all that another one asks, however many times it has
+connected.
+"""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from gateway.limits import OUTPUTS_BYTES
+from gateway.loop import Loop
+
+log = logging.getLogger(__name__)
+
+TURN_NS = 2_000_000  # what requests may take of one turn of the loop; the one that exceeds it is the last
+
+Run = Callable[[], object]
+
+
+class Holder(Protocol):
+    """Whoever has answers waiting."""
+
+    @property
+    def peer(self) -> str: ...
+
+    @property
+    def waiting_bytes(self) -> int: ...
+
+    def close(self) -> None: ...
+
+
+class Sharing:
+    """One gateway's. It belongs to the loop's thread."""
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop = loop
+        self._waiting: dict[str, deque[Run]] = {}  # by address
+        self._posted = False
+        self._turn = -1
+        self._until_ns = 0
+        self._bytes = 0
+        self._holders: dict[Holder, None] = {}
+
+    # Time
+
+    def take(self, address: str, run: Run) -> None:
+        """Run it now, where nobody waits and this turn of the loop has time; else in turn."""
+        if not self._waiting and self._has_time():
+            run()
+        else:
+            self.add(address, run)
+
+    def add(self, address: str, run: Run) -> None:
+        """Run it in turn, in one of the loop's next turns."""
+        self._waiting.setdefault(address, deque()).append(run)
+        self._post()
+
+    def _post(self) -> None:
+        if not self._posted:
+            self._posted = True
+            self._loop.post(self._run)
+
+    def _run(self) -> None:
+        """One of each address after the other, and again, as long as there is time."""
+        self._posted = False
+        due = sum(map(len, self._waiting.values()))  # what these add is for the next turn
+        while due and self._has_time():
+            address = next(iter(self._waiting))
+            runs = self._waiting.pop(address)
+            run = runs.popleft()
+            if runs:
+                self._waiting[address] = runs  # behind the others
+            due -= 1
+            run()
+        if self._waiting:
+            self._post()
+
+    def _has_time(self) -> bool:
+        now_ns = time.monotonic_ns()
+        if self._turn != self._loop.turns:
+            self._turn, self._until_ns = self._loop.turns, now_ns + TURN_NS
+        return now_ns < self._until_ns
+
+    # Memory
+
+    def hold(self, holder: Holder, size: int) -> None:
+        """So many more bytes wait for this client; fewer, where it is negative."""
+        self._bytes += size
+        if holder.waiting_bytes:
+            self._holders[holder] = None
+        else:
+            self._holders.pop(holder, None)
+        if self._bytes > OUTPUTS_BYTES:
+            self._loop.post(self._make_room)
+
+    def _make_room(self) -> None:
+        while self._bytes > OUTPUTS_BYTES:
+            greediest = max(self._holders, key=lambda one: one.waiting_bytes)
+            log.warning(
+                "%s has %d bytes of answers waiting, the most of all; closed: all together have more than %d",
+                greediest.peer,
+                greediest.waiting_bytes,
+                OUTPUTS_BYTES,
+            )
+            greediest.close()
