@@ -13,6 +13,14 @@ from collections.abc import Callable, Iterable, Sequence
 from drivers.samples import Sample
 from gateway import wire
 from gateway.budget import Budget
+from gateway.limits import (
+    ALL_VALUES_A_SECOND,
+    OWN_RATE_HZ,
+    ROW_VALUES,
+    SMALL_VALUES_A_SECOND,
+    STREAMS,
+    VALUES_A_SECOND,
+)
 from gateway.loop import Loop, Timer
 from gateway.outlets import Batch, Outlet, encode_batch
 from gateway.session import Session
@@ -20,8 +28,8 @@ from gateway.sources import Selection
 
 BATCH_S = 0.010  # ticks faster than this travel together
 GATHER_S = 0.002  # how long a source's own samples wait for company
-MOST_STREAMS = 32  # of one client
 CATCH_UP_S = 1.0  # ticks missed for longer than this are lost, not made up
+TURN_VALUES = 20_000  # of one feed in one turn of the loop: who is late catches up in several
 TAP_SAMPLES = 10_000  # what one source may have waiting; the loop empties it every few milliseconds
 
 
@@ -69,6 +77,7 @@ class Feed:
         self.outlets: list[Outlet] = []
         self.rate_hz = rate_hz
         self.channels = sum(len(selection.indices) for selection in selections)
+        self.values_a_second = values_a_second(rate_hz, self.channels)
         self.shed = 1
         self._loop = loop
         self._closed = False
@@ -102,6 +111,11 @@ class Feed:
             outlet.lose(rows)
 
 
+def values_a_second(rate_hz: float, channels: int) -> float:
+    """What such a stream costs: its values, and what its rows cost beside them."""
+    return (rate_hz or OWN_RATE_HZ) * (ROW_VALUES + channels)
+
+
 class TickFeed(Feed):
     """Rows at a steady rate. Each cell is the newest sample at its tick, null once stale.
 
@@ -112,6 +126,7 @@ class TickFeed(Feed):
         super().__init__(loop, selections, rate_hz, filled=lambda: None)
         self.shed_to(1)
         self._next_ns = time.monotonic_ns()
+        self._early: list[tuple[int, Sample, dict[int, int]]] = []
         self._cells: list[tuple[int, float | None] | None] = []
         self._stale_after_ns: list[int] = []
         self._names: list[str] = []
@@ -145,16 +160,16 @@ class TickFeed(Feed):
         stamps: list[int] = []
         updates = iter(self._drained())
         update = next(updates, None)
-        while self._next_ns <= now_ns:
+        most_rows = 1 + TURN_VALUES // (1 + len(self._cells))
+        until_ns = min(now_ns, self._next_ns + most_rows * self._period_ns)
+        while self._next_ns <= until_ns:
             while update is not None and update[0] <= self._next_ns:
                 self._apply(*update)
                 update = next(updates, None)
             stamps.append(self._next_ns)
             rows.append(self._row(self._next_ns))
             self._next_ns += self._period_ns
-        while update is not None:  # newer than the last tick: for the next one
-            self._apply(*update)
-            update = next(updates, None)
+        self._early = [] if update is None else [update, *updates]  # newer than the last tick: for the next
         if rows:
             columns = dict(zip(self._names, zip(*rows, strict=True), strict=True))
             batch = encode_batch(stamps, columns, self.shed)
@@ -173,11 +188,12 @@ class TickFeed(Feed):
         """What a source has cleared, as after a lost port, is not shown until it is stale."""
         for tap, places in zip(self._taps, self._places, strict=True):
             if tap.selection.source.latest.updated_ns is None:
+                self._early = [update for update in self._early if update[2] is not places]
                 for cell in places.values():
                     self._cells[cell] = None
 
     def _drained(self) -> list[tuple[int, Sample, dict[int, int]]]:
-        updates = [
+        updates = self._early + [
             (sample.stamp_ns, sample, places)
             for tap, places in zip(self._taps, self._places, strict=True)
             for sample in tap.drain()[0]
@@ -255,15 +271,16 @@ class Streams:
         """Subscribe a session; its connection's end ends the stream. Returns the stream's number.
 
         Raises:
-            RpcError: it has `MOST_STREAMS` already.
+            RpcError: unavailable: it has as many streams as it may, or they cost too much.
 
         """
-        if len(session.outlets) >= MOST_STREAMS:
-            most = f"a client may have {MOST_STREAMS} streams; end one, or ask for more channels in one"
+        if len(session.outlets) >= STREAMS:
+            most = f"a client may have {STREAMS} streams; end one, or ask for more channels in one"
             raise wire.refuse(wire.Kind.UNAVAILABLE, most)
         chosen = list(selections)
         key = (rate_hz, tuple(name for selection in chosen for name in selection.names))
         feed = self._feeds.get(key)
+        self._check_cost(session, values_a_second(rate_hz, len(key[1])), is_new=feed is None)
         if feed is None:
             feed = TickFeed(self._loop, chosen, rate_hz) if rate_hz else SampleFeed(self._loop, chosen)
             self._feeds[key] = feed
@@ -276,6 +293,24 @@ class Streams:
         session.outlets[outlet.number] = outlet
         self._share(session)
         return outlet.number
+
+    def _check_cost(self, session: Session, wanted: float, *, is_new: bool) -> None:
+        """Refuse what one client, or all together, would make the robot work too much for."""
+        own = wanted + sum(outlet.feed.values_a_second for outlet in self.of(session))
+        together = wanted * is_new + sum(feed.values_a_second for feed in self._feeds.values())
+        if own <= SMALL_VALUES_A_SECOND or (own <= VALUES_A_SECOND and together <= ALL_VALUES_A_SECOND):
+            return
+        whose, cost, most = (
+            ("your streams", own, VALUES_A_SECOND)
+            if own > VALUES_A_SECOND
+            else ("the streams of all clients", together, ALL_VALUES_A_SECOND)
+        )
+        raise wire.refuse(
+            wire.Kind.UNAVAILABLE,
+            f"{whose} would cost {cost:,.0f} values a second, and {most:,} is the most (a row counts as its "
+            f"channels and {ROW_VALUES} more): ask for a lower rate, or fewer channels",
+            limit=float(most),
+        )
 
     def stop(self, session: Session, number: int) -> bool:
         """End one stream of a session; false where it has no such stream."""

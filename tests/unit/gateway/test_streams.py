@@ -3,7 +3,7 @@
 import itertools
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, cast
 
 import pytest
@@ -11,14 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.component import Kind
-from gateway import streams
+from gateway import limits, streams
 from gateway.budget import Budget
 from gateway.loop import Loop
 from gateway.modules.component import ComponentSource
 from gateway.outlets import Batch, Outlet, encode_batch
 from gateway.session import Session
 from gateway.sources import merge, narrow, whole
-from gateway.streams import SampleFeed, Streams, TickFeed
+from gateway.streams import SampleFeed, Streams, TickFeed, values_a_second
+from gateway.wire import RpcError
 from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
 
 MS = 1_000_000
@@ -243,6 +244,65 @@ def test_selections_are_merged_channel_by_channel() -> None:
     assert [one.names for one in merged] == [("knee.position", "knee.torque")]
 
 
+class TestCost:
+    """A robot is asked for no more than it can give; who asks for little is always served."""
+
+    @pytest.fixture
+    def started(self) -> Iterator[Streams]:
+        loop = Loop()
+        yield Streams(loop, 1 << 16, Budget(loop, None))
+        loop.close()
+
+    def fill(self, started: Streams, rates_hz: Iterable[float]) -> "Session":
+        session = cast("Session", FakeSession())
+        for rate_hz in rates_hz:
+            started.start(session, [whole(ComponentSource(knee()))], rate_hz)
+        return session
+
+    def end(self, started: Streams, *sessions: "Session") -> None:
+        for session in sessions:
+            for number in tuple(session.outlets):
+                started.stop(session, number)
+
+    def test_one_clients_streams_have_a_limit(self, started: Streams) -> None:
+        most = int(limits.VALUES_A_SECOND / values_a_second(1000, 2))
+        session = self.fill(started, [1000 - number / 10 for number in range(most)])
+        with pytest.raises(RpcError, match=r"your streams would cost 9\d\d,\d\d\d values a second"):
+            started.start(session, [whole(ComponentSource(knee()))], 0.0)
+        self.end(started, session)
+
+    def test_so_have_all_clients_that_ask_for_different_ones(self, started: Streams) -> None:
+        each = [1000 - number / 10 for number in range(12)]
+        sessions = [self.fill(started, [rate - own / 1000 for rate in each]) for own in range(3)]
+        late = cast("Session", FakeSession())
+        for rate_hz in (900.0, 901.0, 902.0, 903.0, 904.0, 905.0, 906.0, 907.0):
+            started.start(late, [whole(ComponentSource(knee()))], rate_hz)
+        with pytest.raises(RpcError, match=r"the streams of all clients would cost 2,7\d\d,\d\d\d"):
+            started.start(late, [whole(ComponentSource(knee()))], 908.0)
+        started.start(late, [whole(ComponentSource(knee()))], 1000.0)  # one that there is costs nothing more
+        modest = self.fill(started, [100.0, 200.0])
+        self.end(started, late, modest, *sessions)
+
+
+def test_a_feed_that_is_late_catches_up_in_several_turns_and_loses_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(streams, "TURN_VALUES", 30)
+    component = knee()
+    feed, one, began_ns = tick_feed(component, 1000)
+    for at in range(50):
+        component.give(float(at), 0.0, stamp_ns=began_ns + at * MS)
+    until(lambda: time.monotonic_ns() >= began_ns + 60 * MS, "time passes")
+    feed._tick()
+    first = rows(taken(one))
+    assert len(first) <= 12
+    turn_until(feed, began_ns + 50 * MS)
+    found = first + rows(taken(one))
+    assert [row["knee.position"] for _, row in found[:50]] == [float(at) for at in range(50)]
+    assert one.dropped == 0
+    finish(feed)
+
+
 # Over the wire
 
 
@@ -307,7 +367,7 @@ def test_status_and_component_in_one_stream_have_each_channel_once(client: Clien
 
 
 def test_one_stream_too_many_is_refused(client: Client) -> None:
-    for _ in range(streams.MOST_STREAMS):
+    for _ in range(limits.STREAMS):
         client.call("stream.start", modules=["component"], rate_hz=1)
     assert client.refused("stream.start", modules=["component"], rate_hz=1).kind == "unavailable"
 
