@@ -36,7 +36,10 @@ class Transport(Protocol):
     def receive(self, timeout_s: float) -> Sequence[Frame]: ...
 
     def try_send(self, can_id: int, data: bytes) -> bool:
-        """Hand over a frame; `False`: it would have to wait now, and nothing of it was sent."""
+        """Hand over a frame; `False`: it would have to wait now, and nothing of it was sent.
+
+        One that was sent in part is finished first.
+        """
 
     def flush(self) -> bool:
         """Go on with a frame that was taken and left in part only; whether nothing is left of it."""

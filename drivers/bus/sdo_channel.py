@@ -362,9 +362,11 @@ class SdoChannel:
             transfer.request = request  # nobody knows: it may yet be answered
             raise
         except Unavailable:
-            self._forget_unsent(request, begins=begins)
+            with self._sending:
+                self._forget_unsent(request, begins=begins)
             raise
-        self._forget_unsent(request, begins=begins)
+        with self._sending:
+            self._forget_unsent(request, begins=begins)
         self._check_interrupted()
         self._check_permitted(transfer)
         raise Unavailable(f"{transfer.what}: it was not sent")

@@ -5,7 +5,6 @@ Whoever is sending takes the urgent ones first that came meanwhile. Where the in
 block, the bus's sender thread does it, as soon as there is some.
 """
 
-import contextlib
 import threading
 import time
 from collections import deque
@@ -46,6 +45,11 @@ class _Frame:
     wanted: Callable[[], bool] = always
     taken: bool | Unavailable | None = None  # whether it was sent, or why not; `None` as long as it waits
     settled: threading.Event | None = None  # of who waits for that
+    given_up: bool = False  # nobody waits for it any more: it is not tried again
+
+    @property
+    def is_urgent(self) -> bool:
+        return self.until != float("inf")
 
     @property
     def key(self) -> Key:
@@ -92,12 +96,15 @@ class Sender:
     def stop(self) -> None:
         """Send nothing more; who waits is told. Idempotent."""
         with self._lock:
-            self._transport = None
+            transport, self._transport = self._transport, None
             for frame in (*self._urgent.values(), *self._normal):
                 frame.settle(Unavailable(self._why_closed()))
             self._urgent.clear()
             self._normal.clear()
         self._order.set()
+        if transport is not None and not transport.blocks:
+            with self._at_work:  # who has a frame in hand is done with it
+                pass
 
     def join(self) -> None:
         """After `stop`, and after a transport that may block was closed."""
@@ -137,7 +144,8 @@ class Sender:
         return frame.taken is True
 
     def _see_off(self, transport: Transport, frame: _Frame) -> bool:
-        self._work(transport)
+        if frame.taken is None:
+            self._work(transport, until=frame)
         if frame.taken is None:
             self._await(frame, transport.full)
         if isinstance(frame.taken, Unavailable):
@@ -146,26 +154,30 @@ class Sender:
 
     def _await(self, frame: _Frame, full: str) -> None:
         with self._lock:
-            frame.settled = frame.settled or threading.Event()
-        if frame.taken is not None or frame.settled.wait(SEND_TIMEOUT_S):
+            settled = frame.settled = frame.settled or threading.Event()
+        if frame.taken is not None or settled.wait(SEND_TIMEOUT_S):
             return
         with self._lock:
             if frame.taken is not None:
                 return
-            if frame is self._in_hand:
-                raise StillLeaving(f"{full} It may still leave")
-            with contextlib.suppress(ValueError):  # an urgent one stays
+            if frame is not self._in_hand and not frame.is_urgent:
                 self._normal.remove(frame)
-            raise BusFull(full)
+                raise BusFull(full)
+            frame.given_up = True
+        if not settled.wait(ROOM_S):
+            raise StillLeaving(f"{full} It may still leave")
 
     # Who sends.
 
-    def _work(self, transport: Transport, *, only_urgent: bool = False) -> None:
-        """Send what waits, unless somebody does: then he does that too, or leaves it to the thread."""
+    def _work(self, transport: Transport, *, only_urgent: bool = False, until: _Frame | None = None) -> None:
+        """Send what waits, `until` that has gone, unless somebody does: then he does that too.
+
+        What is left is the thread's.
+        """
         if transport.blocks:
             self._order.set()
         elif self._at_work.acquire(blocking=False):
-            self._empty_and_leave(transport, only_urgent=only_urgent)
+            self._empty_and_leave(transport, only_urgent=only_urgent, until=until)
 
     def _run(self, transport: Transport) -> None:
         """The thread: does what nobody else can."""
@@ -175,21 +187,32 @@ class Sender:
             self._order.clear()
             self._at_work.acquire()
             if not self._empty_and_leave(transport):
-                transport.await_room(ROOM_S)
+                self._await_room(transport)
 
-    def _empty_and_leave(self, transport: Transport, *, only_urgent: bool = False) -> bool:
+    def _await_room(self, transport: Transport) -> None:
+        try:
+            transport.await_room(ROOM_S)
+        except Exception:  # noqa: BLE001 - whoever receives from it finds that it is gone
+            time.sleep(ROOM_S)
+
+    def _empty_and_leave(
+        self, transport: Transport, *, only_urgent: bool = False, until: _Frame | None = None
+    ) -> bool:
         """Hand over what waits, and leave work; the thread does what is left. Whether there was room."""
         try:
-            room = self._empty(transport, only_urgent=only_urgent)
+            room = self._empty(transport, only_urgent=only_urgent, until=until)
         finally:
             self._at_work.release()
         if self._urgent or self._normal or not room:  # also what came in this very moment
             self._order.set()
         return room
 
-    def _empty(self, transport: Transport, *, only_urgent: bool = False) -> bool:
+    def _empty(self, transport: Transport, *, only_urgent: bool, until: _Frame | None) -> bool:
         """Hand over what waits; whether the interface took it all. For who is at work."""
-        while (frame := self._take(transport, only_urgent=only_urgent)) is not None:
+        while until is None or until.taken is None:
+            frame = self._take(transport, only_urgent=only_urgent)
+            if frame is None:
+                break
             taken: bool | Unavailable
             try:
                 taken = self._hand_over(transport, frame.can_id, frame.data)
@@ -198,7 +221,7 @@ class Sender:
             with self._lock:
                 self._in_hand = None
                 if taken is False and self._transport is transport:
-                    self._put_back(frame)
+                    self._put_back(frame, transport.full)
                     return False
                 frame.settle(taken or Unavailable(self._why_closed()))
         return _is_flushed(transport)
@@ -223,11 +246,21 @@ class Sender:
             while self._transport is transport and (self._urgent or (self._normal and not only_urgent)):
                 key = next(iter(self._urgent), None)
                 frame = self._normal.popleft() if key is None else self._urgent.pop(key)
-                if frame.wanted() and time.monotonic() < frame.until:
+                if self._is_wanted(frame):
                     self._in_hand = frame
                     return frame
-                frame.settle(False)
         return None
+
+    def _is_wanted(self, frame: _Frame) -> bool:
+        """Whether it may still leave; who waits for one that may not is told."""
+        try:
+            wanted = frame.wanted() and time.monotonic() < frame.until
+        except Exception as error:  # noqa: BLE001 - it is its owner's, and nobody else's
+            frame.settle(Unavailable(f"bus {self._name}: internal error: {type(error).__name__}: {error}"))
+            return False
+        if not wanted:
+            frame.settle(False)
+        return wanted
 
     # What follows is for who has the lock.
 
@@ -238,23 +271,26 @@ class Sender:
 
     def _queue(self, frame: _Frame) -> _Frame:
         """The frame to wait for: where the same one waits already, urgently, it does not leave twice."""
-        urgent = self._urgent.get(frame.key)
-        if urgent is not None and urgent.data == frame.data:
-            return urgent
+        same = (frame.can_id, frame.data)
+        for one in (self._urgent.get(frame.key), self._in_hand):
+            if one is not None and one.is_urgent and (one.can_id, one.data) == same:
+                return one
         self._normal.append(frame)
         return frame
 
     def _queue_urgent(self, frame: _Frame) -> None:
         older = self._urgent.get(frame.key)
-        if older is None and len(self._urgent) == MAX_URGENT:
+        if older is None and len(self._urgent) + (self._in_hand is not None) >= MAX_URGENT:
             older = self._urgent.pop(next(iter(self._urgent)))
         self._urgent[frame.key] = frame
         if older is not None:
             older.settle(self._overtaken())
 
-    def _put_back(self, frame: _Frame) -> None:
+    def _put_back(self, frame: _Frame, full: str) -> None:
         """There was no room for it: it is still the first of its queue, unless a newer one stands for it."""
-        if frame.until == float("inf"):
+        if not frame.is_urgent and frame.given_up:
+            frame.settle(BusFull(full))
+        elif not frame.is_urgent:
             self._normal.appendleft(frame)
         elif frame.key in self._urgent:
             frame.settle(self._overtaken())
@@ -268,5 +304,5 @@ class Sender:
 def _is_flushed(transport: Transport) -> bool:
     try:
         return transport.flush()
-    except Unavailable:
-        return True  # whoever receives from it finds that it is gone
+    except Exception:  # noqa: BLE001 - whoever receives from it finds that it is gone
+        return True

@@ -27,14 +27,17 @@ class Written:
         return key in self._unsure
 
     def doubt(self, key: Object) -> None:
-        """A write is about to be sent."""
+        """A write is about to be sent, of which nothing will be told."""
         self._unsure.add(key)
         self._confirmed.pop(key, None)
+        if self._before is not None and self._before[0] == key:
+            self._before = key, None, True  # also where the one under way is not sent after all
 
     def begin(self, key: Object) -> None:
         """A write is about to be sent, and one of the next three will be told."""
-        self._before = (key, self._confirmed.get(key), key in self._unsure)
+        before = (key, self._confirmed.get(key), key in self._unsure)
         self.doubt(key)
+        self._before = before
 
     def confirm(self, key: Object, data: bytes) -> None:
         """The device has taken it."""

@@ -1,12 +1,13 @@
 """A write is permitted at the last moment, so that none follows the stop that forbids it."""
 
+import contextlib
 import itertools
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo_channel import Interrupted, SdoChannel
 from drivers.bus.sdo_worker import SdoWorker
 from drivers.errors import DeviceTimeout, DriverError, NotPermitted
 from tests.unit.bus.direct import Direct
@@ -156,3 +157,42 @@ def test_a_stop_is_sent_whoever_answers() -> None:
     worker.submit(lambda sdo: sdo.download(CONTROLWORD, 0, b"\x02\x00"), urgent=True).result(WAIT_S)
     worker.stop()
     assert server.requests == [STOP, STOP]
+
+
+def test_a_stop_that_overtakes_a_write_leaves_nothing_known_of_the_controlword() -> None:
+    """What was to be written did not leave, and what was stopped with is not confirmed yet."""
+
+    class Queue:
+        """A bus whose queue is only looked at when it is told to."""
+
+        def __init__(self) -> None:
+            self.turn, self.queued = threading.Event(), threading.Event()
+
+        def offer(self, data: bytes, wanted: Callable[[], bool]) -> Callable[[], bool]:
+            def sent() -> bool:
+                self.queued.set()
+                self.turn.wait(WAIT_S)
+                return wanted()
+
+            return sent
+
+        def send_urgent(self, data: bytes) -> bool:
+            return True
+
+    bus = Queue()
+    channel = SdoChannel("node 1", bus, timeout_s=0.2)
+    channel._written.begin((CONTROLWORD, 0))
+    channel._written.confirm((CONTROLWORD, 0), b"\x0f\x00")
+    write = threading.Thread(target=lambda: _quietly(lambda: channel.download(CONTROLWORD, 0, b"\x0f\x00")))
+    write.start()
+    assert bus.queued.wait(WAIT_S)
+    channel.interrupt(STOP)
+    bus.turn.set()
+    write.join()
+    assert channel.known(CONTROLWORD, 0) is None
+    assert channel.is_unsure(CONTROLWORD, 0)
+
+
+def _quietly(work: Callable[[], object]) -> None:
+    with contextlib.suppress(Interrupted, DriverError):
+        work()

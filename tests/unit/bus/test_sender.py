@@ -123,6 +123,55 @@ def test_an_urgent_frame_is_taken_at_once_though_others_wait(
     assert narrow.threads == [ME]
 
 
+class Hesitant(NarrowTransport):
+    """It has no room twice, and takes its time to find out the second time."""
+
+    def __init__(self) -> None:
+        super().__init__(room=1000)
+        self.begun, self.go_on = threading.Event(), threading.Event()
+
+    def try_send(self, can_id: int, data: bytes) -> bool:
+        self.asked += 1
+        if self.asked == 2:
+            self.begun.set()
+            self.go_on.wait(WAIT_S)
+        return self.asked > 2 and super().try_send(can_id, data)
+
+
+def test_what_its_caller_was_told_that_nobody_sends_does_not_leave_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two SYNCs a millisecond apart would move setpoints twice."""
+    monkeypatch.setattr(senders, "SEND_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(senders, "ROOM_S", WAIT_S)
+    hesitant = Hesitant()
+    with sending(hesitant) as sender, ThreadPoolExecutor(1) as threads:
+        first = threads.submit(sender.send, 0x80, b"first")
+        assert hesitant.begun.wait(WAIT_S)
+        until(lambda: first.done() or (sender._in_hand is not None and sender._in_hand.given_up))
+        hesitant.go_on.set()
+        with pytest.raises(Unavailable, match=r"acknowledge\?$"):
+            first.result(WAIT_S)
+        sender.send(0x80, b"second")
+    assert hesitant.sent == [(0x80, b"second")]
+
+
+def test_a_wish_that_fails_is_its_owners_alone(
+    narrow: NarrowTransport, sender: Sender, patient: None
+) -> None:
+    def fails() -> bool:
+        raise ZeroDivisionError("oops")
+
+    first = sender.offer(0x601, b"first")
+    wish = sender.offer(0x602, b"wish", fails)
+    narrow.open()
+    sender.send(0x603, b"last")
+    with pytest.raises(Unavailable, match="internal error: ZeroDivisionError: oops"):
+        wish()
+    assert first()
+    assert narrow.sent == [(0x601, b"first"), (0x603, b"last")]
+
+
 class Held(NarrowTransport):
     """Whoever sends is held up in the middle of it, as by other programs and threads."""
 
