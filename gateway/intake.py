@@ -209,9 +209,10 @@ class Inlet:
 
     def _sorted(self, lines: list[wire.Line]) -> Heard:
         heard = Heard()
+        newest = next((one for one in reversed(lines) if isinstance(one, wire.StopRequest)), None)
+        answer = None if newest is None else self._stop(newest)  # those of one read are one stop
         for line in lines:
             if isinstance(line, wire.StopRequest):
-                answer = self._stop(line)
                 if self._has_room:
                     heard.stops.append(Stopping(line, answer))
                     self._handed += 1

@@ -341,6 +341,26 @@ def test_a_stop_that_has_arrived_acts_though_the_loop_has_closed_its_client(
         one.close()
 
 
+def test_stops_that_come_together_are_one_and_each_is_answered(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    client, accepted = pair
+    asked: list[str] = []
+    inlet, front, loop = inlet_of(accepted, asked)
+    heard: list[Heard] = []
+    inlet.receiver = heard.append
+    client.sendall(STOP % b"more" * 100 + STOP % b"last")
+    inlet._on_ready(READ)
+    while loop._patience_s() == 0.0:
+        loop._turn()
+    assert asked == ["last"]
+    assert len({id(one.answer) for each in heard for one in each.stops}) == 1
+    assert sum(len(one.stops) for one in heard) == 101
+    inlet.finish()
+    for one in (front, loop):
+        one.close()
+
+
 def test_what_ends_with_a_client_ends_though_something_else_cannot(
     pair: tuple[socket.socket, socket.socket],
 ) -> None:
