@@ -1,6 +1,7 @@
 """What one client may ask for is bounded, whoever it is; what is beyond is answered in words or not."""
 
 import json
+import re
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway import session
+from gateway import limits, session
 from gateway.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES
 from gateway.sources import Wanted
 from gateway.stop_lines import StopSplitter
@@ -163,3 +164,17 @@ def test_reading_garbage_costs_no_more_than_its_length(piece: bytes) -> None:
         return shortest_s(lambda: StopSplitter().feed(piece * (size // len(piece))))
 
     assert cost_s(160_000) < 50 * max(cost_s(16_000), 1e-5)
+
+
+def test_the_table_of_limits_says_what_is_true() -> None:
+    """`SECURITY.md` names every limit, with its number."""
+    text = (Path(__file__).parents[3] / "SECURITY.md").read_text(encoding="utf-8")
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    for name, number in vars(limits).items():
+        if not name.isupper():
+            continue
+        said = f"{number:,g}" if isinstance(number, float) else f"{number:,}"
+        if name in rows:
+            assert re.search(rf"\| {said} ", rows[name]), name
+        else:
+            assert f"`{name}` ({said})" in text, name
