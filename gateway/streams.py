@@ -79,6 +79,7 @@ class Feed:
         self.channels = sum(len(selection.indices) for selection in selections)
         self.values_a_second = values_a_second(rate_hz, self.channels)
         self.shed = 1
+        self._late_ns = 0
         self._loop = loop
         self._closed = False
         self._timer: Timer | None = None
@@ -94,6 +95,11 @@ class Feed:
     def shed_to(self, shed: int) -> None:
         """Give one row of so many from now on."""
         self.shed = shed
+
+    def was_late_s(self) -> float:
+        """How late its rows were at most since this was asked last; forgotten by that."""
+        late_ns, self._late_ns = self._late_ns, 0
+        return late_ns / 1e9
 
     def _spent(self, began_ns: int) -> None:
         """Put down what the thread has worked since then for all of them together."""
@@ -154,6 +160,7 @@ class TickFeed(Feed):
         if self._closed:
             return
         began_ns, now_ns = time.thread_time_ns(), time.monotonic_ns()
+        self._late_ns = max(self._late_ns, now_ns - self._next_ns)
         self._skip_what_is_too_old(now_ns)
         self._forget_what_is_gone()
         rows: list[list[float | None]] = []
@@ -263,7 +270,7 @@ class Streams:
         self._loop = loop
         self._buffer_bytes = buffer_bytes
         self._budget = budget
-        budget.shed = self._shed
+        budget.shed, budget.late_s = self._shed, self._late_s
         self._numbers = itertools.count(1)
         self._feeds: dict[tuple[float, tuple[str, ...]], Feed] = {}
 
@@ -330,6 +337,10 @@ class Streams:
         outlets = self.of(session)
         for outlet in outlets:
             outlet.most_bytes = self._buffer_bytes // len(outlets)
+
+    def _late_s(self) -> float:
+        """How late the latest feed was since this was asked last."""
+        return max((feed.was_late_s() for feed in self._feeds.values()), default=0.0)
 
     def _shed(self, factor: int) -> None:
         for feed in self._feeds.values():

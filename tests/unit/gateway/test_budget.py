@@ -56,11 +56,27 @@ def test_it_comes_back_only_where_twice_as_much_would_fit_for_a_while(loop: Loop
     assert judged(loop, *[0] * 50)[-1] == 1
 
 
-def test_without_a_most_nobody_looks(loop: Loop) -> None:
+def test_without_a_most_only_what_cannot_keep_up_is_shed(loop: Loop) -> None:
     one = Budget(loop, None)
-    one.watch(on=True)
-    assert loop._patience_s() is None
+    factors = []
+    for percent, late_s in (
+        [(400, 0.0)] * 3 + [(1, 1.0)] * 4 + [(1, 0.1)] * 9 + [(400, 0.0)] * 2 * UNDER_LOOKS
+    ):
+        one.judge(percent, late_s)
+        factors.append(one.factor)
+    assert factors[:7] == [1, 1, 1, 1, 2, 2, 4]
+    assert factors[7:16] == [4] * 9
+    assert factors[-1] == 1
     assert one.info is None
+
+
+def test_feeds_say_how_late_they_were_once(loop: Loop) -> None:
+    feed = TickFeed(loop, [whole(ComponentSource(knee()))], 100.0)
+    feed._next_ns -= 300 * MS
+    feed._tick()
+    assert 0.3 <= feed.was_late_s() < 100
+    assert feed.was_late_s() == 0.0
+    feed.close()
 
 
 def test_it_looks_only_while_there_are_streams(loop: Loop) -> None:
@@ -132,7 +148,7 @@ def test_a_client_sees_that_rows_are_shed_and_everything_else_is_served(
         cost = client.call("gateway.cost")
         assert cost["clients"][0]["streams"][0]["shed"] == MOST
         assert client.call("robot.stop", reason="test")["drives"]["left_knee"] == "confirmed"
-    assert "streams now send one row of 2" in caplog.text
+    assert "of a core in all: they now send one row of 2" in caplog.text
 
 
 def test_describe_shows_the_budget(bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
