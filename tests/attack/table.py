@@ -1,0 +1,16 @@
+"""Every attack by its name. A new module of attacks is added here."""
+
+from collections.abc import Mapping
+
+from tests.attack import calls, connections, devices, lines, resting, strangers
+from tests.attack.attack import Attack
+
+_MODULES: tuple[tuple[Attack, ...], ...] = (
+    connections.ATTACKS,
+    lines.ATTACKS,
+    calls.ATTACKS,
+    strangers.ATTACKS,
+    devices.ATTACKS,
+    resting.ATTACKS,
+)
+ATTACKS: Mapping[str, Attack] = {attack.name: attack for module in _MODULES for attack in module}
