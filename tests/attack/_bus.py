@@ -77,7 +77,7 @@ class Bus(_bus.Bus):
     def __init__(self, wire: socket.socket, rate: float) -> None:
         super().__init__(wire)
         self._liar = Drive(LIAR)
-        self.drives = {node_id: Drive(node_id) for node_id in range(1, DRIVES + 1)} | {LIAR: self._liar}
+        self.drives = {at: self._liar if at == LIAR else Drive(at) for at in range(1, DRIVES + 1)}
         for drive in self.drives.values():
             drive.send = self.send  # type: ignore[method-assign]
         self._rate = rate

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 PRINTED = 60  # characters
 FIRST_BYTES = 1 << 16  # of what one connection is told that are looked at
 ELSEWHERE, SAME = "127.0.0.2", "127.0.0.1"  # an attacker has an address of its own, or the stopper's
+IP_BIND_ADDRESS_NO_PORT = 24  # of Linux: the port is chosen by where it connects to
 CONNECT_S = 5.0
 AGAIN_S = 0.01  # until a connection that was ended is made anew
 
@@ -29,6 +30,7 @@ class Target:
         try:
             if receive_bytes is not None:
                 made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
+            made.setsockopt(socket.IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, 1)
             made.bind((self.source, 0))
             made.settimeout(CONNECT_S)
             made.connect(self.address)
