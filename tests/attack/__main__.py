@@ -9,7 +9,7 @@ from dataclasses import asdict
 from tests.attack.attack import FULL, QUICK, Result
 from tests.attack.table import ATTACKS
 
-NAME_WIDTH, ABOUT_WIDTH, CELL_WIDTH = 24, 46, 12
+NAME_WIDTH, CELL_WIDTH = 24, 8
 
 
 def _options() -> argparse.Namespace:
@@ -32,16 +32,19 @@ def _write(text: str) -> None:
     sys.stdout.flush()
 
 
-def _cells(result: Result) -> str:
-    return "".join(f"{cell:>{CELL_WIDTH}}" for cell in result.cells)
+def _line(name: str, cells: tuple[str, ...], columns: tuple[str, ...]) -> str:
+    widths = (max(len(column) + 2, CELL_WIDTH) for column in columns)
+    placed = (f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+    return f"{name:<{NAME_WIDTH}}{''.join(placed)}"
 
 
 def _show(result: Result, columns: tuple[str, ...]) -> None:
     """A row, under its own head where that is another one than before."""
     if result.columns != columns:
-        _write(f"{'':<{NAME_WIDTH}}" + "".join(f"{one:>{CELL_WIDTH}}" for one in result.columns))
+        _write(_line("", result.columns, result.columns))
     verdict = f"NOT KEPT: {', '.join(result.broken)}" if result.broken else "kept"
-    _write(f"{result.name:<{NAME_WIDTH}}{_cells(result)}  {verdict}\n{'':<{NAME_WIDTH}}  told: {result.told}")
+    _write(f"{_line(result.name, result.cells, result.columns)}  {verdict}")
+    _write(f"{'':<{NAME_WIDTH}}  told: {result.told}")
 
 
 def main() -> int:

@@ -12,9 +12,7 @@ from pathlib import Path
 
 from hil_sim.sensors.serial_port import SerialPort
 from hil_sim.sensors.suite import FEET, TRUNK
-from tests.attack.on_serial import PERIOD_S, healthy, hostile
-
-HEALTHY_PERIOD_S = 0.01
+from tests.attack.on_serial import PERIOD_S, TICK_NS, healthy, hostile
 
 
 class Sensor:
@@ -35,7 +33,7 @@ class Sensor:
         now = time.monotonic()
         if now >= self._due:
             self.port.write(next(self._frames if self._hostile is None else self._hostile))
-            self._due = max(self._due, now - 0.1) + (HEALTHY_PERIOD_S if self._hostile is None else PERIOD_S)
+            self._due = max(self._due, now - 0.1) + (TICK_NS / 1e9 if self._hostile is None else PERIOD_S)
         return self._due
 
 

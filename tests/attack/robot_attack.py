@@ -32,8 +32,8 @@ _NEWCOMERS, _GUARDS = (2, 5), (7,)
 _ALL = tuple(range(1, DRIVES + 1))
 
 COLUMNS = (
-    "stop p50/99",
-    "attacked",
+    "stop p50/p99",
+    "under attack",
     "p99 +",
     "refused",
     "guard",
@@ -45,7 +45,7 @@ COLUMNS = (
 )
 
 
-def at(times_ms: list[float], share: float) -> float:
+def percentile(times_ms: list[float], share: float) -> float:
     """A percentile; of nothing, it is not a number."""
     ordered = sorted(times_ms)
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else float("nan")
@@ -121,11 +121,11 @@ class Stopping:
 
     def _resident(self) -> object:
         if self._client is None:
-            self._client = _patient(self._victim.address)
+            self._client = patient(self._victim.address)
         return self._client.call("robot.stop", reason=f"measured {self._number}")
 
     def _newcomer(self) -> object:
-        client = _patient(self._victim.address)
+        client = patient(self._victim.address)
         with client:
             return client.call("robot.stop", reason=f"measured {self._number}, newly come")
 
@@ -141,7 +141,8 @@ class Stopping:
         time.sleep(0.1)
 
 
-def _patient(address: tuple[str, int]) -> Client:
+def patient(address: tuple[str, int]) -> Client:
+    """One that takes no answer for a refusal."""
     client = Client(address)
     client.socket.settimeout(PATIENCE_S)
     return client
@@ -150,9 +151,9 @@ def _patient(address: tuple[str, int]) -> Client:
 class Attacker:
     """A strike in a process of its own."""
 
-    def __init__(self, strike: Strike, victim: Robot, seconds: float) -> None:
+    def __init__(self, strike: Strike, address: tuple[str, int], seconds: float) -> None:
         command = [sys.executable, "-m", "tests.attack._attacker", strike.name]
-        command += [str(victim.address[1]), str(seconds)]
+        command += [str(address[1]), str(seconds)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         self._seconds = seconds
 
@@ -172,11 +173,11 @@ def measure(strike: Strike, lengths: Lengths) -> Result:
     with tempfile.TemporaryDirectory() as folder, robot(Path(folder)) as victim:
         early = Said("")
         if strike.changes_nothing:  # while a write would be done
-            early = Attacker(strike, victim, TRIED_S).told()
+            early = Attacker(strike, victim.address, TRIED_S).told()
         attackers: list[Attacker] = []
 
         def strike_now() -> Callable[[], Said]:
-            attackers.append(Attacker(strike, victim, lengths.attack_s))
+            attackers.append(Attacker(strike, victim.address, lengths.attack_s))
             return attackers[0].told
 
         result = _Run(victim, _ALL, lengths).result(strike.name, strike_now)
@@ -255,11 +256,11 @@ class _Run:
 def _judged(
     name: str, quiet: Phase, attacked: Phase, memory: tuple[float, float, float], said: Said
 ) -> Result:
-    more_ms = at(attacked.stops_ms, 0.99) - at(quiet.stops_ms, 0.99)
+    more_ms = percentile(attacked.stops_ms, 0.99) - percentile(quiet.stops_ms, 0.99)
     worst_ms = max(attacked.guard_ms, default=float("nan"))
     cells = (
-        f"{at(quiet.stops_ms, 0.5):.1f}/{at(quiet.stops_ms, 0.99):.1f}",
-        f"{at(attacked.stops_ms, 0.5):.1f}/{at(attacked.stops_ms, 0.99):.1f}",
+        f"{percentile(quiet.stops_ms, 0.5):.1f}/{percentile(quiet.stops_ms, 0.99):.1f}",
+        f"{percentile(attacked.stops_ms, 0.5):.1f}/{percentile(attacked.stops_ms, 0.99):.1f}",
         f"{more_ms:+.1f}",
         f"{len(attacked.refused)}",
         f"{worst_ms:.1f}" + f" −{attacked.guard_missed}" * bool(attacked.guard_missed),
