@@ -615,9 +615,10 @@ class Enabled(Struct, frozen=True):
 
 
 class JournalEntries(Struct, frozen=True):
-    """Result of `journal.tail`: the newest entries, oldest first."""
+    """Result of `journal.tail`: the newest entries, oldest first; `cut` says why there are fewer than could be."""
 
     entries: list[dict[str, Any]]
+    cut: str | None = None
 
 
 class Method(Struct, frozen=True):

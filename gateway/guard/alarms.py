@@ -22,7 +22,7 @@ STATE_WORDS = {int(state): state.words for state in State}
 class Append(Protocol):
     """How an entry gets into the journal."""
 
-    def __call__(self, who: str, what: str, **details: Any) -> object: ...
+    def __call__(self, who: str, what: str, /, **details: Any) -> object: ...
 
 
 class Alarms:

@@ -14,7 +14,7 @@ from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.stop_control import StopControl
 from gateway.modules.storage import RESTORING, STORING, Command
 from gateway.modules.tuning import Tuning
-from gateway.records.journal import Journal
+from gateway.records.journal import Journal, Share
 from gateway.records.records import Records
 
 if TYPE_CHECKING:
@@ -117,12 +117,12 @@ class ControlModule:
     def _lease_changed(self, session: "Session", what: str) -> None:
         if what == RENEWED:
             return
-        self._records.journal.append(session.who, what)
+        self._records.journal.append(session.who, what, Share.ASKED)
         if what != TAKEN:
             self._tuning.trials.revert_of(session, what)
 
     def _tail(self, count: int) -> "Future[messages.JournalEntries]":
-        return then(self._records.journal.tail(count), messages.JournalEntries)
+        return then(self._records.journal.tail(count), lambda tail: messages.JournalEntries(*tail))
 
     def _release(self, session: "Session", params: messages.ReleaseParams) -> messages.Done:
         self._leases.release(session, params.lease)

@@ -15,6 +15,7 @@ import msgspec
 from gateway.modules.objects import Change
 from gateway.modules.parameters import Parameter
 from gateway.modules.stop.authority import Address
+from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoChange
 from gateway.wire import Kind, RpcError, refuse
@@ -84,13 +85,13 @@ class WriteLedger:
         undo = Undo(self.number, self._who, time.time_ns(), self.trial_s is not None, self.changes)
         with self._or_refuse("nothing was written"):
             self.undos.change(put=[undo])
-            self._say("write", before=undo.before(), after=undo.values(), trial_s=self.trial_s)
+            self._say("write", Share.ASKED, before=undo.before(), after=undo.values(), trial_s=self.trial_s)
 
     def refused(self, changes: Sequence[Change], error: RpcError) -> None:
         """Nothing was sent; nobody waits for the journal."""
         self.undos.leave(self.number, ())
         what = {change.name: change.parameter.decode(change.data) for change in changes}
-        self._journal.append(self._who, "write refused", after=what, result=str(error))
+        self._journal.append(self._who, "write refused", Share.ASKED, after=what, result=str(error))
 
     def made(self, name: str, data: bytes) -> None:
         """The device has made something else of what was written, which is to be taken back all the same."""
@@ -130,8 +131,8 @@ class WriteLedger:
             self._say(what, result=str(error), outcome=error.data.outcome)
         self.undos.leave(self.number, left)
 
-    def _say(self, what: str, **details: object) -> None:
-        self._journal.append(self._who, what, write=self.number, **details).result()
+    def _say(self, what: str, share: Share = Share.OUTCOME, /, **details: object) -> None:
+        self._journal.append(self._who, what, share, write=self.number, **details).result()
 
     def _entry(self, change: Change, before: bytes) -> UndoChange:
         parameter = change.parameter

@@ -22,6 +22,7 @@ from gateway.modules.parameters import READABLE, Parameter
 from gateway.modules.rules import Rules
 from gateway.modules.transaction import Leave
 from gateway.modules.writer import Turn, Writer
+from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.wire import Kind, RpcError, refuse
 
@@ -121,7 +122,7 @@ class _Run:
         self._check_capability()
         before = self._values() if command is STORING else {}
         self._check_drives()
-        self._record(command.name, "nothing was sent")
+        self._record(command.name, "nothing was sent", Share.ASKED)
         try:
             self._check_drives()  # recording took its time
             self._send()
@@ -225,11 +226,11 @@ class _Run:
 
     # Words
 
-    def _record(self, what: str, so: str, **details: str) -> None:
+    def _record(self, what: str, so: str, share: Share = Share.OUTCOME, /, **details: str) -> None:
         """Returns when it is durable; raises `RpcError` where it cannot be recorded, `so` says what then."""
         journal = self._storage.records.journal
         try:
-            journal.append(self._who, what, component=self._component, **details).result()
+            journal.append(self._who, what, share, component=self._component, **details).result()
         except OSError as error:
             said = f"it could not be recorded: {error.strerror or error}; {so}"
             raise self._refusal(Kind.UNAVAILABLE, said) from error

@@ -16,6 +16,7 @@ from gateway.modules.rules import OutOfReach, Rules
 from gateway.modules.stop.authority import Authority
 from gateway.modules.taking_back import CLAIMED, Attempt, TakenBack
 from gateway.modules.writer import Turn, Writer
+from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoChange
 from gateway.wire import Kind, RpcError, refuse
@@ -52,7 +53,7 @@ class TrialJobs:
             self._undos.change(drop=[write])
         except OSError as error:
             text = f"the confirmation could not be recorded, it stays on trial: {error.strerror or error}"
-            self._journal.append(undo.who, "trial NOT confirmed", write=write, result=text)
+            self._journal.append(undo.who, "trial NOT confirmed", Share.ASKED, write=write, result=text)
             raise refuse(Kind.UNAVAILABLE, text) from error
         return undo.values()
 

@@ -57,15 +57,18 @@ def check(number: int, previous: str | None, data: bytes) -> tuple[Head, dict[st
     return head, fields
 
 
-def verify(lines: Iterable[bytes], head: Head | None) -> Iterator[dict[str, Any]]:
+def verify(lines: Iterable[bytes], head: Head | None, begin: Head | None = None) -> Iterator[dict[str, Any]]:
     """Every line's fields in order, each checked as it is given; `head` is where the lines must get to.
+
+    They follow `begin`, or are the first ones.
 
     Raises:
         Broken: at the first line that does not hold.
 
     """
-    now, reached = Head(), head is None or head.n == 0
-    for number, data in enumerate(lines, 1):
+    now = begin or Head()
+    reached = head is None or head.n == 0
+    for number, data in enumerate(lines, now.n + 1):
         if not data.endswith(b"\n"):
             raise Broken(f"line {number} is cut: it has no end")
         now, fields = check(number, now.hash, data[:-1])

@@ -1,121 +1,229 @@
 """The journal: who did what, when, and what came of it. Appended, made durable, hash-chained.
 
-Its own thread writes, so that a slow disk delays nobody but who chooses to wait. The newest hash is also
-kept beside the journal (`.head`), because a chain alone does not show that its end was cut off.
+Its own thread writes, all that waits at once, so that a slow disk delays nobody but who chooses to wait.
+The newest hash is also kept beside the journal (`.head`), because a chain alone does not show that its end
+was cut off. A file that has got large is closed as a piece; the oldest pieces are removed, which the journal
+says. It is read in another thread, from descriptors of its own (ADR 13).
 """
 
 import contextlib
 import logging
 import os
+import queue
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Final
 
 import msgspec
 
-from gateway.records import durable
-from gateway.records.chain import UNDECODABLE, Broken, Head, check, line, verify
+from gateway.futures import failed
+from gateway.records import durable, pieces
+from gateway.records.chain import Broken, Head, line
+from gateway.records.limits import OWN, Limits, Share, TooMany, within_limits
+from gateway.records.pieces import Entry, Piece, Tail, head_file, read_head
+from gateway.records.reading import SHORTENED, read_verified
+
+__all__ = ["Entry", "Journal", "Share", "Sizes", "Tail", "TooMany", "head_file", "read_head", "read_verified"]
 
 log = logging.getLogger(__name__)
 
-Entry = dict[str, Any]
-_TAIL_BYTES = 64 * 1024
+AT_ONCE: Final = 256  # entries that become durable together
+_CLOSED: Final = "the journal is closed, the gateway is ending"
 
 
-def head_file(journal: Path) -> Path:
-    """Where the newest hash of a journal is kept."""
-    return journal.with_name(f"{journal.name}.head")
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """How large the journal's files get, in bytes."""
+
+    piece: int = 8 * 1024 * 1024  # one that has so many is closed
+    kept: int = 256 * 1024 * 1024  # all closed ones together; the newest of them is kept in any case
 
 
-def read_head(journal: Path) -> Head | None:
-    """What the journal is known to reach; `None` where nobody wrote it down.
+@dataclass(slots=True)
+class _Waiting:
+    """An entry; or, without fields, somebody who wants to know the number of the newest."""
 
-    Raises:
-        Broken: the head's file is damaged.
-
-    """
-    try:
-        return msgspec.json.decode(head_file(journal).read_bytes(), type=Head)
-    except FileNotFoundError:
-        return None
-    except UNDECODABLE as error:
-        raise Broken(f"{head_file(journal).name} is damaged: {error}") from error
-
-
-def read_verified(journal: Path) -> list[Entry]:
-    """Every entry of a journal whose chain holds.
-
-    Raises:
-        Broken: it does not; the message says where.
-        OSError: it cannot be read.
-
-    """
-    head = read_head(journal)
-    if not journal.exists() and head is not None and head.n:
-        raise Broken(f"{journal} is missing: {head.n} entries were written")
-    with journal.open("rb") as file:
-        return list(verify(file, head))
+    fields: Entry | None
+    future: "Future[Any]" = field(default_factory=Future)
 
 
 class Journal:
     """One robot's journal; any thread may append. Where it is `unusable`, every entry fails and says so."""
 
-    def __init__(self, path: Path, boot_id: str, unusable: str | None = None) -> None:
+    def __init__(
+        self, path: Path, boot_id: str, unusable: str | None = None, sizes: Sizes | None = None
+    ) -> None:
         self.path = path
         self.problem = unusable  # why the last entry could not be written
         self._unusable = unusable
         self._boot_id = boot_id
+        self._sizes = sizes or Sizes()
         self._head = Head()
+        self._room: Entry = {}  # goes with the next entry
         self._file: BinaryIO | None = None
-        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal")
+        self._queue: queue.SimpleQueue[_Waiting | None] = queue.SimpleQueue()
+        self._limits = Limits()
+        self._limiting = threading.Lock()  # never taken for the gateway's own entries: a stop tells some
+        self._ended = False
+        self._reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="journal reader")
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
 
-    def append(self, who: str, what: str, **details: Any) -> "Future[None]":
+    def append(self, who: str, what: str, share: Share = Share.OUTCOME, /, **details: Any) -> "Future[None]":
         """Add an entry of this instant. The future is done when it is durable.
 
-        It fails with `OSError` where it cannot be written; then the journal is as it was before.
+        It fails with `OSError` where it cannot be written; then the journal is as it was before. `TooMany`
+        says that its client has written too many, as far as its `share` is limited.
         """
-        fields: Entry = {
-            "utc_ns": time.time_ns(),
-            "monotonic_ns": time.monotonic_ns(),
-            "boot_id": self._boot_id,
-            "who": who,
-            "what": what,
-            **details,
-        }
-        return self._writer.submit(self._append, fields)
+        now_ns = time.monotonic_ns()
+        fields = {**self._now(now_ns), "who": who, "what": what, **details}
+        size = 0
+        with contextlib.suppress(Exception):  # what cannot be encoded is found where it is written
+            fields, size = within_limits(fields)
+        refusal = None if who in OWN else self._refusal(who, what, share, size, now_ns)
+        return self._submit(_Waiting(fields)) if refusal is None else failed(TooMany(refusal))
 
-    def tail(self, count: int) -> "Future[list[Entry]]":
-        """The newest entries, oldest first, also those that are being written now."""
-        return self._writer.submit(lambda: self._tail(count))
+    def tail(self, count: int) -> "Future[Tail]":
+        """The newest entries, also those that are being written now; reading delays no other entry."""
+        found: Future[Tail] = Future()
+        newest: Future[int] = self._submit(_Waiting(None))
+        newest.add_done_callback(lambda newest: self._begin_reading(count, newest, found))
+        return found
 
     def close(self) -> None:
         """Write what was appended, and end. Idempotent."""
-        self._writer.shutdown(wait=True)
+        if not self._ended:
+            self._queue.put(None)
+            self._thread.join()
+            self._ended = True
+            self._fail_all()
+        self._reader.shutdown(wait=True)
         if self._file is not None:
             self._file.close()
             self._file = None
 
+    def _now(self, now_ns: int) -> Entry:
+        return {"utc_ns": time.time_ns(), "monotonic_ns": now_ns, "boot_id": self._boot_id}
+
+    def _refusal(self, who: str, what: str, share: Share, size: int, now_ns: int) -> str | None:
+        """Why it is not written; the thread learns that there is something to sum up."""
+        with self._limiting:
+            before = self._limits.patience_s(now_ns)
+            refusal = self._limits.refusal(who, what, share, size, now_ns)
+        if refusal is not None and before is None:
+            self._submit(_Waiting(None))
+        return refusal
+
+    def _submit(self, waiting: _Waiting) -> "Future[Any]":
+        self._queue.put(waiting)
+        if self._ended:
+            self._fail_all()
+        return waiting.future
+
+    def _fail_all(self) -> None:
+        """What came too late; any thread that has put something there may do it."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                late = self._queue.get_nowait()
+                if late is not None:
+                    late.future.set_exception(OSError(None, _CLOSED))
+
     # In the journal's thread.
 
-    def _append(self, fields: Entry) -> None:
+    def _run(self) -> None:
+        ended = False
+        while not ended:
+            taken = self._take()
+            ended = None in taken
+            batch = [*(one for one in taken if one is not None), *self._summaries(ended)]
+            self._do([one for one in batch if one.future.set_running_or_notify_cancel()])
+
+    def _take(self) -> list[_Waiting | None]:
+        """All that waits now, or comes before something is to be summed up; `None` is the end."""
+        with self._limiting:
+            patience_s = self._limits.patience_s(time.monotonic_ns())
+        taken: list[_Waiting | None] = []
+        with contextlib.suppress(queue.Empty):
+            taken.append(self._queue.get(timeout=patience_s))
+            while len(taken) < AT_ONCE and taken[-1] is not None:
+                taken.append(self._queue.get_nowait())
+        return taken
+
+    def _summaries(self, ended: bool) -> list[_Waiting]:
+        now_ns = time.monotonic_ns()
+        with self._limiting:
+            due = self._limits.summaries(None if ended else now_ns)
+        return [_Waiting({**self._now(now_ns), **summary}) for summary in due]
+
+    def _do(self, batch: Sequence[_Waiting]) -> None:
+        entries = [one for one in batch if one.fields is not None]
+        if entries:
+            self._write(entries)
+        asking = [one for one in batch if one.fields is None]
+        if asking:
+            self._tell_newest(asking)
+
+    def _write(self, entries: Sequence[_Waiting]) -> None:
+        """All of them at once; whoever waits is told, and what fails is logged."""
         if self._unusable is not None:
-            log.error("the journal cannot be written: %s; lost: %s", self._unusable, fields)
-            raise OSError(None, self._unusable)
+            for one in entries:
+                log.error("the journal cannot be written: %s; lost: %s", self._unusable, one.fields)
+                one.future.set_exception(OSError(None, self._unusable))
+            return
         try:
-            file = self._file or self._open()
-            data, head = line(self._head, fields)
-            with self._as_before_if_it_fails(file):
-                _append(file, data + b"\n")
-                durable.write(head_file(self.path), msgspec.json.encode(head))
-            self._head = head
-        except Exception as error:  # whatever it is, who waits is told that nothing was written
-            why = getattr(error, "strerror", None) or error
-            self.problem = f"{self.path} cannot be written: {why}; make room or correct its rights"
-            log.error("the journal: %s; lost: %s", self.problem, fields)
-            raise OSError(getattr(error, "errno", None), self.problem) from error
-        self.problem = None
+            errors = self._put(entries)
+        except Exception as error:  # noqa: BLE001 - whoever waits is told that nothing was written
+            errors = {number: error for number, _ in enumerate(entries)}
+        if len(errors) < len(entries):
+            self.problem = None
+        for number, one in enumerate(entries):
+            if number in errors:
+                self._fail(one, errors[number])
+            else:
+                one.future.set_result(None)
+
+    def _fail(self, waiting: _Waiting, error: Exception) -> None:
+        why = getattr(error, "strerror", None) or error
+        self.problem = f"{self.path} cannot be written: {why}; make room or correct its rights"
+        log.error("the journal: %s; lost: %s", self.problem, waiting.fields)
+        failure = OSError(getattr(error, "errno", None), self.problem)
+        failure.__cause__ = error
+        waiting.future.set_exception(failure)
+
+    def _put(self, entries: Sequence[_Waiting]) -> dict[int, Exception]:
+        """Append those that can be encoded; returns why the others cannot."""
+        self._make_room(self._file or self._open())
+        errors: dict[int, Exception] = {}
+        head, lines = self._head, []
+        for number, one in enumerate(entries):
+            try:
+                data, head = line(head, {**(one.fields or {}), **self._room})
+            except Exception as error:  # noqa: BLE001 - it is this entry's alone
+                errors[number] = error
+            else:
+                lines.append(data + b"\n")
+                self._room = {}
+        if lines:
+            self._append(b"".join(lines), head)
+        return errors
+
+    def _append(self, data: bytes, head: Head) -> None:
+        file = self._file or self._open()
+        with self._as_before_if_it_fails(file):
+            _append(file, data)
+            durable.write(head_file(self.path), msgspec.json.encode(head))
+        self._head = head
+
+    def _say(self, what: str, **details: Any) -> None:
+        """An entry of the journal's own."""
+        fields = {**self._now(time.monotonic_ns()), "who": "gateway", "what": what, **details}
+        data, head = line(self._head, {**fields, **self._room})
+        self._append(data + b"\n", head)
+        self._room = {}
 
     @contextlib.contextmanager
     def _as_before_if_it_fails(self, file: BinaryIO) -> Iterator[None]:
@@ -131,55 +239,139 @@ class Journal:
                 durable.write(head_file(self.path), msgspec.json.encode(self._head))
             raise
 
+    def _tell_newest(self, asking: Sequence[_Waiting]) -> None:
+        error: OSError | None = None if self._unusable is None else OSError(None, self._unusable)
+        try:
+            if error is None and self._file is None:
+                self._open()
+        except Exception as failure:  # noqa: BLE001 - it belongs to who asks
+            error = OSError(getattr(failure, "errno", None), f"{self.path} cannot be read: {failure}")
+        for one in asking:
+            if error is None:
+                one.future.set_result(self._head.n)
+            else:
+                one.future.set_exception(error)
+
+    # Opening, closing and removing pieces; in the journal's thread.
+
     def _open(self) -> BinaryIO:
         """Open it behind its last whole line; what a crash has left half-written is cut off and said."""
+        said = self._take_up()
         file = self.path.open("a+b", buffering=0)
         try:
-            said = self._take_up(file)
             durable.sync_folder(self.path.parent)
         except BaseException:
             file.close()
             raise
         self._file = file
+        self._room = _room(self.path, self._sizes)
         if said is not None:
             log.warning("the journal %s: %s", self.path, said)
-            self._append(
-                {"utc_ns": time.time_ns(), "who": "gateway", "what": "journal damaged", "result": said}
-            )
+            self._say("journal damaged", result=said)
         return file
 
-    def _take_up(self, file: BinaryIO) -> str | None:
+    def _take_up(self) -> str | None:
         """Find the newest entry; says what is wrong with the journal's end."""
-        end = _end_of_last_line(file)
-        torn = file.seek(0, os.SEEK_END) - end
-        if torn:
-            os.ftruncate(file.fileno(), end)
-        last = _last_lines(file, 1)
+        with self.path.open("a+b", buffering=0) as file:
+            end = pieces.end_of_last_line(file)
+            torn = file.seek(0, os.SEEK_END) - end
+            if torn:
+                os.ftruncate(file.fileno(), end)
         try:
-            self._head = check(0, None, last[0])[0] if last else Head()
+            last = pieces.newest_line(self.path)
+            self._head = pieces.hash_of(last) if last is not None else Head()
             known = read_head(self.path)
         except Broken as error:
-            return self._set_aside(file, str(error))
+            return self._set_aside(str(error))
         if known is not None and known.n > self._head.n:
             return f"{known.n - self._head.n} entries are missing at its end"
         return f"its last entry was cut by a crash: {torn} bytes were removed" if torn else None
 
-    def _set_aside(self, file: BinaryIO, why: str) -> str:
-        """Nothing can follow what does not hold: begin anew, and keep the old one to be looked at."""
+    def _set_aside(self, why: str) -> str:
+        """Nothing can follow what does not hold: begin anew, and keep the old one to be looked at.
+
+        The file that shows the damage goes last: after a crash in between the rest is set aside too.
+        """
         kept = self.path.with_name(f"{self.path.name}.broken-{time.time_ns()}")
-        kept.write_bytes(self.path.read_bytes())
-        os.ftruncate(file.fileno(), 0)
+        for piece in pieces.closed_pieces(self.path):
+            piece.path.replace(pieces.closed_piece(kept, piece.last).path)
+        self.path.replace(kept)
         self._head = Head()
         return f"{why}; the journal begins anew, the old one is {kept.name}"
 
-    def _tail(self, count: int) -> list[Entry]:
-        if self._unusable is not None:
-            raise OSError(None, self._unusable)
-        file = self._file or self._open()
+    def _make_room(self, file: BinaryIO) -> None:
+        """Where the file has got large: close it as a piece, and begin another one.
+
+        The old name is durable before there is a new file, so that a crash at any point leaves every line.
+        """
+        if file.seek(0, os.SEEK_END) < self._sizes.piece:
+            return
+        closed = pieces.closed_piece(self.path, self._head.n)
         try:
-            return [msgspec.json.decode(one, type=Entry) for one in _last_lines(file, count)]
-        except UNDECODABLE as error:
+            if closed.path.exists():
+                raise FileExistsError(None, f"{closed.path.name} is there already")
+            self.path.replace(closed.path)
+        except OSError as error:
+            log.warning("the journal goes on in one large file: %s", error.strerror or error)
+            return
+        self._file = None
+        file.close()
+        durable.sync_folder(self.path.parent)
+        self._open()
+        self._shorten()
+
+    def _shorten(self) -> None:
+        """Remove the oldest pieces beyond what is kept, which the journal says before."""
+        surplus = self._surplus()
+        if not surplus:
+            return
+        last = surplus[-1]
+        self._say(
+            SHORTENED,
+            up_to=last.last,
+            up_to_hash=_last_hash(last),
+            result=f"entries up to {last.last} were removed: all that is kept has {self._sizes.kept} bytes",
+        )
+        try:
+            for piece in surplus:
+                piece.path.unlink(missing_ok=True)
+            durable.sync_folder(self.path.parent)
+        except OSError as error:
+            log.warning("old pieces of the journal cannot be removed: %s", error.strerror or error)
+
+    def _surplus(self) -> list[Piece]:
+        closed = pieces.closed_pieces(self.path)
+        left = self._sizes.kept
+        for index in range(len(closed) - 1, -1, -1):
+            left -= closed[index].path.stat().st_size
+            if left < 0:
+                return closed[: min(index + 1, len(closed) - 1)]
+        return []
+
+    # In the reader's thread.
+
+    def _begin_reading(self, count: int, newest: "Future[int]", found: "Future[Tail]") -> None:
+        """In whichever thread has found out up to where it may be read."""
+        try:
+            reading = self._reader.submit(self._read, count, newest.result())
+        except Exception as error:  # noqa: BLE001 - it belongs to who asks
+            found.set_exception(error if isinstance(error, OSError) else OSError(None, _CLOSED))
+        else:
+            reading.add_done_callback(lambda reading: _pass_on(reading, found))
+
+    def _read(self, count: int, newest: int) -> Tail:
+        try:
+            return pieces.tail(self.path, count, newest)
+        except Broken as error:
             raise OSError(None, f"{self.path} is damaged: {error}") from error
+
+
+def _pass_on(reading: "Future[Tail]", found: "Future[Tail]") -> None:
+    error = reading.exception()
+    if error is None:
+        found.set_result(reading.result())
+    else:
+        found.set_exception(error)
 
 
 def _append(file: BinaryIO, data: bytes) -> None:
@@ -190,25 +382,31 @@ def _append(file: BinaryIO, data: bytes) -> None:
     os.fsync(file.fileno())
 
 
-def _end_of_last_line(file: BinaryIO) -> int:
-    end = file.seek(0, os.SEEK_END)
-    while end:
-        begin = max(0, end - _TAIL_BYTES)
-        file.seek(begin)
-        found = file.read(end - begin).rfind(b"\n")
-        if found >= 0:
-            return begin + found + 1
-        end = begin
-    return 0
+def _last_hash(piece: Piece) -> str | None:
+    """What the line after it refers to; `None` where the piece is damaged."""
+    try:
+        with piece.path.open("rb") as file:
+            last = next(pieces.lines_backwards(file), None)
+        return None if last is None else pieces.hash_of(last).hash
+    except Broken:
+        return None
 
 
-def _last_lines(file: BinaryIO, count: int) -> list[bytes]:
-    """The last whole lines, oldest first."""
-    begin = _end_of_last_line(file)
-    data = b""
-    while begin and data.count(b"\n") <= count:
-        step = min(begin, _TAIL_BYTES)
-        begin -= step
-        file.seek(begin)
-        data = file.read(step) + data
-    return data.split(b"\n")[:-1][-count:]
+def _room(journal: Path, sizes: Sizes) -> Entry:
+    """What the first entry says of the room on the journal's file system; the log where it is little."""
+    folder = journal.parent
+    try:
+        found = os.statvfs(folder)
+        has = sum(one.path.stat().st_size for one in pieces.closed_pieces(journal)) + journal.stat().st_size
+    except OSError as error:
+        log.warning("how much room there is in %s cannot be seen: %s", folder, error.strerror or error)
+        return {}
+    free, wanted = found.f_bavail * found.f_frsize, max(0, sizes.kept + 2 * sizes.piece - has)
+    if free < wanted:
+        log.warning(
+            "%d MB are free in %s, and the journal may grow by %d MB: make room; without it no write is done",
+            free // 1_000_000,
+            folder,
+            wanted // 1_000_000,
+        )
+    return {"room": {"free_bytes": free, "may_grow_bytes": wanted}}

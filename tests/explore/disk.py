@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from types import TracebackType
+from types import SimpleNamespace, TracebackType
 from typing import ClassVar, Self, cast
 
 from tests.explore.runtime import Runtime
@@ -98,6 +98,10 @@ class Disk:
             del what.file.data[size:]
         self.changed()
 
+    def room(self, _path: object) -> SimpleNamespace:
+        """`os.statvfs`, as far as it is asked for."""
+        return SimpleNamespace(f_frsize=1, f_bavail=0 if self.full else 1 << 40)
+
 
 class DiskPath(PurePosixPath):
     """As much of `pathlib.Path` as records need."""
@@ -141,6 +145,14 @@ class DiskPath(PurePosixPath):
             files.setdefault(path, File())
         self.disk.changed()
         return OpenFile(self.disk, path, self.file())
+
+    def iterdir(self) -> "Iterator[DiskPath]":
+        inside = f"{self}/"
+        names = [path for path in self.disk.files if path.startswith(inside)]
+        return iter([DiskPath(path) for path in names if "/" not in path.removeprefix(inside)])
+
+    def stat(self) -> SimpleNamespace:
+        return SimpleNamespace(st_size=len(self.file().data))
 
     def replace(self, target: "DiskPath") -> "DiskPath":
         self.disk.check(room=False)

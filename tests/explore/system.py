@@ -172,6 +172,7 @@ class System:
             close=self._close,
             fsync=disk.sync,
             ftruncate=disk.truncate,
+            statvfs=disk.room,
             sched_setscheduler=lambda *_policy: None,
         )
         self.time = _Over(time, **self._clocks())

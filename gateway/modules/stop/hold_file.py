@@ -42,6 +42,7 @@ class HoldFile:
         self._unusable = unusable
         self._wrote = wrote
         self._waiting: Future[str | None] | None = None  # for the disk to turn to it
+        self._overtaken: dict[str, HeldStop] = {}  # whose stop another's has replaced meanwhile
         self._lock = threading.Lock()
         self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="hold")
 
@@ -62,11 +63,14 @@ class HoldFile:
     def write(self, who: str, reason: str) -> None:
         """Keep it: a second stop is the same one, for another reason.
 
-        Those that come before the disk has turned to the last one are written at once.
+        Those that come before the disk has turned to the last one are written at once; `wrote` is told each
+        of those who asked.
         """
         now = HeldStop(who, reason, time.time_ns(), time.monotonic_ns(), boot_id())
         with self._lock:
             before = self.held
+            if before is not None and self._waiting is not None:
+                self._overtaken[before.who] = before
             self.held = now if before is None else msgspec.structs.replace(before, who=who, reason=reason)
             if self._waiting is None:
                 kept = self.kept = self._waiting = Future()
@@ -96,7 +100,7 @@ class HoldFile:
 
     def _write_newest(self, kept: "Future[str | None]") -> None:
         with self._lock:
-            held = self.held
+            held, overtaken, self._overtaken = self.held, self._overtaken, {}
             if self._waiting is kept:
                 self._waiting = None
         if held is None:  # it was reset before its turn came
@@ -104,6 +108,9 @@ class HoldFile:
             return
         self._keep(held)
         problem = self.problem
+        for one in overtaken.values():
+            if one.who != held.who:
+                self._wrote(one, problem)
         self._wrote(held, problem).add_done_callback(lambda _written: kept.set_result(problem))
 
     def _keep(self, held: HeldStop) -> None:

@@ -6,7 +6,7 @@ the record in that of the disk, all else in the loop.
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
@@ -31,6 +31,7 @@ from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Report, Target, stop_all
 from gateway.modules.stop.thread import Ended, StopThread
 from gateway.modules.stop.watch import LOOK_S, Watch
+from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.sources import check_globs, matches
 from gateway.wire import Kind, refuse
@@ -58,6 +59,15 @@ class Asked:
     who: str
     reason: str
     answer: "Future[messages.Stopped]" = field(default_factory=Future)
+
+
+def _newest_of_each(stops: Iterable[Asked]) -> list[Asked]:
+    """One stop of everybody, so that nobody's is lost among another's; the newest last."""
+    newest: dict[str, Asked] = {}
+    for asked in stops:
+        newest.pop(asked.who, None)
+        newest[asked.who] = asked
+    return list(newest.values())
 
 
 class StopControl:
@@ -174,12 +184,12 @@ class StopControl:
         with self.authority.settled():
             stops, self._waiting = tuple(self._waiting), []
         try:
-            recorded = [one.asked for one in stops if one.recorded]
-            if recorded:
-                self._record.write(recorded[-1].who, recorded[-1].reason)
-            else:
+            recorded = _newest_of_each(one.asked for one in stops if one.recorded)
+            for asked in recorded:
+                self._record.write(asked.who, asked.reason)
+            if not recorded:
                 newest = stops[-1].asked
-                self._journal.append(newest.who, "stopped again", reason=newest.reason)
+                self._journal.append(newest.who, "stopped again", Share.ACT, reason=newest.reason)
             self._watch.begin()
             self._claimed = self.claim()
         finally:
@@ -213,7 +223,7 @@ class StopControl:
         if isinstance(found, messages.Stopped) and newest is not None and not self._closed:
             keys = ("controllers", "fallbacks", "problem")
             more = {key: value for key in keys if (value := getattr(found, key))}
-            self._journal.append(newest.who, "stop answered", result=found.drives, **more)
+            self._journal.append(newest.who, "stop answered", Share.ACT, result=found.drives, **more)
         for one in stops:
             pass_on(stopped, one.asked.answer)
 
@@ -295,7 +305,9 @@ class StopControl:
         """The answer, once it is written down."""
         reset = messages.Reset(descent.drives, descent.problems, held=self.held)
         problems = {"problems": reset.problems} if reset.problems else {}
-        written = self._journal.append(who, "reset", result=reset.drives, held=reset.held, **problems)
+        written = self._journal.append(
+            who, "reset", Share.ACT, result=reset.drives, held=reset.held, **problems
+        )
         return then(back(self._loop, gather({"journal": written})), lambda _written: reset)
 
     def _begin(self, what: Input, asked_ns: int) -> int:
@@ -352,7 +364,9 @@ class StopControl:
 
     def _explained(self, who: str, joints: list[str], enabling: Enabling) -> "Future[messages.Enabled]":
         """What cannot be journaled is not begun."""
-        entry = gather({"journal": back(self._loop, self._journal.append(who, "enabling", joints=joints))})
+        entry = gather(
+            {"journal": back(self._loop, self._journal.append(who, "enabling", Share.ASKED, joints=joints))}
+        )
 
         def begin(written: Mapping[str, Exception | None]) -> "Future[messages.Enabled]":
             error = written["journal"]
@@ -389,7 +403,7 @@ class StopControl:
     def _wrote(self, held: HeldStop, problem: str | None) -> "Future[None]":
         """In the disk's thread: the record is there, or it is known why not."""
         details = {} if problem is None else {"problem": problem}
-        return self._journal.append(held.who, "stop", reason=held.reason, **details)
+        return self._journal.append(held.who, "stop", Share.ACT, reason=held.reason, **details)
 
     def _tell_again(self, target: str, times: int) -> None:
         self._journal.append(GATEWAY, "stopped again", drive=target, times=times)

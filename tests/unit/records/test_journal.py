@@ -48,13 +48,14 @@ def test_entries_follow_each_other_over_restarts(path: Path) -> None:
 def test_the_tail_has_what_was_just_appended(journal: Journal) -> None:
     for number in range(200):
         journal.append("tester", "note", result="x" * number)
-    entries = journal.tail(150).result(20)
+    entries, cut = journal.tail(150).result(20)
+    assert cut is None
     assert [entry["n"] for entry in entries] == list(range(51, 201))
-    assert [entry["n"] for entry in journal.tail(1000).result(20)] == list(range(1, 201))
+    assert [entry["n"] for entry in journal.tail(1000).result(20).entries] == list(range(1, 201))
 
 
 def test_the_tail_of_an_empty_journal_is_empty(journal: Journal) -> None:
-    assert journal.tail(10).result(10) == []
+    assert journal.tail(10).result(10) == ([], None)
 
 
 def test_every_single_altered_byte_is_found(path: Path) -> None:
@@ -122,7 +123,7 @@ def test_a_damaged_line_in_the_tail_is_said(journal: Journal, path: Path) -> Non
     fill(path, 3)
     whole = path.read_bytes()
     path.write_bytes(whole.replace(b"tester", b"t\xffster", 1))
-    assert len(journal.tail(2).result(10)) == 2
+    assert len(journal.tail(2).result(10).entries) == 2
     with pytest.raises(OSError, match="is damaged"):
         journal.tail(3).result(10)
 
