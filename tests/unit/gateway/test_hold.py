@@ -1,5 +1,6 @@
 """A held stop on disk: written after the stop has acted, found by the next gateway, never silently lost."""
 
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
@@ -9,10 +10,23 @@ from typing import Any
 import pytest
 
 from drivers.joint.quick_stop import StopOutcome
+from gateway.modules.stop.hold_file import HeldStop, HoldFile
+from gateway.modules.stop.stop_control import Asked, _newest_of_each
 from gateway.records import durable
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
-from tests.unit.gateway.harness import DISABLED, ENABLED, HEAD, ROBOT, Bench, Client, config, serving, until
+from tests.unit.gateway.harness import (
+    DEADLINE_S,
+    DISABLED,
+    ENABLED,
+    HEAD,
+    ROBOT,
+    Bench,
+    Client,
+    config,
+    serving,
+    until,
+)
 
 LINGER = ROBOT.replace("linger_s = 0.05", 'linger_s = 0\nrecords = "records"')
 
@@ -56,6 +70,33 @@ def test_a_stop_is_journaled_with_who_why_and_what_came_of_it(bench: Bench, tmp_
     assert stop["reason"] == "the patient stumbles"
     assert stop["who"].startswith("desk (")
     assert answered["result"] == {"left_knee": "confirmed", "right_knee": "unconfirmed"}
+
+
+def test_nobodys_stop_is_lost_in_the_journal_among_anothers(tmp_path: Path) -> None:
+    """Those that come while the disk is busy are written at once; each of those who asked is told."""
+    told: list[tuple[str, str]] = []
+    busy, written = threading.Event(), Future[None]()
+    written.set_result(None)
+
+    def wrote(held: HeldStop, _problem: str | None) -> "Future[None]":
+        busy.wait(DEADLINE_S)
+        told.append((held.who, held.reason))
+        return written
+
+    hold = HoldFile(tmp_path / "stop.json", None, wrote)
+    for who, reason in (("ben", "a"), ("ben", "b"), ("ada", "1"), ("cleo", "c"), ("ada", "2"), ("ada", "3")):
+        hold.write(who, reason)
+    busy.set()
+    hold.close()
+    assert {who for who, _ in told} == {"ben", "ada", "cleo"}
+    assert told[-1] == ("ada", "3")
+    assert ("ben", "b") in told
+
+
+def test_stops_at_one_time_are_one_stop_and_an_entry_of_everybody() -> None:
+    stops = [Asked("ben", "b"), *(Asked("ada", str(number)) for number in range(9))]
+    found = _newest_of_each([*stops, Asked("cleo", "c"), stops[1]])
+    assert [(one.who, one.reason) for one in found] == [("ben", "b"), ("cleo", "c"), ("ada", "0")]
 
 
 def test_the_next_gateway_holds_it_without_any_client(bench: Bench, tmp_path: Path) -> None:

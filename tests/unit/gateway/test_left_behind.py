@@ -11,7 +11,8 @@ import pytest
 from drivers.component import Kind
 from gateway.modules.stop.authority import Address
 from gateway.records import durable
-from gateway.records.journal import Journal
+from gateway.records.journal import Journal, Share
+from gateway.records.limits import ENTRIES_AT_ONCE
 from tests.unit.gateway.harness import Bench, Client, config, serving, until
 from tests.unit.gateway.tuned import (
     CYCLE,
@@ -185,8 +186,8 @@ def test_whatever_is_begun_has_its_end_in_the_journal_wherever_the_gateway_is_ki
     append, replace = Journal.append, durable.write
     remove = durable.remove
 
-    def tell(self: Journal, who: str, what: str, **details: Any) -> Any:
-        appended = append(self, who, what, **details)
+    def tell(self: Journal, who: str, what: str, *share: Any, **details: Any) -> Any:
+        appended = append(self, who, what, *share, **details)
         appended.add_done_callback(lambda _done: happened.append(what))
         return appended
 
@@ -235,6 +236,31 @@ def test_a_write_that_cannot_be_journaled_leaves_nothing_to_be_taken_back(
     assert [what for what, _index, _data in bench.gait.node.log].count(
         "upload"
     ) == 3  # nothing was taken back
+
+
+def test_a_write_beyond_what_one_client_may_write_down_is_refused_and_not_done(
+    robot: Tuned, bench: Bench
+) -> None:
+    for _ in range(ENTRIES_AT_ONCE + 1):
+        robot.records.journal.append("tester", "lease taken", Share.ASKED)
+    error = robot.refused(robot.writing({CYCLE_TIME: 1.3}))
+    assert error.kind == "unavailable"
+    assert "nothing was written: tester has written more than the journal takes" in str(error)
+    assert "try again in" in str(error)
+    assert bench.gait.node.written() == []
+    assert robot.undos() == []
+    robot.session.who = "somebody else"
+    robot.write({CYCLE_TIME: 1.3})
+    assert len(robot.told("write", "write done")) == 2
+
+
+def test_what_came_of_a_write_is_told_however_much_its_client_has_written_meanwhile(
+    robot: Tuned, bench: Bench
+) -> None:
+    for _ in range(ENTRIES_AT_ONCE - 1):
+        robot.records.journal.append("tester", "lease taken", Share.ASKED)
+    robot.write({CYCLE_TIME: 1.3})
+    assert len(robot.told("write", "write done")) == 2
 
 
 def test_a_write_whose_end_cannot_be_kept_is_taken_back(

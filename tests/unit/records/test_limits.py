@@ -1,5 +1,6 @@
 """What one client may write in the journal: its flood is counted, and loses nothing of what others did."""
 
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
 import pytest
 
 from gateway.records import journal as module
@@ -22,6 +24,7 @@ from gateway.records.limits import (
     LEFT_OUT,
     WHO_BYTES,
     Limits,
+    _LeftOut,
     client,
     within_limits,
 )
@@ -70,20 +73,27 @@ def test_a_flood_is_summed_up_when_it_goes_on_and_when_nothing_else_happens(
     journal: Journal, clock: SimpleNamespace
 ) -> None:
     flood(journal)
+    journal.tail(1).result(10)  # as long as the clock stands, nothing is due
     clock.now_ns += 6 * SECOND_NS
     journal.append(BEN, "lease taken", Share.ASKED).result(10)
     entries, _ = journal.tail(3).result(10)
     assert [entry["what"] for entry in entries[-2:]] == ["lease taken", LEFT_OUT]
 
 
-def test_the_thread_wakes_by_itself_to_sum_up(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.records.limits.SUM_UP_S", 0.0)
+def test_a_flood_that_nothing_follows_is_summed_up_by_itself(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.records.limits.SUM_UP_S", 0.05)
+    summed, entry = threading.Event(), _LeftOut.entry
+
+    def told(self: _LeftOut, whose: str) -> dict[str, Any]:
+        summed.set()
+        return entry(self, whose)
+
+    monkeypatch.setattr(_LeftOut, "entry", told)
     journal = Journal(path, "boot")
     flood(journal)
-    summed = threading.Event()
-    while not summed.is_set():
-        if journal.tail(1000).result(10).entries[-1]["what"] == LEFT_OUT:
-            summed.set()
+    assert summed.wait(10)
     journal.close()
 
 
@@ -189,7 +199,7 @@ def test_a_queue_of_entries_delays_the_next_by_no_more_than_two_syncs(
 ) -> None:
     journal = Journal(path, "boot")
     journal.append(ADA, "first").result(10)
-    go_on, syncs, fsync = threading.Event(), [0], module.os.fsync
+    go_on, syncs, fsync = threading.Event(), [0], os.fsync
 
     def counted(descriptor: int) -> None:
         syncs[0] += 1
@@ -259,7 +269,7 @@ def test_a_field_that_is_too_long_is_cut_and_says_so(journal: Journal, path: Pat
     kept = entry["reason"]
     assert type(kept) is type(value)
     assert kept == (dict(list(value.items())[: len(kept)]) if isinstance(kept, dict) else value[: len(kept)])
-    assert 0.5 * FIELD_BYTES < len(module.msgspec.json.encode(kept)) <= FIELD_BYTES
+    assert 0.5 * FIELD_BYTES < len(msgspec.json.encode(kept)) <= FIELD_BYTES
     assert f"{len(value) - len(kept)} of {len(value)}" in entry["cut"]["reason"]
     assert entry["result"] == "done"
 

@@ -3,7 +3,7 @@
 import io
 import itertools
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -366,12 +366,12 @@ def test_entries_of_several_pieces_hold_together_at_the_desk(path: Path) -> None
 
 
 @pytest.fixture
-def roomy(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], None]]:
+def roomy(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     def has(free: int) -> None:
         status = os.statvfs_result((1, 1, 0, 0, free, 0, 0, 0, 0, 255))
         monkeypatch.setattr("gateway.records.journal.os.statvfs", lambda _path: status)
 
-    yield has
+    return has
 
 
 def test_the_first_entry_says_how_much_room_is_left(path: Path, roomy: Callable[[int], None]) -> None:
