@@ -11,10 +11,10 @@ from gateway.cli.reach import choose, parser, reach
 from gateway.cli.text import say, say_json, table, warn
 from gateway.records.chain import Broken
 from gateway.records.folder import RecordsFolder
-from gateway.records.journal import read_verified
+from gateway.records.reading import verified
 
 VERIFY_EPILOG = """Run it on the robot's own computer, or on a copy of journal.jsonl with journal.jsonl.head
-beside it."""
+and its older pieces (journal.jsonl.NUMBER) beside it."""
 
 _SHOWN_APART = ("n", "utc_ns", "monotonic_ns", "boot_id", "who", "what", "previous", "hash")
 
@@ -33,12 +33,14 @@ def tail(argv: list[str]) -> int:
     made.add_argument("-n", type=int, default=20, metavar="N", help="how many, at most 1000 (default 20)")
     arguments = made.parse_args(argv)
     with reach(arguments, "journal") as robot:
-        entries = robot.journal(arguments.n).entries
+        found = robot.journal(arguments.n)
     if arguments.json:
-        for entry in entries:
+        for entry in found.entries:
             say_json(entry)
     else:
-        say(table(("N", "TIME (UTC)", "WHO", "WHAT", ""), map(_row, entries), right=(0,)))
+        say(table(("N", "TIME (UTC)", "WHO", "WHAT", ""), map(_row, found.entries), right=(0,)))
+    if found.cut is not None:
+        warn("journal", f"there is more: {found.cut}")
     return 0
 
 
@@ -68,7 +70,7 @@ def verify(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     path = _journal(arguments.path)
     try:
-        entries = read_verified(path)
+        count, unseen = _count(path)
     except FileNotFoundError:
         warn("journal", f"there is no journal at {path}: name robot.toml, its records folder, or the file")
         return 2
@@ -78,10 +80,21 @@ def verify(argv: list[str]) -> int:
         warn("journal", f"{path} is NOT intact: {error}")
         return 1
     if arguments.json:
-        say_json({"path": str(path), "intact": True, "entries": len(entries)})
-    else:
-        say(f"{path} is intact: {len(entries)} entries, each in its place and unaltered\n")
+        say_json({"path": str(path), "intact": True, "entries": count, "removed": unseen})
+        return 0
+    say(f"{path} is intact: {count} entries, each in its place and unaltered\n")
+    if unseen:
+        say(f"entries 1 to {unseen} could not be seen: the journal says that it has removed them for room\n")
     return 0
+
+
+def _count(path: Path) -> tuple[int, int]:
+    """How many entries there are, and how many were before them."""
+    count = unseen = 0
+    for entry in verified(path):
+        unseen = entry["n"] - 1 if count == 0 else unseen
+        count += 1
+    return count, unseen
 
 
 def _journal(path: Path) -> Path:

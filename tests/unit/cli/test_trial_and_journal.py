@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gateway.main import main
-from gateway.records.journal import Journal
+from gateway.records.journal import Journal, Sizes, read_verified
 from tests.fake_robot import FakeRobot, Refusal
 
 
@@ -81,6 +81,30 @@ def test_the_journals_tail_is_a_table_or_lines(robot: FakeRobot, capsys: pytest.
     assert "3  2023-11-14 22:13:20.000  gwrms set  write done  after=a.b: 7" in capsys.readouterr().out
     assert main(["journal", "tail", "--json", "--robot", robot.address]) == 0
     assert '"after":{"a.b":20}' in capsys.readouterr().out
+
+
+def test_a_tail_that_was_cut_says_so(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.overrides["journal.tail"] = lambda _params: {"entries": [], "cut": "these 0 of 20 fill the answer"}
+    assert main(["journal", "tail", "--robot", robot.address]) == 0
+    assert "there is more: these 0 of 20 fill the answer" in capsys.readouterr().err
+
+
+def test_a_journal_in_pieces_is_verified_and_what_was_removed_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    journal = Journal(path, "boot", sizes=Sizes(piece=1000, kept=3000))
+    for _ in range(40):
+        journal.append("tester", "note").result(10)
+    journal.close()
+    removed = read_verified(path)[0]["n"] - 1
+    assert main(["journal", "verify", str(tmp_path)]) == 0
+    assert f"entries 1 to {removed} could not be seen" in capsys.readouterr().out
+    assert main(["journal", "verify", str(tmp_path), "--json"]) == 0
+    assert f'"removed":{removed}' in capsys.readouterr().out
+    min(tmp_path.glob("journal.jsonl.0*")).unlink()
+    assert main(["journal", "verify", str(tmp_path)]) == 1
+    assert "does not say that it removed them" in capsys.readouterr().err
 
 
 @pytest.fixture
