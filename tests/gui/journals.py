@@ -41,5 +41,5 @@ class RobotsJournal:
 
     def told(self, count: int = 1000) -> Journalled:
         """The newest entries as they come over the wire."""
-        line = msgspec.json.encode(JournalEntries(self._journal.tail(count).result()))
+        line = msgspec.json.encode(JournalEntries(*self._journal.tail(count).result()))
         return Journalled(msgspec.json.decode(line, type=JournalEntries))

@@ -248,10 +248,10 @@ def test_a_drive_that_was_enabled_while_the_command_was_recorded_is_not_disturbe
 ) -> None:
     append = Journal.append
 
-    def slow(self: Journal, who: str, what: str, **details: Any) -> Any:
+    def slow(self: Journal, who: str, what: str, *share: Any, **details: Any) -> Any:
         if what == "store":
             resting.left.set_state(ENABLED)
-        return append(self, who, what, **details)
+        return append(self, who, what, *share, **details)
 
     monkeypatch.setattr(Journal, "append", slow)
     with tuned(tmp_path) as robot:
