@@ -157,6 +157,8 @@ class Journal:
         now_ns = time.monotonic_ns()
         with self._limiting:
             due = self._limits.summaries(None if ended else now_ns)
+        for summary in due:
+            log.warning("the journal: %s", summary["result"])
         return [_Waiting({**self._now(now_ns), **summary}) for summary in due]
 
     def _do(self, batch: Sequence[_Waiting]) -> None:
