@@ -140,7 +140,7 @@ class Journal:
             taken = self._take()
             ended = None in taken
             batch = [*(one for one in taken if one is not None), *self._summaries(ended)]
-            self._do([one for one in batch if one.future.set_running_or_notify_cancel()])
+            self._do_whatever_comes([one for one in batch if one.future.set_running_or_notify_cancel()])
 
     def _take(self) -> list[_Waiting | None]:
         """All that waits now, or comes before something is to be summed up; `None` is the end."""
@@ -160,6 +160,16 @@ class Journal:
         for summary in due:
             log.warning("the journal: %s", summary["result"])
         return [_Waiting({**self._now(now_ns), **summary}) for summary in due]
+
+    def _do_whatever_comes(self, batch: Sequence[_Waiting]) -> None:
+        """The thread outlives every failure, and nobody waits for ever."""
+        try:
+            self._do(batch)
+        except Exception as error:
+            log.exception("the journal's thread failed")
+            for one in batch:
+                if not one.future.done():
+                    one.future.set_exception(OSError(None, f"the journal failed: {error}"))
 
     def _do(self, batch: Sequence[_Waiting]) -> None:
         entries = [one for one in batch if one.fields is not None]

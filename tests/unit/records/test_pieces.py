@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from gateway.records import durable, journal, pieces
-from gateway.records.chain import Broken
+from gateway.records.chain import Broken, Head, line
 from gateway.records.journal import Journal, Sizes, head_file, read_verified
 from gateway.records.reading import SHORTENED
 from server_gui.core.desk import chains
@@ -101,6 +101,20 @@ def test_what_somebody_else_removed_is_not_taken_for_removed_by_the_journal(path
     closed(path)[0].unlink()
     with pytest.raises(Broken, match="does not say that it removed them"):
         read_verified(path)
+
+
+def test_what_is_left_follows_the_line_that_the_journal_says_it_removed(path: Path) -> None:
+    fill(path, 100, TIGHT)
+    entries = read_verified(path)
+    head, forged = Head(entries[0]["n"] - 1, "f" * 64), b""
+    for entry in entries:
+        fields = {key: value for key, value in entry.items() if key not in ("n", "previous", "hash")}
+        data, head = line(head, fields)
+        forged += data + b"\n"
+    anew = path.with_name("forged.jsonl")
+    anew.write_bytes(forged)
+    with pytest.raises(Broken, match="does not follow the line that was removed before it"):
+        read_verified(anew)
 
 
 # A crash at any point of the rotation
@@ -259,6 +273,9 @@ class Copied(bytes):
         made.file = file
         return made
 
+    def split(self, *arguments: Any) -> "list[Copied]":  # type: ignore[override]
+        return [Copied(one, self.file) for one in super().split(*arguments)]
+
     def __add__(self, other: Any) -> "Copied":
         self.file.copied += len(self) + len(other)
         return Copied(bytes(self) + bytes(other), self.file)
@@ -270,6 +287,21 @@ def test_lines_are_read_backwards_each_byte_once() -> None:
     assert list(pieces.lines_backwards(file)) == lines[::-1]
     assert file.bytes_read <= 5_100_000
     assert file.copied == 0
+
+
+def test_a_long_line_is_put_together_once() -> None:
+    line = b"x" * 8_000_000
+    file = Counting(line + b"\n")
+    assert list(pieces.lines_backwards(file)) == [line]
+    assert file.copied == 0
+
+
+def test_a_line_longer_than_any_that_was_written_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pieces, "LINE_BYTES", 1_000_000)
+    file = Counting(b"x" * 8_000_000 + b"\n")
+    with pytest.raises(Broken, match="more than 1000000 bytes"):
+        list(pieces.lines_backwards(file))
+    assert file.bytes_read <= 1_500_000
 
 
 @pytest.mark.parametrize("size", [0, 1, 5, 65535, 65536, 65537, 300_000])
