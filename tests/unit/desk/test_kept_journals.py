@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from gateway.records.journal import Journal, Sizes
 from ml.store import Store, StoreError
 from server_gui.core.background import Background
 from server_gui.core.desk import kept_journals as module
@@ -85,6 +86,19 @@ def test_what_was_altered_shows_and_so_does_an_entry_that_is_there_in_two_versio
     both = chained([*entries(journal), *entries(fork)])
     fork.close()
     assert problem(both) == "entry 4 is there in two versions"
+
+
+def test_entries_of_several_pieces_hold_together(tmp_path: Path) -> None:
+    (tmp_path / "pieces").mkdir()
+    journal = Journal(tmp_path / "pieces" / "journal.jsonl", "boot", sizes=Sizes(piece=2000))
+    for _ in range(40):
+        journal.append("tester", "note").result(10)
+    known = [entry for count in (40, 20, 5) for entry in journal.tail(count).result(10).entries]
+    journal.close()
+    assert len(list((tmp_path / "pieces").glob("journal.jsonl.0*"))) > 3
+    (stretch,) = chained(known)
+    assert [entry["n"] for entry in stretch] == list(range(1, 41))
+    assert problem([stretch]) is None
 
 
 @pytest.mark.parametrize("sent", [True, False])

@@ -13,7 +13,6 @@ from gateway.records import durable, journal, pieces
 from gateway.records.chain import Broken, Head, line
 from gateway.records.journal import Journal, Sizes, head_file, read_verified
 from gateway.records.reading import SHORTENED
-from server_gui.core.desk import chains
 
 SMALL = Sizes(piece=2000, kept=1_000_000)
 TIGHT = Sizes(piece=2000, kept=5000)
@@ -382,16 +381,6 @@ def test_verifying_opens_anew_where_a_piece_was_closed_meanwhile(
 
     monkeypatch.setattr(Path, "open", rotating)
     assert numbers(path) == list(range(1, 41))
-
-
-def test_entries_of_several_pieces_hold_together_at_the_desk(path: Path) -> None:
-    fill(path)
-    journal = Journal(path, "boot", sizes=SMALL)
-    known = [entry for count in (40, 20, 5) for entry in journal.tail(count).result(10).entries]
-    journal.close()
-    (stretch,) = chains.chained(known)
-    assert [entry["n"] for entry in stretch] == list(range(1, 41))
-    assert chains.problem([stretch]) is None
 
 
 # Room
