@@ -615,7 +615,7 @@ class Enabled(Struct, frozen=True):
 
 
 class JournalEntries(Struct, frozen=True):
-    """Result of `journal.tail`: the newest entries, oldest first; `cut` says why there are fewer than could be."""
+    """Result of `journal.tail`: the newest entries, oldest first; `cut` says why there are not more."""
 
     entries: list[dict[str, Any]]
     cut: str | None = None
