@@ -211,7 +211,10 @@ class Inlet:
         heard = Heard()
         newest = next((one for one in reversed(lines) if isinstance(one, wire.StopRequest)), None)
         answer = None if newest is None else self._stop(newest)  # those of one read are one stop
+        asked_ns = heard.stamp_ns  # before that stop
         for line in lines:
+            if line is newest:
+                asked_ns = time.monotonic_ns()  # what follows was asked for after it
             if isinstance(line, wire.StopRequest):
                 if self._has_room:
                     heard.stops.append(Stopping(line, answer))
@@ -222,7 +225,7 @@ class Inlet:
                 self.unanswered += 1
             elif not self._is_full:
                 self._bad += isinstance(line, wire.BadLine) or not line.startswith(b"{")
-                heard.lines.append((time.monotonic_ns(), line))
+                heard.lines.append((asked_ns, line))
                 self._handed += 1
                 self._handed_bytes += wire.size(line)
             elif self._has_room:

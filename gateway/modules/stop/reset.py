@@ -11,7 +11,7 @@ from functools import partial
 
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import OVERTAKEN, Led
-from gateway.futures import back, done, failed, gather, then
+from gateway.futures import back, done, failed, gather, then, within
 from gateway.loop import Loop
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
@@ -22,6 +22,10 @@ from gateway.modules.stop.target import stop_all
 AT_REST = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})
 NOT_SINCE = "it was not read at rest since the last stop, or since it was last seen enabled or booting"
 NOT_STOPPED = "it does not hold the value that stops it"
+# How long a controller may take to tell: where one out of reach is asked to stop again and again, because it
+# enables drives, its reading has no turn, and the reset must end for these to be watched as usual.
+LOOK_S = 2.0
+_UNREAD = Finding(at_rest=False, asked_ns=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +67,10 @@ class Lowering:
 
     def _look(self, led: Mapping[str, Led | Exception]) -> "Future[Descent]":
         drives = back(self._loop, gather({name: _call(drive.look) for name, drive in self._drives.items()}))
-        controllers = {name: one.look() for name, one in self._controllers.items()}
+        controllers = {
+            name: within(self._loop, back(self._loop, one.look()), LOOK_S, _UNREAD)
+            for name, one in self._controllers.items()
+        }
         return then(
             drives,
             lambda seen: then(
@@ -84,7 +91,7 @@ class Lowering:
             if not isinstance(one, Finding):
                 problems[name] = str(one)
             elif not one.at_rest:
-                problems[name] = NOT_STOPPED
+                problems[name] = f"it was not read within {LOOK_S:g} s" if one is _UNREAD else NOT_STOPPED
         problems |= {name: why for name, why in self._absent.items() if name not in last}
         findings = {name: Finding(one.state in AT_REST, one.asked_ns) for name, one in last.items()}
         findings |= {name: one for name, one in found.items() if isinstance(one, Finding)}

@@ -1,13 +1,20 @@
 """The watch over a held stop: whom it asks to stop again, and whom it leaves alone for a while."""
 
+from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
+from drivers.joint.quick_stop import StopOutcome
+from gateway.futures import done
+from gateway.loop import Loop
 from gateway.modules.stop.authority import Authority
-from gateway.modules.stop.machine import Input
+from gateway.modules.stop.controllers import Controllers
+from gateway.modules.stop.machine import Finding, Input
+from gateway.modules.stop.reset import Lowering
 from gateway.modules.stop.stopper import Stopper
+from gateway.modules.stop.target import Report
 from gateway.modules.stop.watch import AT_LEAST_S, LOOK_S, Watch
 
 
@@ -54,3 +61,22 @@ def test_another_node_does_not() -> None:
     first, second = Unseen(object(), LOOK_S), Unseen(object(), 0.0)
     look(first=first, second=second)
     assert (first.asked, second.asked) == (1, 0)
+
+
+def test_a_controller_that_is_only_asked_to_stop_keeps_no_reset_from_its_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It enables drives and cannot be reached: each of its stops goes ahead of the reading."""
+    monkeypatch.setattr("gateway.modules.stop.reset.LOOK_S", 0.05)
+    loop = Loop()
+    never: Future[Finding] = Future()
+    gait = SimpleNamespace(stop=lambda **_how: done(Report(StopOutcome.UNREACHABLE)), wake=lambda: None)
+    gait.look = lambda: never
+    controllers = cast("Controllers", SimpleNamespace(targets={"gait": gait}, absent={}))
+    found = Lowering(loop, {}, {}, controllers).run(lambda: True)
+    found.add_done_callback(lambda _found: loop.stop())
+    loop.call_later(30.0, loop.stop)
+    loop.run()
+    assert found.result(0).problems == {"gait": "it was not read within 0.05 s"}
+    assert not found.result(0).findings["gait"].at_rest
+    loop.close()
