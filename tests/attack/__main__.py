@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import signal
 import sys
 from dataclasses import asdict
 
@@ -50,6 +51,7 @@ def _show(result: Result, columns: tuple[str, ...]) -> None:
 def main() -> int:
     """Exit code: 0, or 1 where a limit was not kept."""
     options = _options()
+    signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(1))  # what was started ends too
     if options.list:
         for name, attack in ATTACKS.items():
             _write(f"{name:<{NAME_WIDTH}}{attack.about}")

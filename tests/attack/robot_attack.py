@@ -274,7 +274,11 @@ def _judged(
         "rss_mb": dict(zip(("before", "peak", "after"), memory, strict=True)),
         "told": asdict(said),
     }
-    broken = tuple(_broken(more_ms, attacked, memory))
+    anyway = set(_broken_in(quiet))  # then this machine is too busy to tell
+    broken = tuple(
+        f"{limit} (without it too)" if limit in anyway else limit
+        for limit in _broken(more_ms, attacked, memory)
+    )
     return Result(name, COLUMNS, cells, broken, said.text, figures)
 
 
@@ -282,15 +286,20 @@ def _broken(more_ms: float, attacked: Phase, memory: tuple[float, float, float])
     """The limits that were not kept. A comparison with no number is not kept."""
     if not more_ms <= STOP_LIMIT_MS:
         yield "stop"
-    if attacked.refused:
-        yield "refused"
-    if attacked.guard_missed or not max(attacked.guard_ms, default=float("nan")) <= GUARD_LIMIT_MS:
-        yield "guard"
-    if not attacked.gap_ms <= ARMED_MS:
-        yield "heartbeat"
-    if attacked.lost:
-        yield "rows"
-    if attacked.streams["ended"]:
-        yield "streams ended"
+    yield from _broken_in(attacked)
     if not memory[2] <= MEMORY_LIMIT * memory[0]:
         yield "memory"
+
+
+def _broken_in(phase: Phase) -> Iterator[str]:
+    """Those that need no comparison."""
+    if phase.refused:
+        yield "refused"
+    if phase.guard_missed or not max(phase.guard_ms, default=float("nan")) <= GUARD_LIMIT_MS:
+        yield "guard"
+    if not phase.gap_ms <= ARMED_MS:
+        yield "heartbeat"
+    if phase.lost:
+        yield "rows"
+    if phase.streams["ended"]:
+        yield "streams ended"

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from tests.attack import calls, connections, devices, lines, resting, strangers
 from tests.attack.attack import Attack
 
-_MODULES: tuple[tuple[Attack, ...], ...] = (
+MODULES: tuple[tuple[Attack, ...], ...] = (
     connections.ATTACKS,
     lines.ATTACKS,
     calls.ATTACKS,
@@ -13,4 +13,4 @@ _MODULES: tuple[tuple[Attack, ...], ...] = (
     devices.ATTACKS,
     resting.ATTACKS,
 )
-ATTACKS: Mapping[str, Attack] = {attack.name: attack for module in _MODULES for attack in module}
+ATTACKS: Mapping[str, Attack] = {attack.name: attack for module in MODULES for attack in module}
