@@ -7,14 +7,22 @@ from tests.attack.robot_file import PARAMETER
 
 GLOB_BYTES = 60_000
 STREAMS, STREAMERS = 32, 8
-GLOB = request("component.snapshot", channels=["a*" + "b" * GLOB_BYTES])
-GLOBS = request("component.snapshot", channels=[f"*a{number}*b*{'c' * 44}" for number in range(1000)])
-STARS = request("component.snapshot", channels=["*a" * (GLOB_BYTES // 2)])
+
+
+def _matched(*globs: str) -> bytes:
+    """Against every channel, and against every parameter."""
+    return request("component.snapshot", channels=globs) + request("parameter.list", names=globs)
+
+
+GLOB = _matched("a*" + "b" * GLOB_BYTES)
+GLOBS = _matched(*(f"*a{number}*b*{'c' * 44}" for number in range(1000)))
+STARS = _matched("*a" * (GLOB_BYTES // 2))
 NAMES = (
     request("hello", client="n" * GLOB_BYTES)
     + request("control.acquire", ttl_s=5)
     + request("control.release")
 )
+READS = request("parameter.read", names=["*"])
 TAIL = request("journal.tail", n=1000)
 WRITES = request("control.acquire", ttl_s=60) + b"".join(
     request("parameter.write", changes={PARAMETER: value}) for value in range(100)
@@ -45,5 +53,6 @@ ATTACKS = (
     Strike("streams", f"{STREAMS} distinct 1 kHz streams from each of {STREAMERS}", streams),
     Strike("names", "names of 60 kB, lease taken and given back", Lines(NAMES, 4)),
     Strike("tail", "the longest journal.tail, 4 clients", Lines(TAIL, 4)),
+    Strike("reads", "every parameter from its drive, 4 clients", Lines(READS, 4)),
     Strike("writes", "parameter.write, 4 clients", Lines(WRITES, 4)),
 )

@@ -26,7 +26,7 @@ from tests.unit.gateway.harness import Client, until
 pytestmark = pytest.mark.timeout(120)
 
 RATE = 400.0  # TPDOs a second, for slow machines
-SECONDS = 1.0
+SECONDS = 0.7
 NODES = tuple(range(1, 9))
 LONGEST_NAME = 1000  # characters, of whatever a client calls itself; no limit need be so wide
 
@@ -73,23 +73,19 @@ def assert_unharmed(phase: Phase) -> None:
 
 @pytest.mark.parametrize("name", ["idle", "slow-loris", "odd-numbers", "tls", "ssh"])
 def test_who_says_little_costs_nobody_a_stop_or_a_row(victim: Robot, name: str) -> None:
-    phase, _ = struck(victim, name)
+    phase, said = struck(victim, name)
     assert_unharmed(phase)
     assert phase.lost == 0
+    assert said.text
 
 
-@pytest.mark.parametrize("name", ["newlines", "nested", "long-line", "stops", "ones-16", "never-read"])
+@pytest.mark.parametrize("name", ["newlines", "nested", "long-line", "stops", "ones-16"])
 def test_who_says_much_costs_nobody_a_stop_or_the_stream(victim: Robot, name: str) -> None:
     phase, _ = struck(victim, name)
     assert_unharmed(phase)
 
 
-def test_who_takes_every_place_is_told_or_sent_away(victim: Robot) -> None:
-    _, said = struck(victim, "idle")
-    assert said.answered or said.ended
-
-
-@pytest.mark.parametrize("name", ["sdo-answers", "life-noise", "emcy-flood"])
+@pytest.mark.parametrize("name", ["sdo-answers", "life-noise"])
 def test_every_drive_that_is_not_to_blame_is_stopped(victim: Robot, name: str) -> None:
     attack = ATTACKS[name]
     assert isinstance(attack, DeviceAttack)
