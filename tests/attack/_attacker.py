@@ -17,7 +17,7 @@ NICE = 15
 
 def main() -> None:
     name, port, seconds = sys.argv[1:]
-    os.nice(NICE)
+    os.setpriority(os.PRIO_PROCESS, 0, NICE)
     attack = ATTACKS[name]
     if not isinstance(attack, Strike):
         raise SystemExit(f"{name} is no attack by clients")

@@ -32,7 +32,8 @@ class Result:
     columns: tuple[str, ...]
     cells: tuple[str, ...]
     broken: tuple[str, ...]
-    told: str
+    told: str  # to the attacker
+    notes: tuple[str, ...] = ()  # what the columns do not say
     figures: Mapping[str, Any] = field(default_factory=dict)  # for machines
 
 

@@ -123,7 +123,15 @@ def _judged(
         f"{rest_s:.1f}",
     )
     figures = {"quiet": quiet.__dict__, "attacked": attacked.__dict__, "told": said.__dict__}
-    return Result(name, COLUMNS, cells, tuple(_broken(more_ms, attacked, rest)), said.text, figures)
+    return Result(
+        name,
+        COLUMNS,
+        cells,
+        tuple(_broken(more_ms, attacked, rest)),
+        said.text,
+        tuple(attacked.refused[:1]),
+        figures,
+    )
 
 
 def _broken(more_ms: float, attacked: _Stops, rest: tuple[float, float, float]) -> Iterator[str]:

@@ -11,12 +11,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from hil_sim.sensors.suite import SensorChoice
 from tests.attack.attack import DeviceAttack, Lengths, Result, Strike
 from tests.attack.barrage import Said, printable
+from tests.attack.machine import BUSY_MS, Stalls
 from tests.attack.robot import SOON_S, Robot, robot
 from tests.attack.robot_file import ARMED_MS
 from tests.bench._drives import DRIVES
@@ -56,11 +57,13 @@ class Phase:
     """What was measured in one part of the run."""
 
     stops_ms: list[float] = field(default_factory=list)
+    newcomers_ms: list[float] = field(default_factory=list)  # those of them by newcomers
     answers_ms: list[float] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)  # why
     guard_ms: list[float] = field(default_factory=list)
     guard_missed: int = 0
     gap_ms: float = 0.0
+    stall_ms: float = 0.0  # of the machine
     streams: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -79,6 +82,15 @@ class Stopping:
 
     def measure(self, seconds: float) -> Phase:
         """Stops and trips for so long."""
+        stalls = Stalls()
+        stalls.start()
+        try:
+            phase = self._measured(seconds)
+        finally:
+            stall_ms = stalls.stop()
+        return replace(phase, stall_ms=stall_ms)
+
+    def _measured(self, seconds: float) -> Phase:
         phase, until = Phase(), time.monotonic() + seconds
         self._victim.streams.report()
         self._victim.bus.take_gap_ms()
@@ -100,7 +112,9 @@ class Stopping:
         if place in _GUARDS:
             self._trip(phase)
         elif place in _NEWCOMERS:
+            before = len(phase.stops_ms)
             self._stop(phase, self._newcomer)
+            phase.newcomers_ms += phase.stops_ms[before:]
         else:
             self._stop(phase, self._resident)
 
@@ -219,9 +233,7 @@ def _changed(victim: Robot, early: Said) -> tuple[str, ...]:
 
 
 def _with(result: Result, broken: tuple[str, ...]) -> Result:
-    return Result(
-        result.name, result.columns, result.cells, (*result.broken, *broken), result.told, result.figures
-    )
+    return replace(result, broken=(*result.broken, *broken))
 
 
 class _Run:
@@ -279,7 +291,16 @@ def _judged(
         f"{limit} (without it too)" if limit in anyway else limit
         for limit in _broken(more_ms, attacked, memory)
     )
-    return Result(name, COLUMNS, cells, broken, said.text, figures)
+    return Result(name, COLUMNS, cells, broken, said.text, tuple(_notes(attacked)), figures)
+
+
+def _notes(attacked: Phase) -> Iterator[str]:
+    if attacked.stall_ms > BUSY_MS:
+        yield f"this machine kept an ordinary thread waiting for {attacked.stall_ms:.0f} ms"
+    if attacked.refused:
+        yield f"refused: {printable(attacked.refused[0])}"
+    for who, times_ms in (("answers", attacked.answers_ms), ("newcomers' stops", attacked.newcomers_ms)):
+        yield f"{who}: p50 {percentile(times_ms, 0.5):.1f} ms, p99 {percentile(times_ms, 0.99):.1f} ms"
 
 
 def _broken(more_ms: float, attacked: Phase, memory: tuple[float, float, float]) -> Iterator[str]:

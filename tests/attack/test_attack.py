@@ -152,7 +152,12 @@ def test_what_an_attacker_was_told_fits_into_a_row() -> None:
 
 
 def test_each_limit_is_judged() -> None:
-    well = Phase([1.0], [1.0], [], [5.0], 0, 101.0, {"lost": 0, "gaps": 0, "ended": 0})
+    well = Phase(
+        stops_ms=[1.0],
+        guard_ms=[5.0],
+        gap_ms=101.0,
+        streams={"lost": 0, "gaps": 0, "ended": 0},
+    )
     memory = (40.0, 90.0, 47.0)
     assert list(robot_attack._broken(19.0, well, memory)) == []
     assert list(robot_attack._broken(float("nan"), well, memory)) == ["stop"]
