@@ -4,6 +4,8 @@ A parser does no I/O. `feed` takes bytes as they come and returns the frames the
 not depend on where the stream was cut. The memory it keeps is bounded by its format's longest frame.
 """
 
+from collections import deque
+from heapq import heappop, heappush
 from typing import Generic, Protocol, TypeVar
 
 import msgspec
@@ -45,8 +47,15 @@ class Parser(Protocol[F]):
         ...
 
 
-UNKNOWN = 0  # more bytes are needed to know the length
-IMPOSSIBLE = -1  # no frame begins here
+IMPOSSIBLE = 0  # no frame begins here
+_ASK, _END = 0, 1  # what is due at a place: a beginning's length is asked for (first), or its frame ends
+GRANT = 64  # bytes that may be looked at again for each that comes
+SAVED = 1 << 18  # of those, the most that are kept for later
+
+
+def needs(count: int) -> int:
+    """What a format says of a length that so many bytes of the frame will tell more about."""
+    return -count
 
 
 class FrameScanner(Generic[F]):
@@ -54,6 +63,10 @@ class FrameScanner(Generic[F]):
 
     Every place where a frame could begin is followed at once, and the first one to end with a right
     checksum wins. So a damaged length never holds up the frames behind it.
+
+    Bytes that are made to look like many beginnings cost no more than others: what could be a frame is due
+    where it ends, and is looked at as long as all that was looked at is at most `GRANT` times what came.
+    Streams of real devices stay far below that.
     """
 
     sync = b""  # what every frame begins with
@@ -62,36 +75,36 @@ class FrameScanner(Generic[F]):
 
     def __init__(self) -> None:
         self.counters = Counters()
+        self.looked_at = 0  # bytes of what could have been frames; a measure of the work
         self._buffer = bytearray()
-        self.frame_end = 0  # where the last valid frame ended; a stream's start counts as one
-        self._begin = 0  # everything before it is dealt with
-        self._searched = 0  # everything before it is searched for beginnings
-        self._candidates: list[int] = []
+        self._cut = 0  # bytes that came before the buffer; places are counted from the stream's start
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        self._ended = self._cut  # where the last valid frame ended; a stream's start counts as one
+        self._begin = self._cut  # everything before it is dealt with
+        self._searched = self._cut  # everything before it is searched for beginnings
+        self._due: list[tuple[int, int, int]] = []  # a heap: place, what is due there, the frame's beginning
+        self._open: deque[int] = deque()  # beginnings in their order, ...
+        self._closed: set[int] = set()  # ... those of them that are none after all
+        self._granted, self._paid_to = SAVED, self._cut
 
     def feed(self, data: bytes) -> list[F]:
         """The frames that `data` completes, in the order of the stream."""
         self._buffer += data
         frames: list[F] = []
-        while (found := self._in_step() or self._first_complete()) is not None:
-            start, end = found
-            frame = self._decode(bytes(self._buffer[start:end]))
-            if frame is None:
-                self._candidates.remove(start)
-                continue
-            self._drop_until(start)
-            self._begin = self._searched = self.frame_end = end
-            self._candidates.clear()
-            self.counters.frames += 1
+        while (frame := self._in_step()) is not None or (frame := self._next()) is not None:
             frames.append(frame)
+        self.counters.frames += len(frames)
         self._trim()
         return frames
 
     def finish(self) -> list[F]:
         """End of the stream: what remains is dropped."""
-        self._drop_until(len(self._buffer))
+        self._drop_until(self._cut + len(self._buffer))
         self._buffer.clear()
-        self._candidates.clear()
-        self._begin = self._searched = self.frame_end = 0
+        self._cut = 0
+        self._begin_anew()
         self._restart()
         return []
 
@@ -99,7 +112,7 @@ class FrameScanner(Generic[F]):
         """Another stream begins."""
 
     def _length(self, buffer: bytearray, start: int) -> int:
-        """Length of the frame that begins at `start`, or UNKNOWN, or IMPOSSIBLE."""
+        """Length of the frame that begins at `start` in `buffer`, or `needs(…)`, or IMPOSSIBLE."""
         raise NotImplementedError
 
     def _decode(self, raw: bytes) -> F | None:
@@ -110,64 +123,112 @@ class FrameScanner(Generic[F]):
         """Where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
         return buffer.find(self.sync, start, end + len(self.sync) - 1)
 
-    def _in_step(self) -> tuple[int, int] | None:
+    @property
+    def frame_end(self) -> int:
+        """Where in the buffer the last valid frame ended."""
+        return self._ended - self._cut
+
+    def _in_step(self) -> F | None:
         """The frame that begins where the last one ended, if no other could end before it: the usual case."""
-        start, buffer = self._begin, self._buffer
-        if self._candidates or self._searched != start or not buffer.startswith(self.sync, start):
+        start, buffer = self._begin - self._cut, self._buffer
+        if self._open or self._searched != self._begin or not buffer.startswith(self.sync, start):
             return None
         end = start + (self.constant_length or self._length(buffer, start))
         if not start < end <= len(buffer):
             return None
         if not self.constant_length and self._find(buffer, start + 1, end) >= 0:
             return None
-        self._candidates.append(start)
-        self._searched = start + 1
-        return start, end
+        end += self._cut
+        frame = self._look_at(self._begin, end)
+        if frame is None:
+            self._searched += 1
+        else:
+            self._begin = self._searched = self._ended = end
+        return frame
 
-    def _first_complete(self) -> tuple[int, int] | None:
-        """Start and end of the candidate that ends first, if any has ended."""
-        best: tuple[int, int] | None = None
-        index = 0
-        limit = len(self._buffer)  # what begins behind the best one's end cannot end before it
-        while index < len(self._candidates) or self._discover(limit):
-            start = self._candidates[index]
-            if start >= limit:
-                break
-            length = self._length(self._buffer, start)
-            if length == IMPOSSIBLE:
-                del self._candidates[index]
-                continue
-            end = start + length
-            if length != UNKNOWN and (end < limit or (best is None and end == limit)):
-                best, limit = (start, end), end
-            index += 1
-        return best
+    def _next(self) -> F | None:
+        """The valid frame that ends first, if one has ended."""
+        end_of_data = self._cut + len(self._buffer)
+        while True:
+            place = self._due[0][0] if self._due else end_of_data
+            if self._discover(min(place, end_of_data)):
+                continue  # what begins before the place may be due before it
+            if not self._due or place > end_of_data:
+                return None
+            place, what, start = heappop(self._due)
+            if what == _ASK:
+                self._ask(start)
+            elif (frame := self._look_at(start, place)) is not None:
+                self._go_on_behind(start, place)
+                return frame
+            else:
+                self._close(start)
 
     def _discover(self, limit: int) -> bool:
         """Follow the next place before `limit` where a frame could begin, if there is one."""
-        start = self._find(self._buffer, self._searched, limit)
-        if start < 0:
+        if self._searched >= limit:
+            return False
+        found = self._find(self._buffer, self._searched - self._cut, limit - self._cut)
+        if found < 0:
             self._searched = max(self._searched, limit - len(self.sync) + 1)
             return False
-        self._candidates.append(start)
+        start = self._cut + found
         self._searched = start + 1
+        self._open.append(start)
+        self._ask(start)
         return True
+
+    def _ask(self, start: int) -> None:
+        """How long the frame is that begins at `start`."""
+        length = self._length(self._buffer, start - self._cut)
+        if length == IMPOSSIBLE:
+            self._close(start)
+        elif length < 0:
+            heappush(self._due, (start - length, _ASK, start))
+        else:
+            heappush(self._due, (start + length, _END, start))
+
+    def _may_look_at(self, start: int, end: int) -> bool:
+        """Whether what was looked at leaves room for it."""
+        if end > self._paid_to:
+            self._granted = min(SAVED, self._granted + GRANT * (end - self._paid_to))
+            self._paid_to = end
+        if end - start > self._granted:
+            return False
+        self._granted -= end - start
+        return True
+
+    def _look_at(self, start: int, end: int) -> F | None:
+        if not self._may_look_at(start, end):
+            return None
+        self.looked_at += end - start
+        return self._decode(bytes(self._buffer[start - self._cut : end - self._cut]))
+
+    def _go_on_behind(self, start: int, end: int) -> None:
+        """A valid frame was there: what began before its end is none."""
+        self._drop_until(start)
+        self._begin = self._searched = self._ended = end
+        self._due.clear()
+        self._open.clear()
+        self._closed.clear()
+
+    def _close(self, start: int) -> None:
+        self._closed.add(start)
+        while self._open and self._open[0] in self._closed:
+            self._closed.remove(self._open.popleft())
 
     def _drop_until(self, end: int) -> None:
         if end > self._begin:
-            skipped = bytes(self._buffer[self._begin : end])
+            skipped = bytes(self._buffer[self._begin - self._cut : end - self._cut])
             self.counters.bytes_dropped += len(skipped.strip(self.idle) if self.idle else skipped)
             self._begin = end
 
     def _trim(self) -> None:
-        keep = self._candidates[0] if self._candidates else self._searched
+        keep = self._open[0] if self._open else self._searched
         self._drop_until(keep)
-        if keep:
-            del self._buffer[:keep]
-            self._candidates = [start - keep for start in self._candidates]
-            self._searched -= keep
-            self.frame_end -= keep
-            self._begin = 0
+        if keep > self._cut:
+            del self._buffer[: keep - self._cut]
+            self._cut = keep
 
 
 class Sequence:
@@ -217,7 +278,7 @@ class Sequence:
 
 
 class DelimitedParser(Generic[F]):
-    """Base of formats whose frames end with a delimiter that occurs nowhere else."""
+    """Base of formats whose frames end with a delimiter, one byte that occurs nowhere else."""
 
     delimiter = b"\0"
     longest = 4096  # bytes of a frame without its delimiter; longer ones are dropped
@@ -229,18 +290,23 @@ class DelimitedParser(Generic[F]):
 
     def feed(self, data: bytes) -> list[F]:
         """The frames that `data` completes, in the order of the stream."""
-        self._buffer += data
-        *complete, rest = bytes(self._buffer).split(self.delimiter)
-        frames = [frame for raw in complete for frame in self._take(raw)]
-        if len(rest) > self.longest:
-            self.counters.bytes_dropped += len(rest)
-            self._overlong, rest = True, b""
-        self._buffer[:] = rest
+        *ended, rest = data.split(self.delimiter)
+        frames: list[F] = []
+        for piece in ended:
+            self._buffer += piece
+            frames += self._take(bytes(self._buffer))
+            self._buffer.clear()
+        self._buffer += rest
+        if len(self._buffer) > self.longest:
+            self.counters.bytes_dropped += len(self._buffer)
+            self._overlong = True
+            self._buffer.clear()
         return frames
 
     def finish(self) -> list[F]:
         """End of the stream: what remains is a frame whose delimiter is missing, or nothing."""
         frames = self.feed(self.delimiter) if self._buffer else []
+        self._overlong = False
         self._restart()
         return frames
 
@@ -252,7 +318,8 @@ class DelimitedParser(Generic[F]):
         raise NotImplementedError
 
     def _take(self, raw: bytes) -> list[F]:
-        frames = [] if not raw else None if self._overlong else self._decode(raw)
+        overlong = self._overlong or len(raw) > self.longest
+        frames = [] if not raw else None if overlong else self._decode(raw)
         self._overlong = False
         if frames is None:
             self.counters.bytes_dropped += len(raw)

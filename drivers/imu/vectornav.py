@@ -9,6 +9,7 @@ The sensor's axes are x forward, y right, z down, and its world is north-east-do
 
 import binascii
 import math
+import re
 import struct
 from functools import reduce
 from operator import xor
@@ -16,13 +17,14 @@ from operator import xor
 from drivers.clock import ClockSpec
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
-from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
+from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 BINARY, ASCII = 0xFA, ord("$")
 LONGEST_ASCII = 256
 TESLA_PER_GAUSS = 1e-4
 CLOCK = ClockSpec(1_000_000_000, 1 << 64)  # time since start-up
 IN_A_MESSAGE = bytes(byte for byte in range(0x20, 0x7F) if byte != ASCII)  # between `$` and `*`
+BEGINNING = re.compile(rb"[$\xfa]")
 HEX_DIGITS = frozenset(b"0123456789ABCDEFabcdef")
 
 # What the values of an ASCII message are, in order.
@@ -86,8 +88,8 @@ class VectornavParser(FrameScanner[ImuFrame]):
         return frames
 
     def _find(self, buffer: bytearray, start: int, end: int) -> int:
-        found = [at for first in (ASCII, BINARY) if (at := buffer.find(first, start, end)) >= 0]
-        return min(found, default=-1)
+        found = BEGINNING.search(buffer, start, end)
+        return -1 if found is None else found.start()
 
     def _length(self, buffer: bytearray, start: int) -> int:
         return (_binary_length if buffer[start] == BINARY else _ascii_length)(buffer, start)
@@ -130,27 +132,29 @@ class VectornavParser(FrameScanner[ImuFrame]):
 
 def _ascii_length(buffer: bytearray, start: int) -> int:
     """Up to the checksum's last digit; the byte behind it tells whether it has two or four."""
+    so_far = len(buffer) - start
     star = buffer.find(b"*", start, start + LONGEST_ASCII)
     body = buffer[start + 1 : star if star >= 0 else start + LONGEST_ASCII]
     if body.translate(None, IN_A_MESSAGE):
         return IMPOSSIBLE
     if star < 0:
-        return UNKNOWN if len(buffer) < start + LONGEST_ASCII else IMPOSSIBLE
+        return needs(so_far + 1) if so_far < LONGEST_ASCII else IMPOSSIBLE
     digits = buffer[star + 1 : star + 6]
     count = next((at for at, byte in enumerate(digits) if byte not in HEX_DIGITS), len(digits))
     if count == len(digits) and count < 5:
-        return UNKNOWN
+        return needs(so_far + 1)
     return star + 1 + count - start if count in (2, 4) else IMPOSSIBLE
 
 
 def _binary_length(buffer: bytearray, start: int) -> int:
     if len(buffer) < start + 2:
-        return UNKNOWN
+        return needs(2)
     groups = buffer[start + 1]
     if groups == 0 or groups >> len(GROUPS):
         return IMPOSSIBLE
-    if len(buffer) < start + 2 + 2 * groups.bit_count():
-        return UNKNOWN
+    head = 2 + 2 * groups.bit_count()
+    if len(buffer) < start + head:
+        return needs(head)
     fields, end = _layout(buffer, start)
     return end + 2 - start if fields and all(size for _, _, size in fields) else IMPOSSIBLE
 

@@ -9,7 +9,7 @@ import struct
 
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
-from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
+from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 LENGTH = 11
 HEAD = 2  # bytes before the words
@@ -37,7 +37,7 @@ class WitmotionParser(FrameScanner[ImuFrame]):
 
     def _length(self, buffer: bytearray, start: int) -> int:
         if len(buffer) < start + 2:
-            return UNKNOWN
+            return needs(2)
         return LENGTH if buffer[start + 1] in KINDS else IMPOSSIBLE
 
     def _decode(self, raw: bytes) -> ImuFrame | None:

@@ -9,7 +9,7 @@ import struct
 
 from drivers.imu.frame import ImuFrame
 from drivers.imu.witmotion import KINDS, vectors
-from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
+from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 HEAD = 0x55
 LENGTH = 8
@@ -42,13 +42,13 @@ class WitmotionCanParser(FrameScanner[ImuFrame]):
     def _length(self, buffer: bytearray, start: int) -> int:
         behind = start + LENGTH
         if len(buffer) < start + 2:
-            return UNKNOWN
+            return needs(2)
         if not _is_head(buffer, start):
             return IMPOSSIBLE
         if start == self.frame_end:
             return LENGTH
         if len(buffer) < behind + 2:
-            return UNKNOWN
+            return needs(LENGTH + 2)
         return LENGTH if _is_head(buffer, behind) else IMPOSSIBLE
 
     def _decode(self, raw: bytes) -> ImuFrame | None:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from drivers.clock import ClockSpec
 from drivers.imu.frame import ImuFrame, More
-from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner, Sequence
+from drivers.parsing import IMPOSSIBLE, FrameScanner, Sequence, needs
 
 MTDATA2 = 0x36
 MESSAGES = {
@@ -100,12 +100,12 @@ class XsensParser(FrameScanner[ImuFrame]):
         self._sequence.restart()
 
     def _length(self, buffer: bytearray, start: int) -> int:
-        if len(buffer) < start + 6:
-            return (
-                UNKNOWN if len(buffer) < start + 4 or buffer[start + 3] == EXTENDED else 5 + buffer[start + 3]
-            )
+        if len(buffer) < start + 4:
+            return needs(4)
         if buffer[start + 3] != EXTENDED:
             return 5 + buffer[start + 3]
+        if len(buffer) < start + 6:
+            return needs(6)
         payload = int.from_bytes(buffer[start + 4 : start + 6], "big")
         return 7 + payload if payload <= LONGEST_PAYLOAD else IMPOSSIBLE
 

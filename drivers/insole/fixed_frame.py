@@ -11,7 +11,7 @@ from drivers.insole.description import Flag, FrameDescription
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Foot
 from drivers.insole.order import Order
-from drivers.parsing import IMPOSSIBLE, UNKNOWN, FrameScanner
+from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 REALS = ("f32", "f64")
 LONGEST = 4096
@@ -28,12 +28,19 @@ LETTERS = {
 Numbers = tuple[float, ...]
 
 
+def _modbus_of(byte: int) -> int:
+    for _ in range(8):
+        byte = byte >> 1 ^ (0xA001 if byte & 1 else 0)
+    return byte
+
+
+_MODBUS = tuple(map(_modbus_of, range(256)))
+
+
 def _crc16_modbus(data: bytes) -> int:
     crc = 0xFFFF
     for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+        crc = crc >> 8 ^ _MODBUS[(crc ^ byte) & 0xFF]
     return crc
 
 
@@ -88,7 +95,7 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
                 return IMPOSSIBLE
             if field.name in self._counting:
                 if len(buffer) < at + layout.size:
-                    return UNKNOWN
+                    return needs(at + layout.size - start)
                 counts[field.name] = int(layout.unpack_from(buffer, at)[0])
             at += layout.size
         return at + self._tail - start

@@ -1,4 +1,4 @@
-"""What every format does at the end of a stream: the next one may count anew."""
+"""What every format does at the end of a stream, and with lines that are too long."""
 
 from typing import Any
 
@@ -6,6 +6,8 @@ import pytest
 
 from drivers.imu.formats import FORMATS
 from drivers.insole import layout as layouts
+from drivers.insole.csv_lines import InsoleCsvParser
+from drivers.insole.description import CsvDescription
 from drivers.insole.formats import parser_maker
 from drivers.parsing import Parser
 from tests.unit.port.streams import Make
@@ -29,3 +31,23 @@ def test_a_stream_that_begins_again_is_not_late_and_the_counters_go_on(name: str
     assert len(first) == len(second) > 50
     assert parser.counters.out_of_order == 0
     assert parser.counters.frames == len(first) + len(second)
+
+
+def csv_parser() -> InsoleCsvParser:
+    return InsoleCsvParser(CsvDescription())
+
+
+def test_a_line_that_is_too_long_is_dropped_however_it_comes() -> None:
+    stream = b"ch1,ch2\n1,2\n" + b"3," * InsoleCsvParser.longest + b"4\n5,6\n"
+    for size in (1, 100, len(stream)):
+        parser = csv_parser()
+        frames = [one for at in range(0, len(stream), size) for one in parser.feed(stream[at : at + size])]
+        assert [frame.cells for frame in frames] == [(1, 2), (5, 6)], f"in pieces of {size}"
+
+
+def test_a_line_that_the_end_has_cut_off_does_not_cost_the_next_stream_its_first() -> None:
+    parser = csv_parser()
+    parser.feed(b"9" * (InsoleCsvParser.longest + 1))
+    assert parser.finish() == []
+    parser.feed(b"ch1,ch2\n")
+    assert [frame.cells for frame in parser.feed(b"1,2\n")] == [(1, 2)]
