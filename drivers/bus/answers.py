@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from drivers.bus.doubles import Doubles
 from drivers.bus.outstanding import Outstanding
 
-INBOX = 64  # responses that wait; what comes beyond is lost, which is as if it never came
+# Responses that wait. Of a flood the first are kept, in their order: what answers a request comes before what
+# is sent behind it without being asked. What comes beyond is lost, which is as if it never came: its request
+# stays outstanding.
+INBOX = 64
 
 
 @dataclass(slots=True)
@@ -55,8 +58,9 @@ class Answers:
             self._inbox.put(response)
 
     def wake(self) -> None:
-        """Let `fetch` return."""
-        self._inbox.put(None)
+        """Let `fetch` return, as it does anyway where something waits for it."""
+        if self._inbox.empty():
+            self._inbox.put(None)
 
     def fetch_waiting(self) -> None:
         """Assign all that have come."""

@@ -50,9 +50,10 @@ def frame_of(message: str, stamp_ns: int) -> Frame | None:
         data = bytes.fromhex("".join(words[3:]))
     except ValueError:
         return None
-    if len(data) > 8 or can_id > 0x1FFF_FFFF:
+    is_standard = len(words[1]) <= 3
+    if len(data) > 8 or not 0 <= can_id <= (0x7FF if is_standard else 0x1FFF_FFFF):
         return None
-    return stamp_ns, can_id if len(words[1]) <= 3 else can_id | EXTENDED, data
+    return stamp_ns, can_id if is_standard else can_id | EXTENDED, data
 
 
 def send_message(can_id: int, data: bytes) -> str:

@@ -47,7 +47,7 @@ class UndoChange(msgspec.Struct, frozen=True):
 class Undo(msgspec.Struct, frozen=True):
     """One write, its changes in the order of their downloads."""
 
-    write: int
+    write: Annotated[int, msgspec.Meta(ge=0, lt=1 << 62)]  # later writes are numbered on from there
     who: str
     utc_ns: int
     trial: bool

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import queue
 import struct
 from collections.abc import Callable
 
@@ -9,7 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus.answers import INBOX
+from drivers.bus import sdo
+from drivers.bus.answers import INBOX, Answers, SdoCounters
+from drivers.bus.outstanding import Outstanding
 from drivers.bus.sdo_channel import OUT_OF_SYNC, SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, Unavailable
 from tests.unit.bus.direct import Direct
@@ -349,6 +352,29 @@ def test_responses_that_nobody_fetches_are_bounded_and_counted() -> None:
     assert server.channel.counters.dropped == 100
     assert number(server.channel.upload(CLOCK, 0)) == 1
     assert server.channel.counters.stale == INBOX
+
+
+def test_of_a_flood_that_nobody_fetches_the_first_are_kept() -> None:
+    """The late answer to what was asked comes before what somebody else sends behind it."""
+    counters = SdoCounters()
+    outstanding = Outstanding()
+    asked = outstanding.add(sdo.multiplexer(0x6041, 0), next(sdo.upload(0x6041, 0)))
+    answers = Answers(outstanding, counters)
+    answers.put(b"\x4b\x41\x60\0" + bytes(4))
+    for _ in range(10_000):
+        answers.put(b"\x4b\x41\x60\0\1\0\0\0")
+    answers.fetch_waiting()
+    assert asked.answer == b"\x4b\x41\x60\0" + bytes(4)
+    assert (counters.stale, counters.dropped) == (INBOX - 1, 10_001 - INBOX)
+
+
+def test_waking_who_does_not_fetch_leaves_one_thing_to_fetch() -> None:
+    answers = Answers(Outstanding(), SdoCounters())
+    for _ in range(10_000):
+        answers.wake()
+    answers.fetch(deadline=0.0)
+    with pytest.raises(queue.Empty):
+        answers.fetch(deadline=0.0)
 
 
 def test_second_answers_are_counted() -> None:
