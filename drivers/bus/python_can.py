@@ -12,6 +12,8 @@ from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 
 _NEVER_BLOCKS = ("virtual",)
+_DAMAGED = (ValueError, IndexError)  # what python-can raises for a line of an adapter that is none
+MAX_PENDING = 4096  # bytes of such a line without its end
 WRITE_S = 0.1  # how long an adapter may take for one frame, also for its last one
 
 
@@ -20,7 +22,7 @@ class PythonCanTransport:
 
     def __init__(self, settings: CanSettings) -> None:
         """Open it; raises `Unavailable`."""
-        self.dropped = 0  # python-can does not tell
+        self.dropped = 0  # what an adapter said that is no frame; python-can tells of no others
         self.warning: str | None = None
         self.blocks = settings.interface not in _NEVER_BLOCKS
         self._where = f"{settings.interface} channel {settings.channel}"
@@ -37,9 +39,14 @@ class PythonCanTransport:
     def receive(self, timeout_s: float) -> Sequence[Frame]:
         try:
             message = self._bus.recv(timeout_s)
-        except (can.CanError, OSError, ValueError) as error:
-            raise Unavailable(f"{self._where} is gone: {error}") from error
+        except (can.CanError, OSError, *_DAMAGED) as error:
+            self._drop_line(error)
+            return ()
         if message is None:
+            self._bound_line()
+            return ()
+        if not _is_possible(message):
+            self.dropped += 1
             return ()
         return ((time.monotonic_ns(), _identifier(message), bytes(message.data)),)
 
@@ -75,11 +82,36 @@ class PythonCanTransport:
             for port in self._serial_ports():
                 port.close()
 
+    def _drop_line(self, error: Exception) -> None:
+        """One of an adapter on a serial port costs only itself; python-can would keep what it cannot read."""
+        is_damaged = isinstance(error, _DAMAGED) or isinstance(error.__cause__, UnicodeDecodeError)
+        pending = getattr(self._bus, "_buffer", None)
+        if not is_damaged or not isinstance(pending, bytearray):
+            raise Unavailable(f"{self._where} is gone: {error}") from error
+        pending.clear()
+        self.dropped += 1
+
+    def _bound_line(self) -> None:
+        """An adapter that never ends its line must not fill the memory."""
+        pending = getattr(self._bus, "_buffer", None)
+        if isinstance(pending, bytearray) and len(pending) > MAX_PENDING:
+            pending.clear()
+            self.dropped += 1
+
     def _serial_ports(self) -> Iterator[Any]:
         """Of an adapter on one; pyserial would write to it for ever."""
         serial = sys.modules.get("serial")
         if serial is not None:
             yield from (one for one in vars(self._bus).values() if isinstance(one, serial.Serial))
+
+
+def _is_possible(message: can.Message) -> bool:
+    """Whether it is a classic frame whose parts fit together: a damaged line can say anything."""
+    if message.is_error_frame:
+        return True
+    highest = 0x1FFF_FFFF if message.is_extended_id else 0x7FF
+    told = 0 if message.is_remote_frame else message.dlc
+    return 0 <= message.arbitration_id <= highest and len(message.data) == told <= 8
 
 
 def _identifier(message: can.Message) -> int:
