@@ -84,7 +84,8 @@ class FrameScanner(Generic[F]):
         self._ended = self._cut  # where the last valid frame ended; a stream's start counts as one
         self._begin = self._cut  # everything before it is dealt with
         self._searched = self._cut  # everything before it is searched for beginnings
-        self._due: list[tuple[int, int, int]] = []  # a heap: place, what is due there, the frame's beginning
+        # A heap: place, what is due there, the frame's beginning, its end.
+        self._due: list[tuple[int, int, int, int]] = []
         self._open: deque[int] = deque()  # beginnings in their order, ...
         self._closed: set[int] = set()  # ... those of them that are none after all
         self._granted, self._paid_to = SAVED, self._cut
@@ -114,6 +115,10 @@ class FrameScanner(Generic[F]):
     def _length(self, buffer: bytearray, start: int) -> int:
         """Length of the frame that begins at `start` in `buffer`, or `needs(…)`, or IMPOSSIBLE."""
         raise NotImplementedError
+
+    def _looks_behind(self, start: int) -> int:  # noqa: ARG002 - most do not
+        """How many bytes behind its end the length of the frame at `start` depends on."""
+        return 0
 
     def _decode(self, raw: bytes) -> F | None:
         """The frame in `raw`; `None`, with the reason counted, where it is not valid."""
@@ -155,11 +160,11 @@ class FrameScanner(Generic[F]):
                 continue  # what begins before the place may be due before it
             if not self._due or place > end_of_data:
                 return None
-            place, what, start = heappop(self._due)
+            _, what, start, end = heappop(self._due)
             if what == _ASK:
                 self._ask(start)
-            elif (frame := self._look_at(start, place)) is not None:
-                self._go_on_behind(start, place)
+            elif (frame := self._look_at(start, end)) is not None:
+                self._go_on_behind(start, end)
                 return frame
             else:
                 self._close(start)
@@ -184,9 +189,10 @@ class FrameScanner(Generic[F]):
         if length == IMPOSSIBLE:
             self._close(start)
         elif length < 0:
-            heappush(self._due, (start - length, _ASK, start))
+            heappush(self._due, (start - length, _ASK, start, 0))
         else:
-            heappush(self._due, (start + length, _END, start))
+            behind = self._looks_behind(start - self._cut)
+            heappush(self._due, (start + length + behind, _END, start, start + length))
 
     def _may_look_at(self, start: int, end: int) -> bool:
         """Whether what was looked at leaves room for it."""
@@ -219,8 +225,8 @@ class FrameScanner(Generic[F]):
 
     def _drop_until(self, end: int) -> None:
         if end > self._begin:
-            skipped = bytes(self._buffer[self._begin - self._cut : end - self._cut])
-            self.counters.bytes_dropped += len(skipped.strip(self.idle) if self.idle else skipped)
+            skipped = self._buffer[self._begin - self._cut : end - self._cut]
+            self.counters.bytes_dropped += len(skipped.translate(None, self.idle))
             self._begin = end
 
     def _trim(self) -> None:

@@ -51,6 +51,9 @@ class WitmotionCanParser(FrameScanner[ImuFrame]):
             return needs(LENGTH + 2)
         return LENGTH if _is_head(buffer, behind) else IMPOSSIBLE
 
+    def _looks_behind(self, start: int) -> int:
+        return 0 if start == self.frame_end else 2
+
     def _decode(self, raw: bytes) -> ImuFrame | None:
         return decode(raw)
 

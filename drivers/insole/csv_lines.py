@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from drivers.insole.description import SECONDS, Column, CsvDescription, Flag
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Foot
-from drivers.insole.order import Order
+from drivers.insole.order import LARGEST, Order
 from drivers.parsing import DelimitedParser
 
 # What a header's column means where the description does not say.
@@ -72,8 +72,9 @@ class InsoleCsvParser(DelimitedParser[InsoleFrame]):
     def _frames(self, row: list[str], columns: Columns) -> list[InsoleFrame] | None:
         """The feet of one line; `None` where a field is not what it should be."""
         try:
-            sequence = None if columns.sequence is None else int(row[columns.sequence])
-            ticks = None if columns.time is None else round(float(row[columns.time]) * columns.second * 1e6)
+            sequence = None if columns.sequence is None else _whole(int(row[columns.sequence]))
+            time = None if columns.time is None else float(row[columns.time])
+            ticks = None if time is None else _whole(round(time * columns.second * 1e6))
             means = {flag.means for place, flag in columns.flags if _is_set(flag, row[place])}
             cells = {foot: [_number(row[at]) for at in places] for foot, places in columns.cells.items()}
             foot = None if columns.foot is None else self._foot(row[columns.foot])
@@ -160,9 +161,17 @@ def _cells(wanted: str | tuple[Column, ...], places: Mapping[str, int]) -> tuple
     return tuple(place for place in found if place is not None) if None not in found else ()
 
 
-def _numbers_in(text: str) -> list[int]:
-    """What names are ordered by, so that ch2 comes before ch10."""
-    return [int(digits) for digits in re.findall(r"\d+", text)]
+def _numbers_in(text: str) -> list[tuple[int, str]]:
+    """What names are ordered by, so that ch2 comes before ch10; however many digits somebody sends."""
+    numbers = [digits.lstrip("0") for digits in re.findall(r"\d+", text)]
+    return [(len(digits), digits) for digits in numbers]
+
+
+def _whole(number: int) -> int:
+    """Raises `ValueError` for one that no device can mean."""
+    if abs(number) > LARGEST:
+        raise ValueError(number)
+    return number
 
 
 def _number(text: str) -> float | None:

@@ -87,10 +87,14 @@ class FrameDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         if not bytes.fromhex(self.header):
             raise ValueError("`header` needs at least one byte: without it nothing can be found in a stream")
         names: list[str] = []
+        reals: list[str] = []
         for field in self.fields:
             if isinstance(field.count, str) and field.count not in names:
                 raise ValueError(f"field {field.name!r}: no field {field.count!r} before it says its count")
+            if isinstance(field.count, str) and field.count in reals:
+                raise ValueError(f"field {field.name!r}: its count {field.count!r} must be a whole number")
             names.append(field.name)
+            reals += [field.name] if field.type in ("f32", "f64") else []
         if names.count("cells") != 1:
             raise ValueError("`fields` needs one field named `cells`")
         unknown = (set(self.time) | {str(flag.source) for flag in self.flags}) - set(names)

@@ -10,7 +10,7 @@ from operator import xor
 from drivers.insole.description import Flag, FrameDescription
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Foot
-from drivers.insole.order import Order
+from drivers.insole.order import LONGEST_TIME_S, Order
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 REALS = ("f32", "f64")
@@ -90,8 +90,10 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         counts: dict[str, int] = {}
         for field in self._description.fields:
             count = counts.get(field.count, 0) if isinstance(field.count, str) else field.count
+            if count < 1:
+                return IMPOSSIBLE
             layout = self._layouts.get((field.type, count)) or self._layout(field.type, count)
-            if at + layout.size - start > LONGEST or (isinstance(field.count, str) and count < 1):
+            if at + layout.size - start > LONGEST:
                 return IMPOSSIBLE
             if field.name in self._counting:
                 if len(buffer) < at + layout.size:
@@ -137,6 +139,8 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         if not all(math.isfinite(number) for name in self._reals for number in values[name]):
             return None
         seconds = sum(values[name][0] * scale for name, scale in description.time.items())
+        if not abs(seconds) <= LONGEST_TIME_S:
+            return None
         ticks = round(seconds * 1e6) if description.time else None
         sequence = int(values["sequence"][0]) if "sequence" in values else None
         means = {flag.means for flag in description.flags if _is_set(flag, values)}

@@ -4,6 +4,8 @@ from drivers.insole.layout import Foot
 from drivers.parsing import Counters, Sequence
 
 TIME_MODULUS = 1 << 64  # µs: never
+LARGEST = 1 << 62  # number or µs that a device can mean; a damaged one says anything
+LONGEST_TIME_S = LARGEST / 1e6
 
 
 class Order:

@@ -112,7 +112,7 @@ def decoded(data: bytes) -> Card:
     """
     try:
         card = msgspec.json.decode(data, type=Card)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # bad UTF-8 is no `DecodeError`
         raise UnusableModel(f"model.json is no model's card: {error}") from None
     if card.format != FORMAT:
         raise UnusableModel(f"model.json has format {card.format}; this GWRMS reads {FORMAT}")

@@ -1,6 +1,7 @@
 """What `gwrms sim-record` wrote: sessions of simulated wearers, each with its channels and its truth."""
 
 import gzip
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +56,10 @@ class _Head(msgspec.Struct):
     columns: list[str]
 
 
+# What reading raises for bytes that are none of ours: also packed ones, numbers too large, lists too deep.
+_DAMAGED: Final = (
+    ValueError, TypeError, OverflowError, RecursionError, EOFError, gzip.BadGzipFile, zlib.error
+)  # fmt: skip
 _ROW: Final = msgspec.json.Decoder(list[Any])
 _HEAD: Final = msgspec.json.Decoder(_Head)
 
@@ -73,7 +78,7 @@ def read(path: Path) -> list[Session]:
         with gzip.GzipFile(fileobj=raw) if compressed else raw as file:
             try:
                 sessions = [_session(head, rows) for head, rows in _blocks(file)]  # type: ignore[arg-type]
-            except (msgspec.MsgspecError, EOFError, gzip.BadGzipFile, ValueError, TypeError) as error:
+            except _DAMAGED as error:
                 raise UnusableData(
                     f"{path} is not what gwrms sim-record writes, or damaged: {error}"
                 ) from error

@@ -141,3 +141,18 @@ def test_endless_line_is_bounded() -> None:
         parser.feed(b"9" * 100)
     assert len(parser._buffer) <= parser.longest
     assert len(parser.feed(b"\nch0\n1\n")) == 1
+
+
+def test_a_column_with_a_number_of_thousands_of_digits_is_a_column() -> None:
+    parser = make()
+    long = b"ch" + b"1" * 5000
+    (frame,) = parser.feed(b"ch2," + long + b",ch01\n3,4,5\n")
+    assert frame.cells == (5, 3, 4)
+
+
+@pytest.mark.parametrize("line", [b"1e300,1,5", b"1,1" + b"0" * 40 + b",5", b"1,-9223372036854775809,5"])
+def test_a_time_or_number_that_no_device_can_mean_is_malformed(line: bytes) -> None:
+    parser = make()
+    frames = parser.feed(b"time,seq,ch0\n" + line + b"\n2,2,6\n")
+    assert [frame.cells for frame in frames] == [(6,)]
+    assert parser.counters.malformed == 1

@@ -141,6 +141,10 @@ def test_unknown_foot_and_not_a_number_are_malformed() -> None:
         ({"header": "A"}, "bytes in hex"),
         ({"fields": [{"name": "x", "type": "u8"}]}, "one field named `cells`"),
         ({"fields": [{"name": "cells", "type": "u8", "count": "n"}]}, "no field 'n' before it"),
+        (
+            {"fields": [{"name": "n", "type": "f32"}, {"name": "cells", "type": "u8", "count": "n"}]},
+            "its count 'n' must be a whole number",
+        ),
         ({"fields": [{"name": "cells", "type": "u9"}]}, "u9"),
         ({"time": {"t": 0.001}}, "name no field: t"),
     ],
@@ -162,3 +166,23 @@ def test_count_that_would_never_end_is_no_frame() -> None:
     parser = InsoleFrameParser(description)
     assert parser.feed(b"\xab\xcd\xff\xff\xff\xff" + b"\xab\xcd\x01\x00\x00\x00\x07\x00") != []
     assert parser.counters.bytes_dropped == 6
+
+
+def test_a_count_below_zero_is_no_frame() -> None:
+    description = describe(
+        fields=[{"name": "n", "type": "i16"}, {"name": "cells", "type": "u8", "count": "n"}]
+    )
+    parser = InsoleFrameParser(description)
+    (frame,) = parser.feed(b"\xab\xcd\x00\x80" + b"\xab\xcd\xff\xff" + b"\xab\xcd\x01\x00\x07")
+    assert frame.cells == (7,)
+    assert parser.counters.bytes_dropped == 8
+
+
+def test_a_time_that_no_device_can_mean_is_malformed() -> None:
+    description = describe(
+        fields=[{"name": "t", "type": "f32"}, {"name": "cells", "type": "u8"}], time={"t": 1.0}
+    )
+    parser = InsoleFrameParser(description)
+    assert parser.feed(b"\xab\xcd" + struct.pack("<fB", 1e38, 7)) == []
+    assert parser.counters.malformed == 1
+    assert len(parser.feed(b"\xab\xcd" + struct.pack("<fB", 1.5, 7))) == 1

@@ -72,6 +72,13 @@ WRONG = {
         + b'\n[10, "walk", 0.1, 0.6]\n',
         "has not the 5 columns",
     ),
+    "packed, then damaged": (b"\x1f\x8b\x08\0\0\0\0\0\0\x03" + b"\xff" * 40, "damaged"),
+    "a time too large": (
+        b'{"session":"a","subject":1,"columns":["time","label","left_phase","right_phase"]}\n'
+        b'[99999999999999999999,"walk",0,0]\n',
+        "damaged",
+    ),
+    "lists too deep": (b"[" * 100_000 + b"\n", "damaged"),
     "cut off": (gzip.compress(b'{"session": "a", "subject": 1, "columns": []}\n' * 99)[:-9], "damaged"),
 }
 

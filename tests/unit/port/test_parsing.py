@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from drivers.imu.formats import FORMATS
+from drivers.imu.witmotion_can import WitmotionCanParser
 from drivers.insole import layout as layouts
 from drivers.insole.csv_lines import InsoleCsvParser
 from drivers.insole.description import CsvDescription
@@ -51,3 +52,28 @@ def test_a_line_that_the_end_has_cut_off_does_not_cost_the_next_stream_its_first
     assert parser.finish() == []
     parser.feed(b"ch1,ch2\n")
     assert [frame.cells for frame in parser.feed(b"1,2\n")] == [(1, 2)]
+
+
+def test_bytes_between_frames_are_counted_alike_however_they_come() -> None:
+    """What means nothing between frames does not count inside what is dropped either."""
+    stream = b"$WNYPR,1\r\n$-002.026*60\r\n$VNACC,1$VNYPR,,2,3*6C\r\n"
+    dropped = set()
+    for size in (1, 3, len(stream)):
+        parser = FORMATS["vectornav"].make_parser()
+        for at in range(0, len(stream), size):
+            parser.feed(stream[at : at + size])
+        parser.finish()
+        dropped.add(parser.counters.bytes_dropped)
+    assert dropped == {len(stream) - stream.count(b"\r\n") * 2}
+
+
+def test_heads_without_checksums_are_the_same_frames_however_they_come() -> None:
+    stream = (
+        b"UOU\x02UQabc\0\0UUUUUU\xab\xaa\xaa\xaa\xaa\xaa\xaa\xaaUUUUUUUUUUU\xaa\xaa\xaaUUUUUUUU\0UUUUU\xff"
+    )
+    found = set()
+    for size in range(1, len(stream)):
+        parser = WitmotionCanParser()
+        frames = [one for at in range(0, len(stream), size) for one in parser.feed(stream[at : at + size])]
+        found.add(repr(frames + parser.finish()))
+    assert len(found) == 1

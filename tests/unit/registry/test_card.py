@@ -35,6 +35,12 @@ def test_a_card_is_read_as_it_was_written() -> None:
     assert age_days(named, named.made + timedelta(hours=36)) == pytest.approx(1.5)
 
 
+@pytest.mark.parametrize("data", [b"", b"[]", b'{"task": "\xff"}', b'{"task": ' + b"[" * 100_000])
+def test_what_is_no_card_is_refused(data: bytes) -> None:
+    with pytest.raises(UnusableModel, match=r"model\.json is no model's card"):
+        decoded(data)
+
+
 def test_a_robot_with_the_same_channels_and_units_is_taken() -> None:
     check_robot(card(learned()), "exo-01", units())
     check_robot(card(learned(), robot="exo-01"), "exo-01", units())
