@@ -28,6 +28,7 @@ TOKENS = (
     b"[insole.left]\n",
     b':256"',
     b':0xFF"',
+    b"99",
     b"127",
     b"1.0",
 )
