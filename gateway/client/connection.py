@@ -24,6 +24,7 @@ from gateway.client.errors import (
 
 OnNotification = Callable[[str, msgspec.Raw], None]
 OnResult = Callable[[msgspec.Raw], None]
+UNREADABLE = (msgspec.MsgspecError, RecursionError)  # what decoding raises; the second is nested too deeply
 
 
 class Refusal(msgspec.Struct):
@@ -152,7 +153,7 @@ class Connection(asyncio.Protocol):
             raise ProtocolError(f"{self.address} does not speak as a gateway does: {line}")
         try:
             message = self._decode(line)
-        except msgspec.MsgspecError as error:
+        except UNREADABLE as error:
             raise ProtocolError(f"{self.address} does not speak as a gateway does: {error}") from error
         if message.method is not None:
             self._on_notification(message.method, message.params)

@@ -13,7 +13,7 @@ import msgspec
 from gateway.client.address import Address
 from gateway.client.backoff import Backoff
 from gateway.client.clock import ClockTracker
-from gateway.client.connection import Connection
+from gateway.client.connection import UNREADABLE, Connection
 from gateway.client.errors import CallTimeout, ClientError, LinkLost, NotConnected, ProtocolError, RemoteError
 from gateway.client.subscription import Subscription
 from gateway.messages import (
@@ -268,7 +268,7 @@ class Link:
             return  # a newer gateway may tell more than we know
         try:
             data = self._decode_data(params)
-        except msgspec.MsgspecError as error:
+        except UNREADABLE as error:
             raise ProtocolError(f"{self.address} sent stream data that cannot be read: {error}") from error
         subscription = self._streams.get(data.stream)
         if subscription is not None:
@@ -290,7 +290,7 @@ class Link:
     def _read(self, result: msgspec.Raw, answer: type[Answer], method: str) -> Answer:
         try:
             return msgspec.json.decode(result, type=answer)
-        except msgspec.MsgspecError as error:
+        except UNREADABLE as error:
             raise ProtocolError(f"{self.address} answered {method} with something else: {error}") from error
 
     def _end_streams(self, reason: ClientError | None) -> None:

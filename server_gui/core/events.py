@@ -107,6 +107,11 @@ class Failed:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Refused(Failed):
+    """The robot sent what cannot be kept: it was told to nobody."""
+
+
 Event = (
     LinkChanged
     | Described

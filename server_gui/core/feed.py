@@ -23,6 +23,7 @@ from gateway.client import (
 )
 from gateway.client.backoff import Backoff
 from gateway.messages import Description, ResourceSnapshotParams
+from server_gui.core.arriving import Arriving, Unfit, journal
 from server_gui.core.events import (
     STOP,
     Changed,
@@ -32,6 +33,7 @@ from server_gui.core.events import (
     Journalled,
     LinkChanged,
     Looked,
+    Refused,
     Resources,
     StopAnswered,
     Telemetry,
@@ -66,8 +68,8 @@ class Following(Struct, frozen=True):
 class Feed:
     """One robot, followed from `run` until that is cancelled.
 
-    `tell` is called in the network's thread with every event, in order. Writes take the lease for as long as
-    they last.
+    `tell` is called in the network's thread with every event that may be kept, in order. Writes take the
+    lease for as long as they last.
     """
 
     def __init__(self, address: Address, tell: Tell, following: Following) -> None:
@@ -75,6 +77,7 @@ class Feed:
         self._following = following
         self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
         self._backoff = Backoff()
+        self._arriving = Arriving()
         self._dropped = asyncio.Event()
         self._newest_entry: dict[str, Any] = {"n": 0}
 
@@ -101,9 +104,12 @@ class Feed:
             following.result()
         except* (NotConnected, LinkLost):
             pass  # the link has told so itself
+        except* Unfit as unfit:
+            for error in unfit.exceptions:
+                self._tell(Refused("its description is refused", str(error)))
         except* ClientError as errors:
-            for error in errors.exceptions:
-                self._tell(Failed("following the robot", str(error)))
+            for one in errors.exceptions:
+                self._tell(Failed("following the robot", str(one)))
 
     async def write(self, changes: Mapping[str, float]) -> None:
         """Change parameters; the lease is taken and given back around it."""
@@ -140,7 +146,7 @@ class Feed:
         async with asyncio.TaskGroup() as group:
             group.create_task(self._until_dropped())
             description = await self._client.describe()
-            self._tell(Described(description))
+            self._admit(Described(description))
             group.create_task(self._stream(self._channels(description)))
             changeable = (known.name for known in description.parameters if known.read_only is None)
             parameters = _matching(following.parameters, changeable)
@@ -148,6 +154,11 @@ class Feed:
             group.create_task(self._repeat(following.resources_s, self._resources))
             if following.journal_s is not None:
                 group.create_task(self._repeat(following.journal_s, self._journal))
+
+    def _admit(self, event: Event) -> None:
+        """Tell what the robot has sent, where it may be kept; raises `Unfit` where not."""
+        self._arriving.check(event)
+        self._tell(event)
 
     async def _until_dropped(self) -> None:
         """Another link may be to another robot, or to one that has changed: then everything begins anew."""
@@ -166,34 +177,39 @@ class Feed:
         rate_hz, clock = self._following.rate_hz, self._client.link.clock
         async with self._client.subscribe(*channels, rate_hz=rate_hz, depth=DEPTH) as stream:
             async for batch in stream:
-                self._tell(Telemetry(stream.stream or 0, batch, clock.offset))
+                try:
+                    self._admit(Telemetry(stream.stream or 0, batch, clock.offset))
+                except Unfit as error:
+                    self._tell(Refused("its rows are refused", str(error)))
 
     async def _look(self, parameters: Sequence[str]) -> None:
         quality = await self._client.components()
         values = await self._client.read(*parameters) if parameters else None
-        self._tell(Looked(quality, values, time.monotonic_ns()))
+        self._admit(Looked(quality, values, time.monotonic_ns()))
 
     async def _resources(self) -> None:
         snapshot = await self._client.resources(self._following.resources)
         link = self._client.link
-        self._tell(Resources(snapshot, link.clock.round_trip_ns, time.monotonic_ns(), link.received_bytes))
+        self._admit(Resources(snapshot, link.clock.round_trip_ns, time.monotonic_ns(), link.received_bytes))
 
     async def _journal(self) -> None:
         """Tell the newest entries when there are new ones, without a hole as far as the robot has them."""
-        journal = await self._client.journal()
-        if any(not isinstance(entry.get("n"), int) or "hash" not in entry for entry in journal.entries):
-            raise ProtocolError("the robot's journal has entries without a number or a hash")
-        if journal.entries and journal.entries[0]["n"] > self._newest_entry["n"] + 1:
-            journal = await self._client.journal(WHOLE_JOURNAL)
-        if journal.entries and journal.entries[-1] != self._newest_entry:
-            self._newest_entry = journal.entries[-1]
-            self._tell(Journalled(journal))
+        found = await self._client.journal()
+        journal(found.entries)
+        if found.entries and found.entries[0]["n"] > self._newest_entry["n"] + 1:
+            found = await self._client.journal(WHOLE_JOURNAL)
+        if found.entries and found.entries[-1] != self._newest_entry:
+            self._admit(Journalled(found))
+            self._newest_entry = found.entries[-1]
 
     async def _repeat(self, period_s: float, look: Callable[[], Awaitable[None]]) -> None:
         while True:
             wait_s = period_s
             try:
                 await look()
+            except Unfit as error:
+                self._tell(Refused("a look at it is refused", str(error)))
+                wait_s = min(period_s, AGAIN_S)
             except (RemoteError, CallTimeout, ProtocolError) as error:
                 self._tell(Failed("a look at the robot", str(error)))
                 wait_s = min(period_s, AGAIN_S)

@@ -4,7 +4,16 @@ import msgspec
 
 from gateway.client import ConnectionState
 from gateway.messages import Description
-from server_gui.core.events import Described, Event, Journalled, LinkChanged, Looked, Resources, Telemetry
+from server_gui.core.events import (
+    Described,
+    Event,
+    Journalled,
+    LinkChanged,
+    Looked,
+    Refused,
+    Resources,
+    Telemetry,
+)
 from server_gui.core.fleet import facts
 from server_gui.core.recording.gathering import EventKind
 from server_gui.core.recording.recorder import Recorder
@@ -47,6 +56,8 @@ class Keeping:
                 self._learn(parameters={name: known.value for name, known in values})
             case LinkChanged():
                 self._link_changed(event)
+            case Refused():
+                self._recorder.refused(self._robot, event.what, event.reason)
 
     def _described(self, description: Description) -> None:
         self._recorder.describe(self._robot, description)

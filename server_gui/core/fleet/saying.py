@@ -3,7 +3,7 @@
 import logging
 
 from gateway.client import Address, ConnectionState
-from server_gui.core.events import Described, Event, Failed, LinkChanged
+from server_gui.core.events import Described, Event, Failed, LinkChanged, Refused
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +29,8 @@ class Saying:
             case Described():
                 channels = len(event.description.channels)
                 log.info("%s: linked to %s, %d channels", self._robot, self._address, channels)
+            case Refused() if event.what in self._said:
+                pass  # it may lie in ever other words
             case Failed():
                 self._warn(event.what, event.reason)
 

@@ -7,7 +7,7 @@ from typing import Final
 from msgspec import Struct
 
 from gateway.client import Address, ClockOffset, ConnectionState
-from server_gui.core.events import Described, Event, LinkChanged, Resources, Telemetry
+from server_gui.core.events import Described, Event, LinkChanged, Refused, Resources, Telemetry
 from server_gui.core.processing.communication import LinkMonitor, LinkQuality
 from server_gui.core.recording.rows import KEYS, VALUE
 
@@ -73,6 +73,9 @@ class LinkStatistics:
                 self._look(event.received_bytes, event.at_ns)
             case Described():
                 self._calls_itself = event.description.robot
+                self._monitor.calendar(event.description.clock.utc_ns - time.time_ns())
+            case Refused():
+                self._monitor.refused(event.reason, time.monotonic_ns())
             case LinkChanged():
                 linked = event.state is ConnectionState.CONNECTED
                 self._links += linked

@@ -3,6 +3,7 @@
 import collections
 import dataclasses
 import statistics
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -16,6 +17,7 @@ AGE_POOR_S, AGE_FAIR_S = 0.5, 0.15
 JITTER_FAIR_S = 0.05
 TRIP_FAIR_S = 0.1
 SILENT_NS = 2_000_000_000
+CALENDAR_NS = 60_000_000_000  # a robot whose calendar is further off than this has a wrong one
 
 
 class Health(StrEnum):
@@ -68,6 +70,8 @@ class LinkMonitor:
         self._link: int | None = None
         self._began_ns: int | None = None
         self._newest_ns: int | None = None
+        self._refused: tuple[int, str] | None = None  # when and why something was, the last time
+        self._calendar_ns = 0  # robot's minus ours
 
     def state(self, state: ConnectionState, problem: str | None, at_ns: int) -> None:
         """The link went up or down."""
@@ -97,6 +101,14 @@ class LinkMonitor:
             self._arrived(batch.received_ns - batch.stamps_ns[-1])
         self._began_ns = batch.received_ns if self._began_ns is None else self._began_ns
         self._newest_ns = batch.received_ns
+
+    def refused(self, why: str, at_ns: int) -> None:
+        """The robot sent what cannot be kept."""
+        self._refused = at_ns, why
+
+    def calendar(self, ahead_ns: int) -> None:
+        """How far the robot's calendar was ahead of ours when it was described."""
+        self._calendar_ns = ahead_ns
 
     def quality(self, now_ns: int) -> LinkQuality:
         """The link over the minute before `now_ns`."""
@@ -141,9 +153,19 @@ class LinkMonitor:
     def _complaints(self, found: LinkQuality, now_ns: int) -> list[tuple[Health, bool, str]]:
         if self._state is not ConnectionState.CONNECTED:
             return [(Health.DOWN, True, self._problem or f"the link is {self._state.value}")]
+        own = [*self._lies(now_ns)]
         if self._newest_ns is None or now_ns - self._newest_ns > SILENT_NS:
-            return [(Health.POOR, True, "connected, but no rows come: is something streamed?")]
-        return _complaints(found)
+            return [*own, (Health.POOR, True, "connected, but no rows come: is something streamed?")]
+        return [*own, *_complaints(found)]
+
+    def _lies(self, now_ns: int) -> Iterator[tuple[Health, bool, str]]:
+        """What the robot itself says that cannot be so."""
+        if self._refused is not None:
+            at_ns, why = self._refused
+            yield Health.POOR, now_ns - at_ns < SECONDS * 1e9, f"it sends what cannot be kept: {why}"
+        off_s = abs(self._calendar_ns) // 1_000_000_000
+        wrong = f"its calendar is {off_s} s from ours, so the times in its journal are wrong; set its clock"
+        yield Health.FAIR, abs(self._calendar_ns) > CALENDAR_NS, wrong
 
 
 def _complaints(found: LinkQuality) -> list[tuple[Health, bool, str]]:

@@ -2,7 +2,8 @@
 
 RecordingError
 └── SpoolUnusable   the spool's folder or one of its files cannot be used; says what to do
-    └── Damaged     a file of it is no database any more, or not one of ours
+    ├── Damaged     a file of it is no database any more, or not one of ours
+    └── NotKept     what was to be kept is such that no file of it takes it; in parts the rest is taken
 """
 
 
@@ -16,3 +17,7 @@ class SpoolUnusable(RecordingError):
 
 class Damaged(SpoolUnusable):
     """A file of the spool does not hold what was written to it."""
+
+
+class NotKept(SpoolUnusable):
+    """What was to be kept cannot be written into any file, whatever the disk does."""

@@ -5,12 +5,13 @@ import uuid
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from gateway.client import Batch
+from server_gui.core import arriving
 from server_gui.core.recording.rows import Floats, Layout, Record, Run
 
 
@@ -30,8 +31,6 @@ class EventKind(Enum):
 
 
 Name = tuple[str, str, int, int]  # session, connection, stream, and which layout object
-
-NUMBERS: Final = range(-(2**62), 2**62)  # what is kept in 8 bytes, and may be added up in them
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +69,7 @@ class Gathering:
         """Keep one notification; the events that it tells of: a new link, a gap, rows dropped.
 
         Raises:
-            ValueError: it cannot be kept, and is as if it had never come.
+            Unfit: it cannot be kept, and is as if it had never come.
 
         """
         batch = new.batch
@@ -147,7 +146,7 @@ class Gathering:
     def _layout(self, channels: tuple[str, ...]) -> Layout:
         for channel in channels:
             if not (channel and channel.isprintable()):
-                raise ValueError(f"{channel!r} is no name of a channel")
+                raise arriving.Unfit(f"{channel!r} is no name of a channel")
         layout = Layout(channels, tuple(self.units.get(channel) for channel in channels))
         return self._layouts.setdefault(channels, layout)
 
@@ -178,13 +177,9 @@ class Gathering:
 
 def _check(new: Notification) -> None:
     """Refuse what would keep every robot's rows from being written."""
-    batch = new.batch
-    rows = len(batch.stamps_ns)
-    for length in set(map(len, batch.columns.values())) - {rows}:
-        raise ValueError(f"{rows} stamps, but {length} values of a channel")
-    numbers = (new.stream, batch.seq, new.utc_offset_ns, *batch.stamps_ns)
-    if not all(number in NUMBERS for number in numbers):
-        raise ValueError("a stamp, or another number, is larger than 8 bytes hold")
+    arriving.batch(new.stream, new.batch)
+    if new.utc_offset_ns not in arriving.NUMBERS:
+        raise arriving.Unfit("the robot's clock is larger than 8 bytes hold")
 
 
 def _values(batch: Batch) -> Floats:

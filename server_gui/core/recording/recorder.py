@@ -13,20 +13,22 @@ from gateway.client import Batch
 from gateway.messages import Description, ResourceSnapshot
 from ml.store.tables import TABLES
 from server_gui.core.recording import records
-from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.gathering import EventKind, Notification
 from server_gui.core.recording.journals import Entry
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.robots import Robots
-from server_gui.core.recording.rows import Record
+from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.spool import Spool
 
 log = logging.getLogger(__name__)
 
 COMMIT_S: Final = 0.05  # rows of so long go to the disk together
+HELD_S: Final = 60.0  # that a mistake of ours stays an alarm, so that it is seen
 AGAIN_S: Final = 1.0  # between attempts on a disk that refuses, and looks at how full it is
 
 Work = Callable[[], Iterable[Record]]
+Part = Run | Record | tuple[str, JournalHead]  # what is committed: rows, or up to where a journal is recorded
 
 
 class Item(NamedTuple):
@@ -43,6 +45,7 @@ class AlarmKind(Enum):
     OVERFLOW = "overflow"  # rows came faster than the disk takes them
     DISK_FULL = "disk_full"  # recording has stopped until there is room
     SPOOL_FAILED = "spool_failed"  # the spool cannot be written; what waits is tried again
+    BROKEN = "broken"  # a mistake of ours: what was to be kept then is lost; it goes on
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,7 @@ class Recorder:
         self._lost_untold = 0
         self._commit_s = 0.0
         self._looked_s = -AGAIN_S
+        self._broke_s = -HELD_S
         self._roomy = True
         self._cuts: list[Callable[[], None]] = []
 
@@ -165,6 +169,10 @@ class Recorder:
         return self._put(
             robot, len(entries), functools.partial(self._robots.journal, robot, entries, time.time_ns())
         )
+
+    def refused(self, robot: str, what: str, why: str) -> int:
+        """Keep that the robot sent what cannot be kept, once for each `what`."""
+        return self._put(robot, 1, functools.partial(self._robots.refused, robot, what, why))
 
     def mark(self, robot: str, text: str, **data: Any) -> int:
         """Mark this instant."""
@@ -231,14 +239,30 @@ class Recorder:
         ending = False
         while not ending:
             queue, handed, ending = self._next()
-            found = [record for item in queue for record in self._done(item)]
-            if ending:
-                found += self._robots.end_all()
-            self._keep(found)
-            self._freeze(ending)
+            try:
+                self._turn(queue, ending)
+            except Exception as error:
+                log.exception("internal error of the recorder; it goes on")
+                self._lose(sum(item.rows for item in queue))
+                self._break(error)
+            if time.monotonic() - self._broke_s > HELD_S:
+                self._alarm(AlarmKind.BROKEN, None)
             with self._changed:
                 self._acknowledged = handed
                 self._changed.notify_all()
+
+    def _break(self, error: Exception) -> None:
+        """A mistake of ours has cost rows."""
+        self._broke_s = time.monotonic()
+        text = f"rows were lost by an internal error of the recorder, {type(error).__name__}: see its log"
+        self._alarm(AlarmKind.BROKEN, text)
+
+    def _turn(self, queue: Sequence[Item], ending: bool) -> None:
+        found = [record for item in queue for record in self._done(item)]
+        if ending:
+            found += self._robots.end_all()
+        self._keep(found)
+        self._freeze(ending)
 
     def _next(self) -> tuple[list[Item], int, bool]:
         """Wait until there is something to keep, let more come, and take it all."""
@@ -269,7 +293,7 @@ class Recorder:
             _check(found)
         except Exception as error:  # noqa: BLE001 - whatever it is, the others' recording goes on
             self._lost += item.rows
-            return self._robots.refused(item.robot, f"{item.robot} sent what cannot be kept: {error}")
+            return self._robots.refused(item.robot, "", str(error))
         return found
 
     def _keep(self, found: list[Record]) -> None:
@@ -281,20 +305,45 @@ class Recorder:
         if self._lost_untold:
             found += self._robots.lost(self._lost_untold)
             self._lost_untold = 0
-        while runs or found:
+        parts: list[Part] = [*runs, *found]
+        left: list[list[Part]] = [[*parts, *self._robots.heads.items()]] if parts else []
+        while left:
+            now = left.pop()
             try:
-                began_s = time.monotonic()
-                self._spool.append(runs, found, self._robots.heads)
+                self._append(now)
+            except NotKept as error:
+                half = len(now) // 2
+                if half:  # what the spool does not take is looked for, so that only that is lost
+                    left += [now[half:], now[:half]]
+                else:
+                    self._not_kept(now[0], error)
             except SpoolUnusable as error:
                 self._alarm(AlarmKind.SPOOL_FAILED, str(error))
-                if not self._ending.wait(AGAIN_S):
-                    continue
-                self._lose(rows)
-                return
-            self._commit_s = time.monotonic() - began_s
-            self._recorded += rows
-            self._alarm(AlarmKind.SPOOL_FAILED, None)
-            return
+                left.append(now)
+                if self._ending.wait(AGAIN_S):
+                    self._lose(sum(_rows(part) for parts in left for part in parts))
+                    return
+
+    def _append(self, parts: Sequence[Part]) -> None:
+        """Commit these together; raises as `Spool.append` does, and nothing of them is kept then."""
+        runs = [part for part in parts if isinstance(part, Run)]
+        found = [part for part in parts if isinstance(part, Record)]
+        heads = dict(part for part in parts if isinstance(part, tuple))
+        began_s = time.monotonic()
+        self._spool.append(runs, found, heads)
+        self._commit_s = time.monotonic() - began_s
+        self._recorded += sum(map(_rows, parts))
+        self._alarm(AlarmKind.SPOOL_FAILED, None)
+
+    def _not_kept(self, part: Part, error: NotKept) -> None:
+        """Give up one part, which no disk would take; its robot's journal is begun anew where it was that."""
+        robot = part[0] if isinstance(part, tuple) else getattr(part, "robot", "")
+        log.error("internal error: %s; of %s, and lost", error, robot or "no robot")
+        if isinstance(part, tuple):
+            self._robots.forget(part[0], self._spool.heads)
+        self._lost += _rows(part)
+        self._lost_untold += _rows(part)
+        self._break(error)
 
     def _lose(self, rows: int) -> None:
         self._lost += rows
@@ -334,6 +383,11 @@ class Recorder:
             log.error("%s", text)
             if self._on_alarm is not None:
                 self._on_alarm(self._alarms[kind])
+
+
+def _rows(part: Part) -> int:
+    """How many rows of a table a part makes."""
+    return len(part) if isinstance(part, Run) else int(isinstance(part, Record))
 
 
 def _check(found: Sequence[Record]) -> None:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 
 from gateway.messages import Description, ResourceSnapshot
+from server_gui.core import arriving
 from server_gui.core.recording import records
 from server_gui.core.recording.gathering import EventKind, Gathering, Notification
 from server_gui.core.recording.journals import Entry, news
@@ -43,18 +44,21 @@ class Robots:
 
     def begin(self, session: Session) -> list[Record]:
         """Begin a session, and end the one before."""
+        begun = session.record()  # may raise: then there is no such session
         ended = self.end(session.robot)
         self.known(session.robot).session = session.name
         self._sessions[session.robot] = session
-        return [*ended, session.record()]
+        return [*ended, begun]
 
     def amend(self, robot: str, facts: Facts) -> list[Record]:
         """More is known about the session that goes on."""
         session = self._sessions.get(robot)
         if session is None:
             return []
-        self._sessions[robot] = session.amended(facts)
-        return [self._sessions[robot].record()]
+        amended = session.amended(facts)
+        record = amended.record()  # may raise: then it is as if nobody had learned more
+        self._sessions[robot] = amended
+        return [record]
 
     def end(self, robot: str) -> list[Record]:
         """End the robot's session, if there is one."""
@@ -84,7 +88,13 @@ class Robots:
         return [records.resources(robot, self.known(robot).session, utc_ns, snapshot)]
 
     def journal(self, robot: str, entries: Sequence[Entry], utc_ns: int) -> list[Record]:
-        """What is new in a tail of the robot's journal."""
+        """What is new in a tail of the robot's journal.
+
+        Raises:
+            Unfit: it is no journal; what is recorded of it stays as it was.
+
+        """
+        arriving.journal(entries)
         new = news(entries, self.heads.get(robot))
         found = [records.journal(robot, entry) for entry in new.entries]
         if entries:
@@ -94,15 +104,22 @@ class Robots:
             found.append(self.known(robot).event(EventKind.JOURNAL_GAP, text, utc_ns, missing=new.missing))
         return found
 
+    def forget(self, robot: str, kept: Mapping[str, JournalHead]) -> None:
+        """Up to where the robot's journal is recorded is what was kept before, or unknown."""
+        self.heads.pop(robot)
+        if robot in kept:
+            self.heads[robot] = kept[robot]
+
     def lost(self, rows: int) -> list[Record]:
         """That rows of nobody knows whom were lost here, told in the recording of every robot there is."""
         text = f"this server lost {rows} rows of all its robots"
         now_ns = time.time_ns()
         return [robot.event(EventKind.LOST, text, now_ns, rows=rows) for robot in self._robots.values()]
 
-    def refused(self, robot: str, why: str) -> list[Record]:
-        """That the robot sent what cannot be kept; the first time is enough to know it."""
-        return self._tell(robot, "refused", EventKind.REFUSED, time.time_ns(), why)
+    def refused(self, robot: str, what: str, why: str) -> list[Record]:
+        """That the robot sent what cannot be kept; of each `what` the first time is enough to know it."""
+        text = f"{robot}: {what}: {why}" if what else f"{robot} sent what cannot be kept: {why}"
+        return self._tell(robot, f"refused {what}", EventKind.REFUSED, time.time_ns(), text)
 
     def _tell(
         self, robot: str, problem: str, kind: EventKind, utc_ns: int, text: str | None = None

@@ -20,7 +20,9 @@ from enum import Enum
 from pathlib import Path
 from typing import IO, Final, Self
 
-from server_gui.core.recording.errors import Damaged, SpoolUnusable
+import msgspec
+
+from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import SUFFIXES, Segment
 
@@ -28,6 +30,16 @@ log = logging.getLogger(__name__)
 
 RESERVE_BYTES: Final = 1 << 30  # what the disk must have left for recording to go on
 KEEP_BYTES: Final = 4 << 30  # uploaded segments that stay as a second copy, while there is room
+UNFIT: Final = (  # what a segment raises because of the rows themselves
+    sqlite3.IntegrityError,
+    sqlite3.ProgrammingError,
+    sqlite3.InterfaceError,
+    sqlite3.DataError,
+    msgspec.MsgspecError,
+    OverflowError,
+    TypeError,
+    ValueError,
+)
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged)?\.db")
 
 
@@ -93,11 +105,14 @@ class Spool:
         """Keep all of this or nothing; safe from now on when this returns.
 
         Raises:
+            NotKept: nothing was kept, because of what it is; in parts the rest of it may be.
             SpoolUnusable: nothing was kept; the message says why.
 
         """
         try:
             self._current.append(runs, records, heads or {})
+        except UNFIT as error:
+            raise NotKept(f"the spool {self.folder} does not take it: {error}") from error
         except sqlite3.Error as error:
             raise SpoolUnusable(f"the spool {self.folder} cannot be written: {error}") from error
         self._heads.update(heads or {})

@@ -7,6 +7,7 @@ import math
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -321,3 +322,64 @@ def test_a_robot_that_sends_fewer_rows_to_save_work_is_told(spool: Spool) -> Non
             recorder.record("exo-01", 1, dataclasses.replace(batch(seq), shed=shed))
     told = [json.loads(str(event["data"])) for event in events(spool, "shed")]
     assert [(found["seq"], found["shed"]) for found in told] == [(2, 4), (4, 1)]
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"n": 1, "hash": {"a": 1}},
+        {"n": 1, "hash": None},
+        {"n": 2**63 + 5, "hash": "h"},
+        {"n": 2**70, "hash": "h"},
+    ],
+)
+def test_a_journal_that_lies_keeps_nothing_of_any_robot_from_the_disk(
+    spool: Spool, lie: dict[str, Any]
+) -> None:
+    with Recorder(spool) as recorder:
+        recorder.journal("bad", [{"n": 1, "hash": "h1"}])
+        recorder.journal("bad", [lie])
+        for seq in range(3):
+            recorder.record("good", 1, batch(seq))
+            assert recorder.flush(WAIT_S)
+        recorder.journal("bad", [{"n": 1, "hash": "h1"}, {"n": 2, "hash": "h2"}])
+        assert recorder.flush(WAIT_S)
+        assert recorder.state.alarms == ()
+    found = kept(spool)
+    assert [row[3] for row in rows(found[0])] == [0, 1, 2]
+    assert [record.fields["n"] for record in found[1] if record.table == "journal"] == [1, 2]
+    assert spool.heads["bad"] == JournalHead(2, "h2")
+    assert len(events(spool, "refused")) == 1
+
+
+def test_what_no_file_takes_is_lost_alone_with_an_alarm(spool: Spool) -> None:
+    alarms: list[Alarm] = []
+    with Recorder(spool, alarms.append) as recorder:
+        recorder._robots.heads["bad"] = JournalHead(2**63 + 5, "h")  # as if nobody had looked at it
+        for robot in ("a", "b", "c"):
+            recorder.record(robot, 1, batch(0))
+        assert recorder.flush(WAIT_S)
+        recorder.record("a", 1, batch(1))
+        assert recorder.flush(WAIT_S)
+    assert [alarm.kind for alarm in alarms] == [AlarmKind.BROKEN]
+    found = rows(kept(spool)[0])
+    assert len(found) == len(set(found)) == 4
+    assert "bad" not in spool.heads
+
+
+def test_a_mistake_of_ours_is_an_alarm_and_the_recorder_goes_on(
+    spool: Spool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alarms: list[Alarm] = []
+    with Recorder(spool, alarms.append) as recorder:
+        with monkeypatch.context() as broken:
+            broken.setattr(spool, "make_room", lambda: 1 / 0)
+            recorder._looked_s = -AGAIN_S
+            recorder.record("exo-01", 1, batch(0))
+            assert recorder.flush(WAIT_S)
+        assert [alarm.kind for alarm in recorder.state.alarms] == [AlarmKind.BROKEN]
+        assert recorder.state.lost > 0
+        recorder.record("exo-01", 1, batch(1))
+        assert recorder.flush(WAIT_S)
+    assert [alarm.kind for alarm in alarms] == [AlarmKind.BROKEN]
+    assert rows(kept(spool)[0])[-1][3] == 1
