@@ -18,12 +18,13 @@ from server_gui.core.fleet.door import ask
 from server_gui.core.fleet.statistics import LinkReport
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingState, TaskReport
 from server_gui.core.settings import ServerSettings, SettingsError, add_robots, default_file, load
+from server_gui.core.watching import BEAT_S
 from server_gui.terminal.ending import Ended, Ending
 
 log = logging.getLogger(__name__)
 
 UNIT = Path(__file__).with_name("collect.service")
-LOOK_S = 0.5  # between looks whether it is to end
+LOOK_S = BEAT_S  # between looks whether it is to end, and whether its threads move
 HEADER = (
     "robot", "address", "link", "quality", "since", "links", "rows/s", "received/s", "rows", "missed",
     "dropped", "newest", "round trip", "clock",
@@ -141,6 +142,7 @@ def status_text(report: CollectorReport) -> str:
         f"collecting since {_instant(report.began_utc_s)} (process {report.pid}, gwrms {report.version})",
         f"spool  {report.spool}: {rows}; {size(report.disk_free_bytes)} free on its disk",
         f"store  {report.store}: {batches}; backlog {size(uploader.backlog_bytes)}",
+        *(f"ALARM  {trouble.text}" for trouble in report.threads),
         *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
         *([f"ALARM  {uploader.problem}"] if uploader.problem else []),
         *(f"ALARM  {file} is damaged: its rows are not in the store" for file in uploader.damaged),

@@ -2,9 +2,10 @@
 
 import asyncio
 import concurrent.futures
-import threading
 from collections.abc import Coroutine
 from typing import Any, Self, TypeVar
+
+from server_gui.core.watching import BEAT_S, Worker
 
 Result = TypeVar("Result")
 
@@ -17,21 +18,31 @@ class Network:
 
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="network")
+        self._beating = self._loop.call_later(0.0, lambda: None)
+        self.worker = Worker("network", self._run)
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self.worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
         self.run(self._end_all()).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
+        self.worker.join()
         self._loop.close()
 
     def run(self, work: Coroutine[Any, Any, Result]) -> "concurrent.futures.Future[Result]":
         """Run `work` in the network's thread; cancelling the future cancels it."""
         return asyncio.run_coroutine_threadsafe(work, self._loop)
+
+    def _run(self) -> None:
+        self._beat()
+        self._loop.run_forever()
+
+    def _beat(self) -> None:
+        self.worker.beat()
+        self._beating.cancel()
+        self._beating = self._loop.call_later(BEAT_S, self._beat)
 
     @staticmethod
     async def _end_all() -> None:

@@ -26,6 +26,7 @@ from server_gui.core.prediction.news import Foreseen
 from server_gui.core.prediction.predicting import Predicting
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings import RecordingSettings, ServerSettings
+from server_gui.core.watching import Watch
 
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first
@@ -76,6 +77,8 @@ class Feeds:
             self.network = self._own = Network()
             self._elsewhere = None if record is None else Elsewhere(settings.recorder.spool)
             self._predicting = Predicting(settings, foresee) if settings.prediction.enabled else None
+        predicting = () if self._predicting is None else self._predicting.workers
+        self._watch = Watch((self.network.worker, *predicting))  # where no collector has one
 
     def __enter__(self) -> Self:
         for part in (self._collector, self._own, self._predicting):
@@ -124,6 +127,7 @@ class Feeds:
             self._collector.wait(0.0)
         elif self._record is not None and recording.is_alone(GIVE_WAY_S):
             self._take_over(recording)
+        recording.see((self._watch if self._collector is None else self._collector.watch).look())
         recording.look()
 
     # --- inside

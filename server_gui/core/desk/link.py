@@ -18,6 +18,7 @@ from gateway.messages import (
     Stored,
     Written,
 )
+from server_gui.core.arriving import Arriving
 from server_gui.core.events import Costs, Failed, Resources
 from server_gui.core.feed import Tell
 from server_gui.core.network import Network
@@ -39,6 +40,7 @@ class Link:
         self._tell = tell
         self._dropped = dropped
         self._client = Client(address, LinkSettings(client="gwrms gui"), self._state_changed)
+        self._arriving = Arriving()
         self._processes_wanted = asyncio.Event()
 
     async def run(self) -> None:
@@ -104,11 +106,13 @@ class Link:
     async def _look(self) -> None:
         try:
             snapshot = await self._client.resources(PROCESSES)
+            found = Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns())
+            self._arriving.check(found)
         except ClientError as error:
             if self._client.link.state is ConnectionState.CONNECTED:
                 self._tell(Failed("the process table", str(error)))
             return
-        self._tell(Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns()))
+        self._tell(found)
         with contextlib.suppress(ClientError):  # an older gateway does not know it
             self._tell(Costs(await self._client.cost()))
 

@@ -1,7 +1,7 @@
 """What is recorded of the robots, by whom, and how that goes, in words for the window."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from enum import Enum
@@ -12,11 +12,14 @@ from server_gui.core.desk.answers import Deliver, when_done
 from server_gui.core.desk.news import News, NewsKind
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.recording.recorder import AlarmKind
+from server_gui.core.watching import Trouble
 
 LOOK_NS: Final = 1_000_000_000  # between looks
 SOON: Final = "this window records as soon as it can"
 WHO: Final = "recording"  # what the news name instead of a robot
 STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
+NEEDED: Final = frozenset({"network", "recorder"})  # threads without which nothing is recorded
+UNKNOWN_NS: Final = 2_000_000_000  # without an answer: nobody knows then
 
 
 class Keeper(Protocol):
@@ -76,6 +79,7 @@ class Recording:
         self._asking = False
         self._alone_since_ns: int | None = None  # when whoever records elsewhere did not answer any more
         self._trouble: dict[str, str] = {}  # kind → what was told of it
+        self._threads: dict[By, tuple[Trouble, ...]] = {}  # by whose they are
 
     def look(self) -> None:
         """Ask again, now and then."""
@@ -91,6 +95,17 @@ class Recording:
             lambda report: self._reported(keeper, report),
             lambda error: self._failed(keeper, error),
         )
+
+    def see(self, threads: Sequence[Trouble], by: By = By.WINDOW) -> None:
+        """What is wrong with the threads that follow, record and predict: this window's, or another's."""
+        told = {trouble.thread: trouble.text for trouble in self._threads.get(by, ())}
+        now = {trouble.thread: trouble.text for trouble in threads}
+        for thread, text in now.items():
+            if told.get(thread) != text:
+                self._news.add(NewsKind.WARNING, WHO, text)
+        for thread in told.keys() - now.keys():
+            self._news.add(NewsKind.STATE, WHO, f"over: {told[thread]}")
+        self._threads[by] = tuple(threads)
 
     @property
     def can_ask(self) -> bool:
@@ -121,8 +136,14 @@ class Recording:
         report = self.report
         if self._keeper is None:
             return Said(Tone.OFF, "Not recording", self.why)
+        threads = self._threads.get(self.by, ())
+        ended = [known.text for known in threads if known.thread in NEEDED and not known.works]
+        if ended:
+            return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(ended))
         if self.problem is not None:
             return Said(Tone.BAD, "NOT RECORDING", f"{SOON}: {self.why or self.problem}")
+        if self._asking and self._asked_ns is not None and time.monotonic_ns() - self._asked_ns > UNKNOWN_NS:
+            return Said(Tone.BAD, "RECORDING: NO ANSWER", "whether anything is recorded now is not known")
         if report is None:
             return Said(Tone.OFF, "Recording: not known yet", self.why)
         stopped = [alarm.text for alarm in report.recorder.alarms if alarm.kind in STOPPED]
@@ -136,7 +157,8 @@ class Recording:
     def _going_on(self, report: CollectorReport) -> Said:
         who = "" if self.by is By.WINDOW else f" by process {report.pid}"
         rows = sum(link.rows_per_s for link in report.robots.values())
-        problems = [alarm.text for alarm in report.recorder.alarms]
+        problems = [trouble.text for threads in self._threads.values() for trouble in threads]
+        problems += [alarm.text for alarm in report.recorder.alarms]
         problems += [] if report.uploader.problem is None else [report.uploader.problem]
         facts = [
             f"Recording{who}",
@@ -154,6 +176,8 @@ class Recording:
             return
         self._asking, self.report, self.problem = False, report, None
         self._alone_since_ns = None
+        if self.by is By.OTHER:
+            self.see(report.threads, By.OTHER)
         now = {alarm.kind.value: alarm.text for alarm in report.recorder.alarms}
         now |= {} if report.uploader.problem is None else {"store": report.uploader.problem}
         for kind in now.keys() - self._trouble.keys():

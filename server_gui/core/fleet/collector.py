@@ -30,6 +30,7 @@ from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader, UploaderState
 from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload
+from server_gui.core.watching import Trouble, Watch
 
 log = logging.getLogger(__name__)
 
@@ -57,6 +58,7 @@ class CollectorReport(Struct, frozen=True):
     recorder: RecorderState
     uploader: UploaderState
     prediction: PredictingState | None = None  # None: it is off
+    threads: tuple[Trouble, ...] = ()  # of its own, that have died or stand still
 
 
 class Collector:
@@ -98,6 +100,9 @@ class Collector:
             else None
         )
         self._running: concurrent.futures.Future[None] | None = None
+        predicting = () if self._foreseeing is None else self._foreseeing.workers
+        workers = (self.network.worker, self._recorder.worker, self._uploader.worker, *predicting)
+        self.watch = Watch(workers)
 
     def __enter__(self) -> Self:
         self._uploader.__enter__()
@@ -120,7 +125,8 @@ class Collector:
         self._spool.close()
 
     def wait(self, within_s: float) -> None:
-        """Let it work so long; raises what has ended it, which is a mistake of ours."""
+        """Let it work so long, and see to its threads; raises what has ended it, a mistake of ours."""
+        self.watch.look()
         if self._running is not None and concurrent.futures.wait([self._running], within_s).done:
             self._running.result()
 
@@ -214,6 +220,7 @@ class Collector:
             robots=self._fleet.report(),
             recorder=self._recorder.state,
             uploader=self._uploader.state,
+            threads=self.watch.look(),
             prediction=None if self._foreseeing is None else self._foreseeing.state,
         )
 

@@ -27,10 +27,10 @@ class Inbox:
                 self._forget(waiting, event.batch.received_ns - MOST_NS)
             self._changed.notify()
 
-    def take(self) -> dict[str, "collections.deque[Event]"] | None:
-        """Wait for events, then everything that has come, robot by robot; None where `close` was called."""
+    def take(self, within_s: float | None = None) -> dict[str, "collections.deque[Event]"] | None:
+        """Wait for events, so long; then all that has come, robot by robot; None where `close` was called."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._closed)
+            self._changed.wait_for(lambda: self._waiting or self._closed, within_s)
             taken, self._waiting = self._waiting, {}
         return None if self._closed else taken
 

@@ -2,7 +2,11 @@
 
 import threading
 from collections.abc import Callable
-from typing import Self
+from typing import Final, Self
+
+from server_gui.core.watching import Worker
+
+LOOK_S: Final = 600.0  # a look takes less
 
 
 class Looking:
@@ -17,16 +21,16 @@ class Looking:
         self._every_s = every_s
         self._break_off_s = break_off_s
         self._wake = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self.worker = Worker(name, self._run, LOOK_S + every_s, daemon=True)
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self.worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
         self.ending = True
         self._wake.set()
-        self._thread.join(self._break_off_s)
+        self.worker.join(self._break_off_s)
 
     def wake(self) -> None:
         """Look now; from any thread."""
@@ -34,6 +38,7 @@ class Looking:
 
     def _run(self) -> None:
         while not self.ending:
+            self.worker.beat()
             self._look()
             self._wake.wait(self._every_s)
             self._wake.clear()

@@ -2,7 +2,6 @@
 
 import collections
 import logging
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final, Self, TypeVar
 
@@ -19,11 +18,13 @@ from server_gui.core.prediction.settings import Action
 from server_gui.core.prediction.state import PredictingState, TaskReport
 from server_gui.core.prediction.tracking import Tracking
 from server_gui.core.settings import ServerSettings
+from server_gui.core.watching import BEAT_S, Worker
 
 log = logging.getLogger(__name__)
 
 Thing = TypeVar("Thing")
 
+STILL_S: Final = 1.0  # what is due of one model, and the rows of all robots, take less
 BROKEN: Final = "it cannot be used: internal error, "
 
 
@@ -51,19 +52,24 @@ class Predicting:
         self._broken: dict[str, str] = {}  # models, and why
         self._judged = 0
         self._skipped = 0
-        self._thread = threading.Thread(target=self._run, name="prediction")
+        self._worker = Worker("prediction", self._run, STILL_S)
 
     def __enter__(self) -> Self:
         self._serving.__enter__()
         self._tracking.__enter__()
-        self._thread.start()
+        self._worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
         self._inbox.close()
-        self._thread.join()
+        self._worker.join()
         self._tracking.__exit__(*exc)
         self._serving.__exit__(*exc)
+
+    @property
+    def workers(self) -> tuple[Worker, ...]:
+        """Its threads, to be watched over."""
+        return self._worker, self._serving.worker, self._tracking.worker
 
     def take(self, robot: str, event: Event) -> None:
         """Take what a robot's feed tells; from any thread, returns at once."""
@@ -92,7 +98,8 @@ class Predicting:
 
     def _run(self) -> None:
         with threadpool_limits(limits=1):  # small batches gain nothing from more, and the cores are others'
-            while (taken := self._inbox.take()) is not None:
+            while (taken := self._inbox.take(BEAT_S)) is not None:
+                self._worker.beat()
                 try:
                     self._turn(taken)
                 except Exception:
@@ -102,6 +109,7 @@ class Predicting:
         for robot, events in taken.items():
             self._follow(robot, events)
         for model, due in self._due():
+            self._worker.beat()
             news = self._judge(model, due)
             for one in news:
                 if self._stop and isinstance(one, Ruled) and one.began and one.rule.action is Action.STOP:

@@ -17,6 +17,7 @@ from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
 from server_gui.core.prediction.looking import Looking
+from server_gui.core.watching import Worker
 
 if TYPE_CHECKING:
     from ml.registry.registry import Registry
@@ -54,6 +55,11 @@ class Serving:
         self._seen: Any = None  # what should serve then, and the files of what was refused
         self._retry_s = math.inf  # when that is tried again, on our monotonic clock
         self._looking = Looking("models", self._look, poll_s, BREAK_OFF_S)
+
+    @property
+    def worker(self) -> Worker:
+        """Its thread, to be watched over."""
+        return self._looking.worker
 
     def __enter__(self) -> Self:
         self._looking.__enter__()

@@ -9,6 +9,7 @@ from ml.registry.card import Card
 from ml.store import NoSuchTable, StoreError
 from server_gui.core.prediction.looking import Looking
 from server_gui.core.prediction.state import Figures, Quality
+from server_gui.core.watching import Worker
 
 if TYPE_CHECKING:
     from server_gui.core.prediction.track_record import TrackRecord
@@ -30,6 +31,11 @@ class Tracking:
         self._record: TrackRecord | None = None
         self._looking = Looking("track record", self._look, EVERY_S, BREAK_OFF_S)
         self.wake = self._looking.wake  # look now; from any thread
+
+    @property
+    def worker(self) -> Worker:
+        """Its thread, to be watched over."""
+        return self._looking.worker
 
     def __enter__(self) -> Self:
         self._looking.__enter__()

@@ -3,7 +3,7 @@
 import time
 
 from gateway.messages import Description
-from server_gui.core.events import Described, Event, LinkChanged, Looked, Resources, Telemetry
+from server_gui.core.events import Described, Event, LinkChanged, Looked, Refused, Resources, Telemetry
 from server_gui.core.processing.communication import LinkMonitor, LinkQuality
 from server_gui.core.processing.component import ComponentProcessing, Derived
 from server_gui.core.processing.resource import ResourceProcessing
@@ -40,6 +40,9 @@ class RobotProcessing:
                 )
             case Described():
                 self._described(event.description)
+                self.communication.calendar(event.description.clock.utc_ns - time.time_ns())
+            case Refused():
+                self.communication.refused(event.reason, time.monotonic_ns())
             case _:
                 pass  # writes and stops change nothing here
 

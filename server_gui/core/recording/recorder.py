@@ -20,6 +20,7 @@ from server_gui.core.recording.records import Facts
 from server_gui.core.recording.robots import Robots
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.spool import Spool
+from server_gui.core.watching import BEAT_S, Worker
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +94,7 @@ class Recorder:
         self._spool = spool
         self._on_alarm = on_alarm
         self._settings = settings or RecorderSettings()
-        self._thread = threading.Thread(target=self._run, name="recorder")
+        self.worker = Worker("recorder", self._run)
         # Shared between the threads, under the lock.
         self._changed = threading.Condition()
         self._queue: list[Item] = []
@@ -115,7 +116,7 @@ class Recorder:
         self._cuts: list[Callable[[], None]] = []
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self.worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
@@ -126,8 +127,7 @@ class Recorder:
         with self._changed:
             self._ending.set()
             self._changed.notify_all()
-        if self._thread.ident is not None:
-            self._thread.join()
+        self.worker.join()
 
     # --- what is handed in
 
@@ -241,17 +241,19 @@ class Recorder:
             queue, handed, ending = self._next()
             try:
                 self._turn(queue, ending)
-            except Exception as error:
-                log.exception("internal error of the recorder; it goes on")
+            except BaseException as error:
                 self._lose(sum(item.rows for item in queue))
                 self._break(error)
+                if not isinstance(error, Exception):
+                    raise
+                log.exception("internal error of the recorder; it goes on")
             if time.monotonic() - self._broke_s > HELD_S:
                 self._alarm(AlarmKind.BROKEN, None)
             with self._changed:
                 self._acknowledged = handed
                 self._changed.notify_all()
 
-    def _break(self, error: Exception) -> None:
+    def _break(self, error: BaseException) -> None:
         """A mistake of ours has cost rows."""
         self._broke_s = time.monotonic()
         text = f"rows were lost by an internal error of the recorder, {type(error).__name__}: see its log"
@@ -267,10 +269,10 @@ class Recorder:
     def _next(self) -> tuple[list[Item], int, bool]:
         """Wait until there is something to keep, let more come, and take it all."""
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._ending.is_set() or self._acknowledged < self._handed, AGAIN_S
-            )
+            self.worker.beat()
+            self._changed.wait_for(lambda: self._ending.is_set() or self._acknowledged < self._handed, BEAT_S)
         self._ending.wait(COMMIT_S)
+        self.worker.beat()
         with self._changed:
             queue, self._queue = self._queue, []
             self._queued_rows = 0
@@ -320,9 +322,16 @@ class Recorder:
             except SpoolUnusable as error:
                 self._alarm(AlarmKind.SPOOL_FAILED, str(error))
                 left.append(now)
-                if self._ending.wait(AGAIN_S):
+                if self._ends_within(AGAIN_S):
                     self._lose(sum(_rows(part) for parts in left for part in parts))
                     return
+
+    def _ends_within(self, wait_s: float) -> bool:
+        """Wait so long, and say that this is no standing still; True as soon as it is to end."""
+        until_s = time.monotonic() + wait_s
+        while (left_s := until_s - time.monotonic()) > 0 and not self._ending.wait(min(left_s, BEAT_S)):
+            self.worker.beat()
+        return self._ending.is_set()
 
     def _append(self, parts: Sequence[Part]) -> None:
         """Commit these together; raises as `Spool.append` does, and nothing of them is kept then."""

@@ -15,11 +15,13 @@ from server_gui.core.recording.compacting import Compacting
 from server_gui.core.recording.errors import Damaged, RecordingError
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
+from server_gui.core.watching import Worker
 
 log = logging.getLogger(__name__)
 
 KNOWN: Final = (StoreError, RecordingError, sqlite3.Error)
 LOOK_S: Final = 1.0  # between looks at the spool
+UPLOAD_S: Final = 600.0  # one batch takes so long at most, with a pause before it
 LONGEST_S: Final = 60.0  # between attempts on a store that cannot be reached
 
 
@@ -59,10 +61,10 @@ class Uploader:
         self._ending = threading.Event()
         self._asked = threading.Event()
         self._turned = threading.Event()  # it has looked at everything that waits
-        self._thread = threading.Thread(target=self._run, name="uploader")
+        self.worker = Worker("uploader", self._run, UPLOAD_S)
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self.worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
@@ -76,9 +78,7 @@ class Uploader:
         """
         self._ending.set()
         self._asked.set()
-        if self._thread.ident is not None:
-            self._thread.join(within_s)
-        return not self._thread.is_alive()
+        return self.worker.join(within_s)
 
     def drain(self, within_s: float) -> bool:
         """Upload everything that waits, wanted or not; False where that fails or takes longer."""
@@ -107,6 +107,7 @@ class Uploader:
                 backoff.reset()
                 self._compact()
             self._turned.set()
+            self.worker.beat()
             self._asked.wait(backoff.next_s())
         if self._compacting is not None:
             self._compacting.close()
@@ -122,6 +123,7 @@ class Uploader:
         for done, number in enumerate(waiting, 1):
             if self._ending.is_set() or not (asked or self._wanted()):
                 return True
+            self.worker.beat()
             try:
                 self._upload(number)
             except Damaged as error:

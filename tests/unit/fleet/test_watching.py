@@ -1,0 +1,186 @@
+"""Threads that die or stand still are an alarm and begun anew; nothing is called recorded that is not."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from server_gui.commands.collect import status_text
+from server_gui.core.desk.news import News
+from server_gui.core.desk.recording import By, Recording, Tone
+from server_gui.core.fleet.collector import Collector
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.spool import Spool
+from server_gui.core.settings import (
+    PredictionSettings,
+    RecordingSettings,
+    RobotSettings,
+    ServerSettings,
+    StoreSettings,
+)
+from server_gui.core.watching import STILL_S, Trouble, Watch, Worker
+from tests.fake_robot import FakeRobot
+
+WAIT_S = 20.0
+
+
+def until(condition: Callable[[], object], within_s: float = WAIT_S) -> None:
+    deadline_s = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+
+
+def test_a_thread_that_dies_is_said_begun_anew_and_said_to_be_so(caplog: pytest.LogCaptureFixture) -> None:
+    ending, began = threading.Event(), []
+
+    def run() -> None:
+        began.append(1)
+        if len(began) == 1:
+            raise SystemExit
+        while not ending.wait(0.01):
+            worker.beat()
+
+    worker = Worker("recorder", run)
+    watch = Watch([worker])
+    worker.start()
+    until(lambda: watch.look() and len(began) == 2)
+    (trouble,) = watch.look()
+    assert trouble.works
+    assert "has died and was begun anew: SystemExit" in trouble.text
+    assert sum("was begun anew" in record.getMessage() for record in caplog.records) == 1
+    ending.set()
+    assert worker.join(WAIT_S)
+    assert watch.look() == ()
+
+
+def test_a_thread_that_dies_again_and_again_does_not_work() -> None:
+    worker = Worker("recorder", lambda: None)
+    watch = Watch([worker])
+    worker.start()
+    until(lambda: any(not trouble.works for trouble in watch.look()))
+    assert "2 times" in watch.look()[0].text
+    worker.join()
+    assert watch.look() == ()
+
+
+def test_a_thread_that_stands_still_is_said_within_a_second_and_over_when_it_moves(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    go_on, ending = threading.Event(), threading.Event()
+
+    def run() -> None:
+        go_on.wait(WAIT_S)
+        while not ending.wait(0.01):
+            worker.beat()
+
+    worker = Worker("recorder", run)
+    watch = Watch([worker])
+    worker.start()
+    until(watch.look)
+    assert STILL_S < 1.0
+    assert watch.look() == (
+        Trouble("recorder", "the thread “recorder” stands still, longer than 0.75 s", False),
+    )
+    go_on.set()
+    until(lambda: not watch.look())
+    assert [r.levelno for r in caplog.records] == [logging.ERROR, logging.WARNING]
+    ending.set()
+    worker.join()
+
+
+@pytest.fixture
+def collector(tmp_path: Path, folder_url: str) -> Iterator[Collector]:
+    with FakeRobot() as robot:
+        settings = ServerSettings(
+            {"exo-fake": RobotSettings(robot.address)},
+            StoreSettings(folder_url),
+            RecordingSettings(spool=tmp_path / "spool", batch_s=1.0, resources_s=0.1),
+            PredictionSettings(enabled=True),
+        )
+        with Collector(settings) as collector:
+            until(lambda: collector.report().result(WAIT_S).recorder.recorded > 5)
+            yield collector
+
+
+def troubles(collector: Collector) -> tuple[Trouble, ...]:
+    """What the loop of the command, or of the window, sees."""
+    collector.wait(0.01)
+    return collector.watch.look()
+
+
+def said(collector: Collector) -> tuple[Recording, str]:
+    """What the window says, and what the status command says, of this collector."""
+    recording = Recording(By.WINDOW, None, lambda call: call(), News())
+    recording._keeper = collector
+    recording.report = collector.report().result(WAIT_S)
+    recording.see(collector.watch.look())
+    return recording, status_text(recording.report)
+
+
+@pytest.mark.parametrize("name", ["_recorder", "_uploader", "network"])
+def test_a_dead_thread_of_a_collector_is_an_alarm_everywhere_and_works_again(
+    collector: Collector, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def die(*_: object, **__: object) -> None:
+        monkeypatch.undo()
+        raise SystemExit
+
+    owner = getattr(collector, name)
+    if name == "network":
+        owner._loop.call_soon_threadsafe(die)
+    else:
+        monkeypatch.setattr(owner, {"_recorder": "_turn", "_uploader": "_empty"}[name], die)
+    until(lambda: troubles(collector))
+    recording, status = said(collector)
+    assert f"ALARM  the thread “{owner.worker.name}” has died and was begun anew: SystemExit" in status
+    assert recording.said(None).tone is Tone.WARNING
+    assert any(owner.worker.name in news.text for news in recording._news.items)
+    before = collector.report().result(WAIT_S).recorder.recorded
+    until(lambda: collector.report().result(WAIT_S).recorder.recorded > before)
+
+
+def test_a_recorder_that_stands_still_is_not_said_to_record(
+    collector: Collector, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on = threading.Event()
+    monkeypatch.setattr(collector._spool, "append", lambda *_: go_on.wait(WAIT_S))
+    began_s = time.monotonic()
+    until(lambda: troubles(collector))
+    assert time.monotonic() - began_s < WAIT_S
+    recording, status = said(collector)
+    assert "ALARM  the thread “recorder” stands still" in status
+    assert (recording.said(None).tone, recording.said(None).text) == (Tone.BAD, "RECORDING HAS STOPPED")
+    monkeypatch.undo()
+    go_on.set()
+    until(lambda: not troubles(collector))
+
+
+def test_what_was_in_hand_when_the_recorder_died_is_counted_as_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def die(*_: object) -> None:
+        monkeypatch.undo()
+        raise SystemExit
+
+    with Spool(tmp_path, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        watch = Watch([recorder.worker])
+        monkeypatch.setattr(recorder, "_turn", die)
+        recorder.mark("exo-01", "now")
+        until(watch.look)
+        assert recorder.flush(WAIT_S)
+        assert recorder.state.lost == 1
+        recorder.mark("exo-01", "again")
+        assert recorder.flush(WAIT_S)
+        assert recorder.state.recorded >= 1
+
+
+def test_nobody_answering_is_not_called_recording() -> None:
+    recording = Recording(By.WINDOW, None, lambda call: call(), News())
+    recording._keeper = SimpleNamespace()
+    recording._asking, recording._asked_ns = True, time.monotonic_ns() - 3_000_000_000
+    assert recording.said(None).tone is Tone.BAD
