@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
+from gateway.cli.plain import json_plain, plain
 from gateway.coding import text as digits
 from gateway.messages import BudgetInfo, ChannelInfo
 
@@ -16,7 +17,7 @@ OTHER_DECIMALS = 4
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Iterable[int] = ()) -> str:
     """Aligned columns two spaces apart; the columns in `right` (by index) are right-aligned."""
-    lines = [tuple(header), *(tuple(row) for row in rows)]
+    lines = [tuple(map(plain, header)), *(tuple(map(plain, row)) for row in rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     numeric = frozenset(right)
     return "".join(
@@ -30,20 +31,21 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Iterable[
 
 
 def say(text: str) -> None:
-    """Print for people."""
-    sys.stdout.write(text)
+    """Print for people; letters that would command the terminal are shown as what they are."""
+    sys.stdout.write(plain(text, "\n"))
     sys.stdout.flush()
 
 
 def say_json(answer: object) -> None:
     """Print for machines: one line, flushed, so that a pipe sees it at once."""
-    sys.stdout.write(msgspec.json.encode(answer).decode() + "\n")
+    sys.stdout.write(json_plain(msgspec.json.encode(answer).decode()) + "\n")
     sys.stdout.flush()
 
 
 def warn(command: str, text: str) -> None:
-    """A sentence on stderr."""
-    sys.stderr.write(f"gwrms {command}: {text}\n")
+    """A sentence on stderr; no line of it can pass for another warning."""
+    shown = plain(text, "\n").replace("\n", "\n  ")
+    sys.stderr.write(f"gwrms {command}: {shown}\n")
 
 
 def measured(value: float | None, channel: ChannelInfo | None = None) -> str:

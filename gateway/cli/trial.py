@@ -52,7 +52,8 @@ def _wait(robot: Robot, write: int, ends: float, *, countdown: bool) -> bool:
     asking = [sys.stdin]
     while (left := ends - time.monotonic()) > 0:
         if countdown:
-            say(f"\r{left:4.0f} s left \r")
+            sys.stdout.write(f"\r{left:4.0f} s left \r")
+            sys.stdout.flush()
         ready, _, _ = select.select(asking, [], [], min(LOOK_S, left))
         if ready:
             if sys.stdin.readline():

@@ -11,6 +11,7 @@ from typing import Self
 import msgspec
 
 from gateway import wire
+from gateway.cli.plain import plain
 from gateway.client.address import Address
 from gateway.client.errors import (
     CallTimeout,
@@ -24,6 +25,7 @@ from gateway.client.errors import (
 
 OnNotification = Callable[[str, msgspec.Raw], None]
 OnResult = Callable[[msgspec.Raw], None]
+LONGEST_REFUSAL = 4096  # letters of it that are told
 UNREADABLE = (msgspec.MsgspecError, RecursionError)  # what decoding raises; the second is nested too deeply
 
 
@@ -160,14 +162,14 @@ class Connection(asyncio.Protocol):
         elif message.id is not None:
             self._settle(message)
         elif message.error is not None:
-            raise ProtocolError(f"{self.address} could not read a request: {message.error.message}")
+            raise ProtocolError(f"{self.address} could not read a request: {_said(message.error)}")
 
     def _settle(self, message: Incoming) -> None:
         answer, on_result = self._waiting.get(message.id or 0, (None, None))
         if answer is None or answer.done():
             return  # its caller gave up
         if message.error is not None:
-            answer.set_exception(RemoteError(message.error.code, message.error.message, message.error.data))
+            answer.set_exception(RemoteError(message.error.code, _said(message.error), message.error.data))
             return
         answer.set_result(message.result)
         if on_result is not None:
@@ -182,6 +184,11 @@ class Connection(asyncio.Protocol):
                 answer.set_exception(
                     LinkLost(f"{reason}; a request was under way, and whether it was done is unknown")
                 )
+
+
+def _said(refusal: Refusal) -> str:
+    """The robot's own words, as far as they are told."""
+    return plain(refusal.message[:LONGEST_REFUSAL])
 
 
 def _reason(error: OSError) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 
+from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import NONE, age, say, size, table, warn
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.door import ask
@@ -118,14 +119,23 @@ def _collect(settings: ServerSettings, operator: str, notes: str) -> int:
 def _log_to_stderr() -> None:
     """A line each; in systemd's journal without the time, which it has itself."""
     time = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
-    logging.basicConfig(level=logging.WARNING, format=f"{time}%(levelname)s %(message)s")
+    logging.basicConfig(level=logging.WARNING)
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(PlainLines(f"{time}%(levelname)s %(message)s"))
     logging.getLogger("server_gui").setLevel(logging.INFO)
+
+
+class PlainLines(logging.Formatter):
+    """One line a record, whatever a robot says in it."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's own name
+        return plain(super().formatMessage(record))
 
 
 def _status(spool: Path, *, as_json: bool) -> int:
     answer = ask(spool, "status")
     if as_json:
-        say(answer.decode())
+        say(json_plain(answer.decode().rstrip()) + "\n")
     else:
         say(status_text(msgspec.json.decode(answer, type=CollectorReport)))
     return 0
@@ -149,7 +159,9 @@ def status_text(report: CollectorReport) -> str:
     ]
     robots = report.robots.items()
     links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)
-    problems = "".join(f"{name}: {reason}\n" for name, link in robots for reason in link.quality.reasons)
+    problems = "".join(
+        f"{name}: {plain(reason)}\n" for name, link in robots for reason in link.quality.reasons
+    )
     return "\n".join([*lines, "", links, *([problems] if problems else []), *_predicted(report.prediction)])
 
 

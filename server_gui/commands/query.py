@@ -10,6 +10,7 @@ import msgspec
 import pyarrow as pa
 import pyarrow.csv
 
+from gateway.cli.plain import json_plain
 from gateway.cli.text import NONE, say, table, warn
 from ml.store.query import Result, query
 from server_gui.commands.cloud_reach import add_url, parser, reach
@@ -60,7 +61,7 @@ def _json(result: Result) -> None:
     """One array, a row a line, written while it is read."""
     between = "["
     for batch in result.batches:
-        rows = ",\n".join(_encoder.encode(row).decode() for row in batch.to_pylist())
+        rows = ",\n".join(json_plain(_encoder.encode(row).decode()) for row in batch.to_pylist())
         if rows:
             sys.stdout.write(between + rows)
             between = ",\n"

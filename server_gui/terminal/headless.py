@@ -3,6 +3,7 @@
 import math
 import sys
 
+from gateway.cli.plain import plain
 from gateway.client import ConnectionState
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
@@ -65,7 +66,7 @@ def _stances(gait: Gait) -> str:
 
 def say(text: str) -> None:
     """Print a line at once, also into a pipe."""
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(plain(text, "\n") + "\n")
     sys.stdout.flush()
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
+from gateway.cli.plain import plain
+
 LEFT = "#56b4e9"  # Okabe–Ito sky blue
 RIGHT = "#e69f00"  # Okabe–Ito orange
 GOOD = "#009e73"
@@ -48,11 +50,16 @@ def side_colour(component: str) -> str:
     return {"left": LEFT, "right": RIGHT}.get(side, "default")
 
 
+def words(text: str, style: str = "") -> Text:
+    """Text that is nothing else: no markup of rich, and nothing that commands the terminal."""
+    return Text(plain(text), style=style)
+
+
 def state_text(word: str) -> Text:
     """A state as shape, colour and word."""
-    plain = word.replace("_", " ").lower()
-    mark = STATES.get(plain, UNKNOWN)
-    return Text(f"{mark.shape} {plain}", style=mark.colour)
+    said = word.replace("_", " ").lower()
+    mark = STATES.get(said, UNKNOWN)
+    return words(f"{mark.shape} {said}", mark.colour)
 
 
 def sparkline(values: Iterable[float | None], low: float, high: float, width: int) -> str:

@@ -10,6 +10,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from gateway.cli.plain import plain
 from gateway.client import ConnectionState
 from gateway.messages import ParameterInfo, ParameterValue, Written
 from server_gui.core.events import Failed
@@ -31,6 +32,7 @@ from server_gui.terminal.marks import (
     side_colour,
     sparkline,
     state_text,
+    words,
 )
 
 FULL_FORCE_N = 1000.0
@@ -63,7 +65,7 @@ def header(robot: Robot, where: str, look: Look) -> RenderableType:
     row.add_column(ratio=1)
     row.add_column(justify="right")
     name = robot.description.robot if robot.description is not None else where
-    row.add_row(Text.assemble((name, "bold"), ("  " + where, DIM)), _link(robot, look))
+    row.add_row(Text.assemble((plain(name), "bold"), ("  " + plain(where), DIM)), _link(robot, look))
     if not look.roomy:
         return row
     return Panel(row, title="[bold]GWRMS[/]", title_align="left", box=box.ROUNDED, border_style=DIM)
@@ -74,7 +76,7 @@ def _link(robot: Robot, look: Look) -> Text:
     age_s = robot.age_s()
     if link.state is not ConnectionState.CONNECTED:
         age = f", shown is {age_s:.1f} s old" if age_s is not None else ""
-        return Text(f"✕ {link.state.value}{age}", style=BAD)
+        return words(f"✕ {link.state.value}{age}", style=BAD)
     age = NONE if age_s is None else f"{age_s * 1000:.0f} ms"
     trip = NONE if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     text = Text.assemble(
@@ -104,11 +106,11 @@ def joints(robot: Robot, look: Look) -> RenderableType:
         colour = OLD if stale or value is None else side_colour(name)
         past = list(robot.history.get(channel, ()))[::ROWS_A_BLOCK]
         grid.add_row(
-            Text(name.replace("_", " "), style=side_colour(name)),
+            words(name.replace("_", " "), style=side_colour(name)),
             _drive(robot, name, stale),
-            Text(degrees(value), style=colour),
-            Text(needle(value, JOINT_LOW_RAD, JOINT_HIGH_RAD, look.angle), style=colour),
-            Text(sparkline(past, *_spark_range(past), look.past), style=colour),
+            words(degrees(value), style=colour),
+            words(needle(value, JOINT_LOW_RAD, JOINT_HIGH_RAD, look.angle), style=colour),
+            words(sparkline(past, *_spark_range(past), look.past), style=colour),
         )
     return _panel(grid, "Joints", robot)
 
@@ -126,7 +128,7 @@ def _drive(robot: Robot, name: str, stale: bool) -> Text:
         return _part_state(robot, name)
     word = robot.word(f"{name}.state")
     if stale or word is None:
-        return Text(word or NONE, style=OLD)
+        return words(word or NONE, style=OLD)
     return state_text(word)
 
 
@@ -149,16 +151,18 @@ def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
         force = robot.values.get(f"{name}.force")
         colour = OLD if stale or force is None else side_colour(name)
         share = None if force is None else force / FULL_FORCE_N
-        label = Text(name.replace("_insole", " foot").replace("_", " "), style=side_colour(name))
-        number = _part_state(robot, name) if force is None else Text(f"{force:.0f} N", style=colour)
-        grid.add_row(label, number, Text(bar(share, look.foot), style=colour))
+        label = words(name.replace("_insole", " foot").replace("_", " "), style=side_colour(name))
+        number = _part_state(robot, name) if force is None else words(f"{force:.0f} N", style=colour)
+        grid.add_row(label, number, words(bar(share, look.foot), style=colour))
     for name in robot.names("imu"):
-        for quantity, words in (("tilt_forward", "forward"), ("tilt_side", "to the side")):
+        for quantity, said in (("tilt_forward", "forward"), ("tilt_side", "to the side")):
             tilt = robot.values.get(f"{name}.{quantity}")
             colour = OLD if stale or tilt is None else "default"
-            number = _part_state(robot, name) if tilt is None else Text(degrees(tilt), style=colour)
+            number = _part_state(robot, name) if tilt is None else words(degrees(tilt), style=colour)
             grid.add_row(
-                f"{name} {words}", number, Text(needle(tilt, -TILT_RAD, TILT_RAD, look.foot), style=colour)
+                words(f"{name} {said}"),
+                number,
+                words(needle(tilt, -TILT_RAD, TILT_RAD, look.foot), style=colour),
             )
     return _panel(grid, "Feet and trunk", robot, _walk(gait, look))
 
@@ -185,25 +189,25 @@ def parameters(robot: Robot, controls: Controls, look: Look) -> RenderableType:
     for name, held in robot.parameters.items():
         chosen = name == controls.selected
         style = "bold" if chosen else "default"
-        value = Text(NONE if held.value is None else f"{held.value:.10g}", style=style)
+        value = words(NONE if held.value is None else f"{held.value:.10g}", style=style)
         grid.add_row(
             "▶" if chosen else " ",
-            Text(name, style=style),
+            words(name, style=style),
             value,
-            held.unit,
+            words(held.unit),
             _range(held, infos.get(name), look),
         )
     if not robot.parameters:
-        grid.add_row("", Text("not known yet", style=OLD), "", "", "")
+        grid.add_row("", words("not known yet", style=OLD), "", "", "")
     return _panel(grid, "Gait parameters", robot, _age(robot.parameters_at_ns))
 
 
 def _range(held: ParameterValue, info: ParameterInfo | None, look: Look) -> Text:
     if held.problem is not None or info is None or info.min is None or info.max is None:
-        return Text(held.problem or "no limits known", style=WARN)
+        return words(held.problem or "no limits known", style=WARN)
     where = needle(held.value, info.min, info.max, look.parameter)
     if not look.roomy:
-        return Text(where, style=DIM)
+        return words(where, style=DIM)
     return Text.assemble(f"{info.min:>6g} ", (where, DIM), f" {info.max:g}")
 
 
@@ -211,24 +215,24 @@ def resources(robot: Robot, look: Look) -> RenderableType:
     """The robot's computer: CPU, memory, and who uses them most."""
     seen = robot.resources
     if seen is None:
-        return _panel(Text("not known yet", style=OLD), "Computer", robot)
+        return _panel(words("not known yet", style=OLD), "Computer", robot)
     grid = Table.grid(expand=True, padding=(0, 1))
     grid.add_column(no_wrap=True, ratio=1)
     for _ in range(3):
         grid.add_column(justify="right", no_wrap=True)
     cpu = None if seen.cpu.percent is None else seen.cpu.percent / 100
     memory = seen.memory.used / seen.memory.total
-    grid.add_row(Text("CPU"), Text(bar(cpu, look.share)), _percent(seen.cpu.percent), "")
+    grid.add_row(words("CPU"), words(bar(cpu, look.share)), _percent(seen.cpu.percent), "")
     grid.add_row(
-        Text("memory"), Text(bar(memory, look.share)), f"{100 * memory:.0f} %", _mib(seen.memory.used)
+        words("memory"), words(bar(memory, look.share)), f"{100 * memory:.0f} %", _mib(seen.memory.used)
     )
     grid.add_row(
-        Text("this gateway", style=DIM), "", _percent(seen.gateway.cpu_percent), _mib(seen.gateway.rss_bytes)
+        words("this gateway", style=DIM), "", _percent(seen.gateway.cpu_percent), _mib(seen.gateway.rss_bytes)
     )
     if isinstance(seen.processes, list):
         for process in seen.processes[:SHOWN_PROCESSES]:
-            pid = Text(str(process.pid) if look.roomy else "", style=DIM)
-            grid.add_row(process.name, pid, _percent(process.cpu_percent), _mib(process.memory_bytes))
+            pid = words(str(process.pid) if look.roomy else "", style=DIM)
+            grid.add_row(words(process.name), pid, _percent(process.cpu_percent), _mib(process.memory_bytes))
     return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
 
 
@@ -256,21 +260,21 @@ def _news(robot: Robot, controls: Controls, where: str) -> Text:
     if controls.stop_sent:
         return _stop(robot)
     if robot.last_failure is not None:
-        return Text(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
+        return words(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
     if robot.link.problem is not None:
-        return Text(f"✕ {robot.link.problem}", style=BAD)
+        return words(f"✕ {robot.link.problem}", style=BAD)
     bad = robot.not_ok()
     if bad:
-        return Text(
+        return words(
             "  ".join(f"{part.name} {part.state}: {part.problem or 'no reason known'}" for part in bad),
             style=WARN,
         )
     if controls.writing:
-        return Text(controls.note, style=DIM)
+        return words(controls.note, style=DIM)
     if robot.last_change is not None:
         return _written(robot.last_change.written)
     hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
-    return Text(controls.note or hint, style=DIM)
+    return words(controls.note or hint, style=DIM)
 
 
 def _written(written: Written) -> Text:
@@ -278,20 +282,20 @@ def _written(written: Written) -> Text:
         f"{name} {written.before.get(name, math.nan):.10g} → {after:.10g}"
         for name, after in written.after.items()
     )
-    return Text(f"✓ {', '.join(changes)}, read back", style=GOOD)
+    return words(f"✓ {', '.join(changes)}, read back", style=GOOD)
 
 
 def _stop(robot: Robot) -> Text:
     answer = robot.last_stop
     if answer is None:
-        return Text("STOP sent …", style=f"bold {WARN}")
+        return words("STOP sent …", style=f"bold {WARN}")
     if isinstance(answer, Failed):
-        return Text(f"STOP NOT CONFIRMED: {answer.reason}", style=f"bold {BAD}")
+        return words(f"STOP NOT CONFIRMED: {answer.reason}", style=f"bold {BAD}")
     drives = answer.stopped.drives
     missing = [f"{name} {outcome}" for name, outcome in drives.items() if outcome != "confirmed"]
     if missing or not drives:
-        return Text(f"STOP NOT CONFIRMED: {', '.join(missing) or 'no drives'}", style=f"bold {BAD}")
-    return Text(f"STOP confirmed by all {len(drives)} drives", style=f"bold {GOOD}")
+        return words(f"STOP NOT CONFIRMED: {', '.join(missing) or 'no drives'}", style=f"bold {BAD}")
+    return words(f"STOP confirmed by all {len(drives)} drives", style=f"bold {GOOD}")
 
 
 def _panel(content: RenderableType, title: str, robot: Robot, note: str = "") -> Panel:

@@ -7,11 +7,13 @@ from typing import Any, Final
 
 from PySide6.QtCore import Qt
 
+from gateway.cli.plain import plain
 from gateway.messages import Number
 from server_gui.core.desk.acts import Act
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import brief, exact
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Index, RowsModel
 
 TITLES: Final = (
@@ -57,9 +59,9 @@ class ActsModel(RowsModel[Line]):
         line, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return _TEXTS[column](line)
+                return plain(_TEXTS[column](line))
             case Qt.ItemDataRole.ToolTipRole:
-                return _tip(line)
+                return tip(_tip(line))
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.ForegroundRole if column == OUTCOME and _is_bad(line.act):

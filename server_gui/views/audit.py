@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QPushButton,
     QVBoxLayout,
@@ -26,6 +25,7 @@ from server_gui.views.acts_model import ROBOT, TIME, ActsModel, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
+from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.rows import Filtered, Index, RowsTable
 
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
@@ -99,7 +99,7 @@ class Audit(QWidget):
         self.table = self._table()
         theme.scaled.connect(self._restyle)
         self._restyle()
-        self.verdict = QLabel()
+        self.verdict = PlainLabel()
         self.verdict.setObjectName("banner")
         self.verdict.setWordWrap(True)
         row = QHBoxLayout()

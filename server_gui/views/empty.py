@@ -4,6 +4,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import PlainLabel
 
 WORDS = """<p>No robot is in the list yet.</p>
 <p>Type the address of a robot's gateway at the left, below <i>Robots</i>: HOST:PORT, as
@@ -21,7 +22,7 @@ class EmptyView(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.setObjectName("page")
-        title = QLabel("Welcome to GWRMS")
+        title = PlainLabel("Welcome to GWRMS")
         title.setObjectName("title")
         title.setStyleSheet("font-size: 180%;")
         words = QLabel(WORDS)
@@ -32,7 +33,7 @@ class EmptyView(QWidget):
         self.start.clicked.connect(self._start)
         look = QPushButton("Look at recordings")
         look.clicked.connect(self.recordings)
-        self._said = QLabel()
+        self._said = PlainLabel()
         self._said.setObjectName("dim")
         self._said.setWordWrap(True)
         self._said.setAlignment(Qt.AlignmentFlag.AlignCenter)

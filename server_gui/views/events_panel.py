@@ -6,11 +6,13 @@ from typing import Any, Final
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
+from gateway.cli.plain import plain
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.news import Item
 from server_gui.views.joint_table import GLYPHS
 from server_gui.views.marks import NEWS
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
 COLUMNS: Final = 4
@@ -48,11 +50,13 @@ class NewsModel(QAbstractTableModel):
             case Qt.ItemDataRole.DisplayRole:
                 when = datetime.datetime.fromtimestamp(item.utc_s, datetime.UTC).astimezone()
                 glyph = GLYPHS.get(mark.shape, "◆")
-                return (f"{when:%H:%M:%S}", f"{glyph} {mark.word}", item.robot, item.text)[index.column()]
+                return (f"{when:%H:%M:%S}", f"{glyph} {mark.word}", plain(item.robot), plain(item.text))[
+                    index.column()
+                ]
             case Qt.ItemDataRole.ForegroundRole if index.column() < 2:
                 return self._theme.colour(mark.colour if index.column() else "dim")
             case Qt.ItemDataRole.ToolTipRole:
-                return item.text
+                return tip(item.text)
         return None
 
 

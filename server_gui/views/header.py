@@ -5,7 +5,7 @@ from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -16,6 +16,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
 
 STOP_MARKS: Final = {
@@ -52,8 +53,7 @@ class Chip(QFrame):
         self._icon.show_mark(mark)
         set_text(self._main, main)
         set_text(self._detail, detail)
-        if not self.toolTip().endswith(detail):
-            self.setToolTip(f"{main}\n{detail}")
+        set_tip(self, f"{main}\n{detail}")
 
 
 class Header(QWidget):
@@ -69,7 +69,7 @@ class Header(QWidget):
         self._is_short = False
         self.setObjectName("header")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-        self._brand = QLabel("GWRMS")
+        self._brand = PlainLabel("GWRMS")
         self._brand.setObjectName("brand")
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 5, 12, 5)

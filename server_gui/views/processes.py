@@ -5,6 +5,7 @@ from typing import Any, Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
+from gateway.cli.plain import plain
 from gateway.messages import ProcessUse
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
@@ -25,7 +26,7 @@ class ProcessModel(RowsModel[ProcessUse]):
         process, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return _text(process, column)
+                return plain(_text(process, column))
             case _ if role == SORT_ROLE:
                 return _key(process, column)
             case Qt.ItemDataRole.TextAlignmentRole if column != NAME:

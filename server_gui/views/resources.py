@@ -1,12 +1,11 @@
 """The robot's computer over time: CPU, memory, who uses them, disk, network, heat; and its processes."""
 
-import html
 import time
 from typing import Final
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QHideEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLineEdit, QWidget
 
 from gateway.messages import ResourceSnapshot
 from server_gui.core.desk.desk import Desk
@@ -19,6 +18,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.trend import Trend, since_restart
 from server_gui.views.unit_plot import OTHERS
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.plot import Curve
 
 GIB: Final = 1 << 30
@@ -57,7 +57,7 @@ class Resources(QWidget):
         self.top = Trend(theme, "Who uses the CPU, % of a core", 10.0)
         self.devices = Trend(theme, "Disk and network, KiB/s", 10.0, 1 / KIB)
         self.temperature = Trend(theme, "Temperature", 10.0)
-        self.facts = QLabel()
+        self.facts = PlainLabel()
         self.facts.setWordWrap(True)
         computer = Card("Computer")
         computer.body.addWidget(self.facts)
@@ -146,7 +146,7 @@ class Resources(QWidget):
         top = seen.top(TOP)
         times, columns = seen.over_time(top)
         colours = ("accent", "good", *OTHERS[1:3])
-        named = [Curve(html.escape(one.name), colour) for one, colour in zip(top, colours, strict=False)]
+        named = [Curve(one.name, colour) for one, colour in zip(top, colours, strict=False)]
         self.top.show_rows(seen, times, named, columns, live=live)
 
     def _refresh_notes(self, station: Station) -> None:

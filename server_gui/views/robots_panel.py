@@ -5,7 +5,6 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QScrollArea,
     QVBoxLayout,
@@ -20,6 +19,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 
@@ -35,7 +35,7 @@ class RobotCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), QLabel(), ElidedLabel("dim")
+        self._name, self._state, self._link = ElidedLabel("title"), PlainLabel(), ElidedLabel("dim")
         self._state.setObjectName("dim")
         self._state.setWordWrap(True)
         self.stop = StopButton("robot_stop")
@@ -106,7 +106,7 @@ class RobotsPanel(QWidget):
         self.address.setPlaceholderText("Add a robot: HOST:PORT")
         self.address.setAccessibleName("Address of a robot to add")
         self.address.returnPressed.connect(self._add)
-        self.said = QLabel()
+        self.said = PlainLabel()
         self.said.setObjectName("dim")
         self.said.setWordWrap(True)
         self.said.hide()

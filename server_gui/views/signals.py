@@ -12,7 +12,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QSplitter,
@@ -34,6 +33,7 @@ from server_gui.views.unit_plot import UnitPlot
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
+from server_gui.views.widgets.plain import PlainLabel
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
@@ -87,7 +87,7 @@ class Signals(QWidget):
         self.measuring.chosen.connect(lambda cursor: self._move(cursor, self._at[cursor]))
         self.measuring.stepped.connect(self._step)
         self._stack = QVBoxLayout()
-        self.empty = QLabel("Tick channels at the left to see them here.")
+        self.empty = PlainLabel("Tick channels at the left to see them here.")
         self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.empty.setObjectName("dim")
         self._stack.addWidget(self.empty)

@@ -4,7 +4,7 @@ import collections
 import time
 from typing import Final
 
-from PySide6.QtWidgets import QLabel, QStatusBar
+from PySide6.QtWidgets import QStatusBar
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Tone
@@ -14,6 +14,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 FRAMES: Final = 60
 TONES: Final = {
@@ -31,7 +32,7 @@ class StatusBar(QStatusBar):
         super().__init__()
         self._desk = desk
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
-        self._link, self.recording, self._window = ElidedLabel(), ElidedLabel(), QLabel()
+        self._link, self.recording, self._window = ElidedLabel(), ElidedLabel(), PlainLabel()
         self._icon = MarkIcon(theme, 11)
         stop = ElidedLabel()
         stop.setText("STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop")
@@ -59,8 +60,7 @@ class StatusBar(QStatusBar):
         first = said.detail.partition("\n")[0]
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
         set_text(self.recording, f"{said.text}: {first}" if wrong else said.text)
-        if self.recording.toolTip() != said.detail:
-            self.recording.setToolTip(said.detail)
+        set_tip(self.recording, said.detail)
 
     def _rate(self) -> float:
         if len(self._frames) < 2:

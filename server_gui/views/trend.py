@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QLabel
 
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import rich
 from server_gui.views.widgets.plot import Curve, Plot, css
 
 Floats = npt.NDArray[np.float64]
@@ -64,7 +65,7 @@ class Trend(Card):
             known = values[~np.isnan(values)]
             newest = f"<b>{known[-1] * self._scale:.1f}</b>" if len(known) else "–"
             colour = css(self._theme, curve.colour)
-            text = f"━ {curve.channel} {newest}".replace(" ", "&nbsp;")
+            text = f"━ {rich(curve.channel)} {newest}".replace(" ", "&nbsp;")
             said.append(f'<span style="color:{colour}">{text}</span>')
         set_text(self.legend, "&nbsp; ".join(said))
 

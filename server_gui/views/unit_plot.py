@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QLabel
 from server_gui.core.processing.units import Unit
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import rich
 from server_gui.views.widgets.plot import Curve, Plot, css
 
 # Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
@@ -39,8 +40,8 @@ class UnitPlot(Card):
     def show_values(self, values: Sequence[float | None]) -> None:
         """The newest value of each curve, behind its name."""
         names = (
-            f'<span style="color:{css(self._theme, curve.colour)}">━ {curve.channel} '
-            f"<b>{self.unit.text(value)}</b></span>"
+            f'<span style="color:{css(self._theme, curve.colour)}">━ {rich(curve.channel)} '
+            f"<b>{rich(self.unit.text(value))}</b></span>"
             for curve, value in zip(self._curves, values, strict=True)
         )
         set_text(self._legend, "&nbsp;&nbsp; ".join(names))

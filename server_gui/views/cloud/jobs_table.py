@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 from gateway.cli.text import size
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import set_tip
 
 TITLES: Final = ("Job", "", "", "")
 NAME, BAR, SAID, BUTTON = range(4)
@@ -76,7 +77,7 @@ class JobsTable(QTableWidget):
             item = self.item(row, column)
             if item is not None and item.text() != text:
                 item.setText(text)
-                item.setToolTip(text)
+                set_tip(item, text)
                 item.setForeground(self._theme.colour("bad" if job.state is JobState.FAILED else "text"))
         for bar in self.cellWidget(row, BAR).findChildren(QProgressBar):
             bar.setRange(0, 0 if job.state is JobState.RUNNING and job.total is None else STEPS)

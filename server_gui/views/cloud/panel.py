@@ -34,6 +34,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.files import ask_folder
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import PlainLabel
 
 SLOW: Final = 6  # frames between two looks
 NARROW: Final = 480  # at text of 100 %: what is narrower has no room for two cards beside each other
@@ -58,12 +59,12 @@ class Cloud(QWidget):
         self.jobs = JobsTable(archive.jobs, theme)
         self._cards = {name: Card(name) for name in ("Store", "Waiting for upload", "In the store", "Jobs")}
         self._facts = {name: _value() for name in ("URL", "Service", "Keys", "Holds")}
-        self._icon, self.state = MarkIcon(theme), QLabel()
+        self._icon, self.state = MarkIcon(theme), PlainLabel()
         self.state.setWordWrap(True)
         self.settings = SettingsForm(archive.settings, archive.file or default_file())
         self.settings.hide()
         self._cards["Store"].body.addLayout(self._store())
-        self.waiting = QLabel()
+        self.waiting = PlainLabel()
         self.waiting.setWordWrap(True)
         self.waiting.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.upload = QPushButton("Upload now")
@@ -74,7 +75,7 @@ class Cloud(QWidget):
         self.upload.clicked.connect(self._upload)
         self._cards["Waiting for upload"].body.addWidget(self.waiting, 1)
         self._cards["Waiting for upload"].body.addWidget(self.upload)
-        self.hint = QLabel(NO_STORE)
+        self.hint = PlainLabel(NO_STORE)
         self.hint.setObjectName("dim")
         self.hint.setWordWrap(True)
         self._cards["In the store"].body.addWidget(self.hint)
@@ -129,7 +130,7 @@ class Cloud(QWidget):
         row.addWidget(self.edit)
         grid.addLayout(row, 0, 0, 1, 2)
         for place, (name, value) in enumerate(self._facts.items(), 1):
-            title = QLabel(name)
+            title = PlainLabel(name)
             title.setObjectName("dim")
             grid.addWidget(title, place, 0)
             grid.addWidget(value, place, 1)
@@ -237,7 +238,7 @@ def _waiting(batches: int) -> str:
 
 
 def _value() -> QLabel:
-    label = QLabel()
+    label = PlainLabel()
     label.setWordWrap(True)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)

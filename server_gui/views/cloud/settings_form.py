@@ -5,11 +5,12 @@ from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from server_gui.core.settings import ServerSettings, SettingsError, Upload
 from server_gui.core.settings_file import Value, change
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import PlainLabel
 
 POLICIES: Final = {
     Upload.ALWAYS: "always, a batch at a time",
@@ -48,7 +49,7 @@ class SettingsForm(Card):
         for policy, text in POLICIES.items():
             self.upload.addItem(text, policy.value)
         self.upload.setCurrentIndex(list(POLICIES).index(recorder.upload))
-        self.said, self.save = QLabel(), QPushButton("Check and save")
+        self.said, self.save = PlainLabel(), QPushButton("Check and save")
         self.said.setWordWrap(True)
         self.save.setObjectName("primary")
         self.save.clicked.connect(self._save)
@@ -71,7 +72,7 @@ class SettingsForm(Card):
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         for place, (name, field) in enumerate(rows.items()):
-            title = QLabel(name)
+            title = PlainLabel(name)
             title.setObjectName("dim")
             field.setAccessibleName(f"Store settings: {name}")
             grid.addWidget(title, place, 0)

@@ -1,13 +1,14 @@
 """Who may write: take control or release it, and how long it lasts."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import PlainLabel
 
 
 class ControlBar(QWidget):
@@ -20,7 +21,7 @@ class ControlBar(QWidget):
         super().__init__()
         self._desk = desk
         self._icon = MarkIcon(theme)
-        self.words = QLabel()
+        self.words = PlainLabel()
         self.words.setObjectName("dim")
         self.words.setWordWrap(True)
         self._take, self._release = QPushButton("Take control"), QPushButton("Release")

@@ -5,7 +5,7 @@ from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QPushButton, QSlider
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QSlider
 
 from gateway.messages import Number, ParameterInfo
 from server_gui.core.desk.desk import Desk
@@ -16,6 +16,7 @@ from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import exact
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 STEPS: Final = 200
 
@@ -52,7 +53,7 @@ class Detail(Card):
         self.field = QLineEdit()
         self.field.setAccessibleName("New value, exactly")
         self.field.editingFinished.connect(self._typed)
-        self._unit = QLabel()
+        self._unit = PlainLabel()
         self._unit.setObjectName("dim")
         self._drop = QPushButton("Forget edit")
         self._drop.clicked.connect(self._dropped)
@@ -67,10 +68,10 @@ class Detail(Card):
         row.addWidget(self._unit)
         row.addWidget(self._drop)
         self.body.addLayout(row)
-        self._facts = QLabel("Choose a parameter above; F2 or typing edits it.")
+        self._facts = PlainLabel("Choose a parameter above; F2 or typing edits it.")
         self._facts.setObjectName("dim")
         self._facts.setWordWrap(True)
-        self._facts.setToolTip(f"Stored: {RULE}")
+        set_tip(self._facts, f"Stored: {RULE}")
         self.body.addWidget(self._facts)
         self._brief = ElidedLabel("dim")
         self._brief.hide()
@@ -116,7 +117,7 @@ class Detail(Card):
         set_text(self._facts, facts)
         set_text(self._brief, facts.rpartition("\n")[2])  # a problem stands in a line of its own
         if self._brief.toolTip() != facts:
-            self._brief.setToolTip(facts)
+            set_tip(self._brief, facts)
 
     def _refresh_slider(self, info: ParameterInfo, current: Number | None, value: Number | None) -> None:
         self._range = reach(info, current)

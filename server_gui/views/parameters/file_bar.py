@@ -1,11 +1,12 @@
 """The file that parameters are compared with: how many differ, and staging them."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout
 
 from server_gui.core.desk.comparison import Comparison
 from server_gui.core.desk.desk import Desk
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 
 class FileBar(QFrame):
@@ -19,7 +20,7 @@ class FileBar(QFrame):
         self._desk = desk
         self.setObjectName("card")
         self.setAccessibleName("File that is compared with")
-        self.words = QLabel()
+        self.words = PlainLabel()
         self.words.setWordWrap(True)
         self.stage_button, close = QPushButton("Load as edits"), QPushButton("Close file")
         self.stage_button.setToolTip("Makes edits of the differences, to be reviewed. Nothing is written")
@@ -44,7 +45,7 @@ class FileBar(QFrame):
         file.update(station.known, station.robot.parameters)
         count = len(file.different)
         set_text(self.words, _words(file, count))
-        self.words.setToolTip("\n".join((str(file.path), *file.unchangeable)))
+        set_tip(self.words, "\n".join((str(file.path), *file.unchangeable)))
         self.stage_button.setEnabled(count > 0)
         text = f"Load {count} as edits" if count else "Nothing differs"
         if self.stage_button.text() != text:

@@ -7,7 +7,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QGridLayout,
-    QLabel,
     QMenu,
     QPushButton,
     QStackedWidget,
@@ -31,6 +30,7 @@ from server_gui.views.parameters.tree import ParameterTree
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.files import ask_open, ask_save
+from server_gui.views.widgets.plain import PlainLabel
 
 
 class ParametersPanel(QWidget):
@@ -49,7 +49,7 @@ class ParametersPanel(QWidget):
         self.pages = QStackedWidget()
         for page in (self._edit_page(), self.review, self.storing):
             self.pages.addWidget(page)
-        self.banner = QLabel()
+        self.banner = PlainLabel()
         self.banner.setObjectName("banner")
         self.banner.setWordWrap(True)
         everything = QVBoxLayout(self)

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QPushButton,
     QSpinBox,
     QTableWidget,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from server_gui.core.desk.edits import Change
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "")
 TRIAL_S: Final = 30
@@ -48,7 +48,7 @@ class Review(QWidget):
         self._allowed = False
         self._settled = QTimer(self, singleShot=True)
         self._settled.timeout.connect(lambda: self._enable(self._allowed))
-        title = QLabel("Review: this and nothing else is written")
+        title = PlainLabel("Review: this and nothing else is written")
         title.setObjectName("title")
         title.setWordWrap(True)
         self.table = QTableWidget(0, len(TITLES))
@@ -63,7 +63,7 @@ class Review(QWidget):
         for column in range(len(TITLES)):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        self.said = QLabel()
+        self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)
         self.seconds = CalmSpin()
@@ -134,5 +134,5 @@ class Review(QWidget):
                 item.setFont(self._theme.text_font(bold=True))
             if column == 5:
                 item.setForeground(self._theme.colour("bad"))
-            item.setToolTip(change.problem or "")
+            set_tip(item, change.problem or "")
             self.table.setItem(row, column, item)

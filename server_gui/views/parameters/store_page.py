@@ -22,6 +22,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.desk.storing import Storable, objection, storable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.plain import PlainLabel
 
 SETTLE_MS: Final = 400  # a click that was meant for what stood there before does not count
 TITLES: Final = ("Parameter", "Robot", "Unit", "Stored")
@@ -45,7 +46,7 @@ class StorePage(QWidget):
         self._devices: list[Storable] = []
         self._settled = QTimer(self, singleShot=True)
         self._settled.timeout.connect(self.refresh)
-        title = QLabel("Store to flash")
+        title = PlainLabel("Store to flash")
         title.setObjectName("title")
         explained = QLabel(EXPLAINED)
         explained.setWordWrap(True)
@@ -53,7 +54,7 @@ class StorePage(QWidget):
         self.device.setAccessibleName("Device that is to store")
         self.device.currentIndexChanged.connect(self._settle)
         self.table = self._table()
-        self.said = QLabel()
+        self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)
         back = QPushButton("Back")

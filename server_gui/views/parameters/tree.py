@@ -24,6 +24,7 @@ from server_gui.core.desk.stored import RULE
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.filter import NAME_ROLE, Filter
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import set_tip
 
 Index = QModelIndex | QPersistentModelIndex
 TITLES: Final = ("Parameter", "Robot", "New", "Unit", "Range", "Default", "File", "Stored", "")
@@ -160,10 +161,10 @@ class ParameterTree(QTreeView):
         tip = f"{name}\nobject {info.object} {info.type}\n{info.unit}"
         for place, item in enumerate(items):
             item.setData(name, NAME_ROLE)
-            item.setToolTip(tip)
+            set_tip(item, tip)
             editable = Qt.ItemFlag.ItemIsEditable if place == NEW else Qt.ItemFlag.NoItemFlags
             item.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable | editable)
-        items[RANGE].setToolTip(f"{exact(unit, info.min)} … {exact(unit, info.max)} {unit.symbol}")
+        set_tip(items[RANGE], f"{exact(unit, info.min)} … {exact(unit, info.max)} {unit.symbol}")
         items[STORED].setToolTip(RULE)
         for place in (ROBOT, NEW, RANGE, DEFAULT, FILE):
             items[place].setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -198,7 +199,7 @@ class ParameterTree(QTreeView):
             colour = self._theme.colour("staged") if staged is not None else None
             for item in items:
                 item.setData(colour, Qt.ItemDataRole.BackgroundRole)
-        items[SAID].setToolTip(problem or "")
+        set_tip(items[SAID], problem or "")
 
     def _refresh_facts(
         self, station: Station, name: str, info: ParameterInfo, pinned: frozenset[str]

@@ -1,13 +1,14 @@
 """A trial that counts down: keep it, or let it go back."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.writing import Trial
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.plain import PlainLabel
 
 
 class TrialBar(QFrame):
@@ -22,7 +23,7 @@ class TrialBar(QFrame):
         self._write: int | None = None
         self.setObjectName("card")
         self.setAccessibleName("Trial")
-        self.words = QLabel()
+        self.words = PlainLabel()
         self.words.setObjectName("title")
         self.words.setWordWrap(True)
         self._bar = QProgressBar()

@@ -21,6 +21,7 @@ from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.plain import set_tip
 
 LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
@@ -65,7 +66,7 @@ class LabelBar(QWidget):
         if tape is not self._tape or self._revision != self._labels.revision:
             self._tape, self._revision = tape, self._labels.revision
             set_text(self.said, self._labels.said or self._hint())
-            self.said.setToolTip(self._labels.said)
+            set_tip(self.said, self._labels.said)
             self._timeline.show_labels(self._labels.labels)
             self._fill(tape)
 
@@ -82,7 +83,7 @@ class LabelBar(QWidget):
         row = QHBoxLayout()
         row.addWidget(self.span, 1)
         for button in (begin, end, whole):
-            button.setToolTip(button.accessibleName())
+            set_tip(button, button.accessibleName())
             row.addWidget(button)
         return row
 

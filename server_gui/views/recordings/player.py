@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QMenu,
     QPushButton,
     QSizePolicy,
@@ -30,6 +29,7 @@ from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scrolled import Scrolled
 
 SLOW: Final = 5  # frames between two looks at what people read
@@ -50,7 +50,7 @@ class Player(QWidget):
         self._stack = QStackedWidget()
         for view in self._views:
             self._stack.addWidget(Scrolled(view))
-        self.banner = QLabel()
+        self.banner = PlainLabel()
         self.banner.setObjectName("banner")
         self.banner.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.timeline = Timeline(theme)
@@ -113,7 +113,7 @@ class Player(QWidget):
         self._speed.addItems([f"{speed:g} ×" for speed in SPEEDS])
         self._speed.setAccessibleName("Speed of the playback")
         self._speed.currentIndexChanged.connect(self._set_speed)
-        self.place = QLabel()
+        self.place = PlainLabel()
         self.export = QPushButton("Export")
         menu = QMenu(self.export)
         for kind in FORMATS:
@@ -135,7 +135,7 @@ class Player(QWidget):
             return
         self._tone("bad" if playback.problem else "")
         set_text(self.banner, self._title())
-        self.banner.setToolTip(self.banner.text())
+        set_tip(self.banner, self.banner.text())
         text = "Pause" if playback.playing else "Play"
         if self.play.text() != text:
             self.play.setText(text)

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.cli.plain import plain
 from gateway.cli.text import size
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
@@ -27,6 +27,7 @@ from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import PlainLabel, tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
 TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator", "Notes")
@@ -49,11 +50,11 @@ class SessionModel(RowsModel[Session]):
         session, column = self.rows[index.row()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return _cells(session)[column]
+                return plain(_cells(session)[column])
             case _ if role == SORT_ROLE:
                 return _keys(session)[column]
             case Qt.ItemDataRole.ToolTipRole:
-                return session.session
+                return tip(session.session)
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.FontRole if column in NUMBERS:
@@ -80,7 +81,7 @@ class SessionsPage(QWidget):
         self.words.setAccessibleName("Filter of the recordings")
         self.words.setClearButtonEnabled(True)
         self.words.textChanged.connect(self._filter.setFilterFixedString)
-        self.said = QLabel()
+        self.said = PlainLabel()
         self.said.setWordWrap(True)
         self.said.setObjectName("dim")
         self.play = QPushButton("Play")

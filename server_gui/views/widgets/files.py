@@ -7,6 +7,8 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
+from gateway.cli.plain import plain
+
 
 def ask_open(
     parent: QWidget, title: str, kinds: Sequence[str], done: Callable[[Path], object]
@@ -66,9 +68,9 @@ def _unless_there(parent: QWidget, path: Path, done: Callable[[Path], object]) -
     if not path.exists():
         done(path)
         return
-    box = QMessageBox(
-        QMessageBox.Icon.Question, "Overwrite?", f"{path.name} is there already.", parent=parent
-    )
+    said = f"{plain(path.name)} is there already."
+    box = QMessageBox(QMessageBox.Icon.Question, "Overwrite?", said, parent=parent)
+    box.setTextFormat(Qt.TextFormat.PlainText)
     box.addButton("Overwrite", QMessageBox.ButtonRole.AcceptRole)
     box.addButton(QMessageBox.StandardButton.Cancel)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

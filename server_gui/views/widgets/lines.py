@@ -10,6 +10,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
 
 
 class Lines(QWidget):
@@ -44,5 +45,4 @@ class Lines(QWidget):
             if known:
                 icon.show_mark(lines[place].mark)
                 set_text(label, texts[place])
-        if self.toolTip() != "\n".join(texts):
-            self.setToolTip("\n".join(texts))
+        set_tip(self, "\n".join(texts))

@@ -15,8 +15,8 @@ from server_gui.core.desk.recording import By, Recording, Tone
 from server_gui.core.fleet.collector import Collector
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
+from server_gui.core.prediction.settings import PredictionSettings
 from server_gui.core.settings import (
-    PredictionSettings,
     RecordingSettings,
     RobotSettings,
     ServerSettings,
