@@ -1,6 +1,7 @@
 """The systemd units of a gateway: on demand behind a socket, or at boot where the robot has a guard."""
 
 import os
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,6 +40,16 @@ UMask=0027"""
 _HARDENED_USER = "NoNewPrivileges=yes\nUMask=0027"  # more needs rights that a user's manager does not have
 
 
+# What may stand in a unit: there, a line's end begins another setting, and some signs mean something.
+_HOST = re.compile(r"[0-9A-Za-z][0-9A-Za-z.-]*|[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*")
+_ACCOUNT = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,31}")
+_UNIT = re.compile(r"[A-Za-z0-9_-]{1,200}")
+
+
+class NotForUnits(ValueError):
+    """Something that is to stand in a unit could say more there than it should."""
+
+
 @dataclass(frozen=True, slots=True)
 class Service:
     """What is to be run: the robot's file, for the whole computer as `user`, or for one user's session."""
@@ -47,6 +58,23 @@ class Service:
     name: str = "gwrms"
     of_user: bool = False
     user: str | None = None  # None: one that systemd makes up
+
+    def __post_init__(self) -> None:
+        """Refuse what may not stand in a unit.
+
+        Raises:
+            NotForUnits: says what it is, and what may.
+
+        """
+        config = self.config
+        _fits(_UNIT, self.name, "the units' name", "letters, digits, _ and -")
+        if not self.at_boot:
+            _fits(_HOST, config.gateway.host, f"host in {config.path}", "an address without a zone")
+        if self.user is not None:
+            _fits(_ACCOUNT, self.user, "the account", "letters, digits, _ . and -, at most 32")
+        for path in (Path(sys.executable), config.path.absolute(), self._records):
+            _readable(str(path), "the path")
+        _readable(" ".join(config.robot.name.split()), f"name in {config.path}")
 
     @property
     def at_boot(self) -> bool:
@@ -133,6 +161,19 @@ class Service:
         if self.config.gateway.records is not None:
             lines.append(f"ReadWritePaths={_quoted(f'-{self._records}')}")
         return "\n".join(lines)
+
+
+def _fits(pattern: re.Pattern[str], given: str, what: str, allowed: str) -> None:
+    if not pattern.fullmatch(given):
+        raise NotForUnits(f"{what} cannot stand in a systemd unit: {given!r}; give {allowed}")
+
+
+def _readable(given: str, what: str) -> None:
+    if not given.isprintable() or "\\" in given:
+        raise NotForUnits(
+            f"{what} cannot stand in a systemd unit: {given!r}; leave out backslashes, line ends and "
+            "whatever else cannot be printed"
+        )
 
 
 def _escaped(path: Path | str) -> str:

@@ -8,10 +8,11 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from gateway.cli import install_service
-from gateway.cli.units import MARK, Service, folder
+from gateway.cli.units import MARK, NotForUnits, Service, folder
 from gateway.config import load
 from gateway.listeners import listen
 from gateway.main import main
@@ -178,3 +179,54 @@ def test_wrong_usage_ends_with_2(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_computer_s_units_go_where_systemd_looks() -> None:
     assert folder(of_user=False) == Path("/etc/systemd/system")
+
+
+BREAK = "x\nExecStartPre=/bin/evil"
+
+
+@pytest.mark.parametrize("host", [f"fe80::1%{BREAK}", BREAK, "%h", "a b", "", "::1%%eth0", "1.2.3.4\\"])
+def test_a_host_that_says_more_than_a_host_is_refused(file: Path, host: str) -> None:
+    config = load(file)
+    gateway = msgspec.structs.replace(config.gateway, host=host)
+    with pytest.raises(NotForUnits, match=r"host in .* cannot stand in a systemd unit"):
+        Service(msgspec.structs.replace(config, gateway=gateway))
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1", "fe80::1", "0.0.0.0", "robot-1.lab", "::ffff:1.2.3.4"])
+def test_a_host_that_is_one_stands_in_the_unit(file: Path, host: str) -> None:
+    config = load(file)
+    gateway = msgspec.structs.replace(config.gateway, host=host)
+    units = Service(msgspec.structs.replace(config, gateway=gateway)).units
+    assert host in units["gwrms.socket"]
+
+
+@pytest.mark.parametrize("user", [f"ada\n{BREAK}", "ada ", "%u", "-ada", "a/b", "", "x" * 40])
+def test_an_account_that_says_more_than_one_is_refused(file: Path, user: str) -> None:
+    with pytest.raises(NotForUnits, match="the account cannot stand"):
+        Service(load(file), user=user)
+
+
+@pytest.mark.parametrize("name", ["a/b", BREAK, "", "../x", "a.service"])
+def test_a_unit_name_that_is_a_path_is_refused(file: Path, name: str) -> None:
+    with pytest.raises(NotForUnits, match="the units' name cannot stand"):
+        Service(load(file), name)
+
+
+@pytest.mark.parametrize("name", ["folder\nExecStartPre=x", "back\\slash", "esc\x1b[2J"])
+def test_a_path_with_a_line_end_is_refused(file: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    moved = file.rename(tmp_path / name / "robot.toml")
+    with pytest.raises(NotForUnits, match="the path cannot stand"):
+        Service(load(moved))
+    config = load(moved.rename(file))
+    gateway = msgspec.structs.replace(config.gateway, records=str(tmp_path / name))
+    with pytest.raises(NotForUnits, match="the path cannot stand"):
+        Service(msgspec.structs.replace(config, gateway=gateway), user="ada")
+
+
+@pytest.mark.parametrize("name", ["exo\x1b[2J", "exo\\"])
+def test_a_robot_name_that_says_more_is_refused(file: Path, name: str) -> None:
+    config = load(file)
+    robot = msgspec.structs.replace(config.robot, name=name)
+    with pytest.raises(NotForUnits, match=r"name in .* cannot stand"):
+        Service(msgspec.structs.replace(config, robot=robot))
