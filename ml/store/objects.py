@@ -16,6 +16,7 @@ from obstore.exceptions import AlreadyExistsError, NotFoundError
 from obstore.store import MemoryStore, ObjectStore, from_url
 
 from ml.store.errors import translated
+from ml.store.private import private_folder
 
 CONNECT_TIMEOUT_S: Final = 5
 TIMEOUT_S: Final = 60
@@ -130,6 +131,7 @@ def s3_options() -> dict[str, str]:
 
 def _open(url: str) -> ObjectStore:
     if url.startswith("file://"):
+        private_folder(Path(unquote(urlsplit(url).path)))
         return from_url(url, mkdir=True)
     options = s3_options()
     client = {name: options.pop(name) for name in _CLIENT if name in options}

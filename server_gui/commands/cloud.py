@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.cli.reach import choose
+from ml.store.private import private_files
 from server_gui.commands.cloud_look import du, ls, verify
 from server_gui.commands.cloud_move import download, upload
 from server_gui.commands.cloud_upkeep import compact, retain, vacuum
@@ -36,4 +37,5 @@ COMMANDS: Final[dict[str, Callable[[list[str]], int]]] = {
 
 def main(argv: list[str]) -> int:
     """Run `gwrms cloud`."""
+    private_files()
     return choose(argv, COMMANDS, USAGE)

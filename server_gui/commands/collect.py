@@ -14,6 +14,7 @@ import msgspec
 
 from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import NONE, age, say, size, table, warn
+from ml.store.private import private_files
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.door import ask
 from server_gui.core.fleet.statistics import LinkReport
@@ -71,6 +72,7 @@ exit status
 
 def main(argv: list[str]) -> int:
     """Run `gwrms collect`."""
+    private_files()
     arguments = _parser().parse_args(argv)
     if arguments.unit:
         say(UNIT.read_text(encoding="utf-8").replace("@PYTHON@", sys.executable))

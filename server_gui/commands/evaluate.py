@@ -8,6 +8,7 @@ from pathlib import Path
 from gateway.cli.text import say, say_json, table
 from ml.evaluate import BENCHMARKS, Benchmark, Outcome
 from ml.evaluate.report import number, page
+from ml.store.private import private_files
 
 EPILOG = f"""benchmarks
 {chr(10).join(f"  {one.name:<16} {one.asks}" for one in BENCHMARKS.values())}
@@ -28,6 +29,7 @@ exit status
 
 def main(argv: list[str]) -> int:
     """Run `gwrms evaluate`."""
+    private_files()
     arguments = _parser().parse_args(argv)
     benchmark = BENCHMARKS[arguments.benchmark]
     began = time.monotonic()

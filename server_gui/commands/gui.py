@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from ml.store.private import private_files
 from server_gui.core.settings import add_robots, default_file, load, name_of
 from server_gui.qt_needs import check, prefer_x
 
@@ -25,6 +26,7 @@ exit status
 
 def main(argv: list[str]) -> int:
     """Run `gwrms gui`."""
+    private_files()
     arguments = _parser().parse_args(argv)
     settings = add_robots(load(arguments.config), dict(arguments.robot))
     prefer_x()

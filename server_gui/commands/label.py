@@ -11,6 +11,7 @@ import msgspec
 from gateway.cli.text import NONE, say, say_json, table, warn
 from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
+from ml.store.private import private_files
 from ml.store.sessions import Session
 from server_gui.commands.cloud_reach import absolute, instant_or_seconds, parser
 from server_gui.core.labelling import Kept, Labelling, span
@@ -42,6 +43,7 @@ exit status
 
 def main(argv: list[str]) -> int:
     """Run `gwrms label`."""
+    private_files()
     made = _parser()
     arguments = made.parse_intermixed_args(argv)  # LABEL may follow an option
     settings = load(arguments.config)

@@ -19,6 +19,7 @@ from ml.registry.registry import Registry
 from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
+from ml.store.private import private_files
 from ml.store.store import checked_url
 from server_gui.commands.cloud_reach import add_url, parser, url, when
 from server_gui.commands.models_show import told
@@ -50,6 +51,7 @@ NOTHING: Final = "nothing"  # that serves
 
 def main(argv: list[str]) -> int:
     """Run `gwrms models`."""
+    private_files()
     return choose(argv, COMMANDS, USAGE)
 
 

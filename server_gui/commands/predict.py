@@ -16,6 +16,7 @@ from gateway.cli.text import say, say_json
 from gateway.client import Address, BadAddress
 from ml.registry.card import age_days
 from ml.store import Store, sessions
+from ml.store.private import private_files
 from ml.store.sessions import Session
 from server_gui.commands.cloud_reach import parser
 from server_gui.commands.rehearse import rehearse
@@ -51,6 +52,7 @@ exit status
 
 def main(argv: list[str]) -> int:
     """Run `gwrms predict`."""
+    private_files()
     made = _parser()
     arguments = made.parse_args(argv)
     if not (arguments.robot or arguments.session or arguments.benchmark):

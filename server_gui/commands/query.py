@@ -12,6 +12,7 @@ import pyarrow.csv
 
 from gateway.cli.plain import json_plain
 from gateway.cli.text import NONE, say, table, warn
+from ml.store.private import private_files
 from ml.store.query import Result, query
 from server_gui.commands.cloud_reach import add_url, parser, reach
 from server_gui.core.cloud.tabular import iso_8601
@@ -40,6 +41,7 @@ Only reading: no other statement, no file outside the store. Times are UTC."""
 
 def main(argv: list[str]) -> int:
     """Run `gwrms query`."""
+    private_files()
     made = parser("query", "SQL over the store's tables.", EPILOG)
     made.add_argument("sql", metavar="SELECT…", help="one statement, in DuckDB's SQL; - reads it from stdin")
     made.add_argument("--csv", action="store_true", help="CSV, every row")

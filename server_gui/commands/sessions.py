@@ -13,6 +13,7 @@ import pyarrow as pa
 
 from gateway.cli.reach import choose as choose_command
 from gateway.cli.text import NONE, say, say_json, size, table, warn
+from ml.store.private import private_files
 from ml.store.sessions import Channel, Session
 from server_gui.commands.cloud_reach import (
     Advance,
@@ -42,6 +43,7 @@ USAGE = (
 
 def main(argv: list[str]) -> int:
     """Run `gwrms sessions`."""
+    private_files()
     commands = {"ls": ls, "show": show, "export": export, "gait": gait}
     return choose_command(argv, commands | {"resources": resources, "compare": compare}, USAGE)
 

@@ -10,6 +10,7 @@ from ml.errors import Overtaken
 from ml.registry.card import Metrics
 from ml.registry.registry import Registry
 from ml.robot.task import TASKS
+from ml.store.private import private_files
 from ml.training.judging import Judged
 from ml.training.material import Wish
 from ml.training.training import Trained, told, train
@@ -39,6 +40,7 @@ exit status
 
 def main(argv: list[str]) -> int:
     """Run `gwrms train`."""
+    private_files()
     arguments = _parser().parse_args(argv)
     wish = Wish(
         arguments.task,

@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from ml.store import durable
 from ml.store.errors import StoreError, translated
 from ml.store.objects import PIECE_BYTES, Object, Objects
+from ml.store.private import opener, private_folder
 from ml.store.probe import probe
 from ml.store.store import ABOUT, Store
 from server_gui.core.cloud.checksums import Altered, Digest, proven
@@ -25,6 +26,7 @@ _LOG: Final = f"/{durable.LOG}/"
 # What is no part of a store, and the one object that changes: a hint, which the next checkpoint makes anew.
 _NOT_COPIED: Final = re.compile(rf"_probe/.*|.*{re.escape(PART)}|.*{_LOG}_last_checkpoint")
 _ENTRY: Final = re.compile(rf"(.*){_LOG}(\d{{20}})\.json")
+_NO_NAMES: Final = ("", ".", "..")
 Listing = Mapping[str, Object]
 
 
@@ -56,12 +58,15 @@ def missing(source: Objects, target: Objects) -> list[Object]:
     """What the target lacks, in the order in which it is to be copied.
 
     Raises:
-        StoreError: the target is no earlier state of the source.
+        StoreError: the target is no earlier state of the source, or an object has no place in a folder.
 
     """
     before = _listing(source)
     now = _listing(source)  # files are written before the log names them: all that `before` names are here
     wanted = {path: found for path, found in now.items() if path in before or _LOG not in path}
+    if target.url.startswith("file://"):
+        for path in wanted:
+            beneath(_folder(target), path)
     there = _listing(target)
     _check(source, target, now, there)
     return sorted((found for path, found in wanted.items() if _differs(found, there.get(path))), key=_order)
@@ -88,7 +93,7 @@ def copy(source: Objects, target: Objects, wanted: Sequence[Object], advance: Ad
 def _copy(source: Objects, target: Objects, found: Object, advance: Advance) -> bool:
     digest = Digest()
     if target.url.startswith("file://"):
-        file = Path(urlsplit(target.url).path) / found.path
+        file = beneath(_folder(target), found.path)
         with translated(f"{file} cannot be written"):
             _into(file, source, found, digest, advance)
         if source.url.startswith("file://"):  # which makes no tags: what was written is read
@@ -104,9 +109,9 @@ def _copy(source: Objects, target: Objects, found: Object, advance: Advance) -> 
 
 def _into(file: Path, source: Objects, found: Object, digest: Digest, advance: Advance) -> None:
     """Into a folder, going on where an earlier attempt ended."""
-    file.parent.mkdir(parents=True, exist_ok=True)
+    private_folder(file.parent)
     part = file.with_name(f"{file.name}{PART}")
-    with part.open("ab+") as out:
+    with open(part, "ab+", opener=opener) as out:
         out.truncate(min(out.tell(), found.size_bytes) // PIECE_BYTES * PIECE_BYTES)
         out.seek(0)
         for _ in _told(digest.of(iter(lambda: out.read(PIECE_BYTES), b"")), advance):
@@ -116,6 +121,27 @@ def _into(file: Path, source: Objects, found: Object, digest: Digest, advance: A
         out.flush()
         os.fsync(out.fileno())
     part.replace(file)
+
+
+def _folder(target: Objects) -> Path:
+    return Path(unquote(urlsplit(target.url).path))
+
+
+def beneath(folder: Path, key: str) -> Path:
+    """Where an object goes in a folder, whatever whoever wrote to the store has called it.
+
+    Raises:
+        StoreError: that would be no file beneath the folder.
+
+    """
+    named = key.isprintable() and "\\" not in key and all(part not in _NO_NAMES for part in key.split("/"))
+    file = folder / key
+    if not named or not file.resolve().is_relative_to(folder.resolve()):
+        raise StoreError(
+            f"the store has an object that is called {key!r:.200}, which is no file beneath {folder}; "
+            "see who writes to the store, and remove it there"
+        )
+    return file
 
 
 def _told(pieces: Iterator[bytes], advance: Advance) -> Iterator[bytes]:

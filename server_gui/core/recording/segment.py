@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import msgspec
 
+from ml.store.private import FILE
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
 
@@ -58,6 +59,7 @@ class Segment:
         self.number = number
         self.rows = 0
         with translated(path):
+            path.touch(FILE)  # what SQLite puts beside it is as private as this is
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
             self._database.execute(f"PRAGMA page_size={PAGE_BYTES}")
             self._database.execute(f"PRAGMA mmap_size={MAPPED_BYTES}")

@@ -22,6 +22,7 @@ from typing import IO, Final, Self
 
 import msgspec
 
+from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import SUFFIXES, Segment
@@ -211,7 +212,7 @@ class Spool:
         file = self.folder / "id"
         if not file.exists():
             draft = file.with_name("id.draft")
-            with draft.open("w") as out:
+            with open(draft, "w", opener=opener) as out:
                 out.write(f"{uuid.uuid4()}\n")
                 out.flush()
                 os.fsync(out.fileno())
@@ -262,8 +263,8 @@ class Spool:
 def _take(folder: Path) -> IO[bytes]:
     """The folder's lock, which ends with the process, however that ends."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / "lock").open("ab")
+        closed_folder(folder)
+        lock = open(folder / "lock", "ab", opener=opener)  # noqa: SIM115 - held as long as the spool
     except OSError as error:
         raise SpoolUnusable(
             f"the spool's folder {folder} cannot be used: {error.strerror or error}; "
