@@ -228,6 +228,8 @@ def stop_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[X
     if qt.platformName() != "xcb":
         return contextlib.nullcontext()
     try:
-        return X11Keys(int(app.window.winId()), lambda: app.stop("STOP key of the window"))
+        keys = X11Keys(int(app.window.winId()), lambda: app.stop("STOP key of the window"))
     except NoX:
         return contextlib.nullcontext()
+    app.feeds.others.add(keys.worker)
+    return keys

@@ -122,6 +122,11 @@ class Watch:
         self._lock = threading.Lock()
         self._known: dict[str, Trouble] = {}
 
+    def add(self, worker: Worker) -> None:
+        """Another one, from now on."""
+        with self._lock:
+            self._workers += (worker,)
+
     def look(self) -> tuple[Trouble, ...]:
         """What is wrong now; what has begun or is over since the last time is said in the log."""
         with self._lock:

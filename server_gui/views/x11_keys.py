@@ -6,12 +6,14 @@ server, or another program has grabbed the keys, Qt's way remains.
 """
 
 import ctypes
+import math
 import os
 import select
-import threading
 import time
 from collections.abc import Callable
 from typing import Final, Self
+
+from server_gui.core.watching import Worker
 
 F12, SPACE = 0xFFC9, 0x0020  # keysyms
 CONTROL, CAPS_LOCK, NUM_LOCK = 0x04, 0x02, 0x10
@@ -40,16 +42,16 @@ class X11Keys:
         self._connection = _connect(self._xcb)
         self._end = os.pipe()
         self._last_s: dict[int, float] = {}  # of each key
-        self._thread = threading.Thread(target=self._watch, name="stop keys")
+        self.worker = Worker("stop keys", self._watch, math.inf)  # it waits for a key, as long as it takes
 
     def __enter__(self) -> Self:
         self._grab()
-        self._thread.start()
+        self.worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
         os.write(self._end[1], b".")
-        self._thread.join()
+        self.worker.join()
         self._xcb.xcb_disconnect(self._connection)
         for descriptor in self._end:
             os.close(descriptor)

@@ -78,6 +78,7 @@ class Feeds:
             self._elsewhere = None if record is None else Elsewhere(settings.recorder.spool)
             self._predicting = Predicting(settings, foresee) if settings.prediction.enabled else None
         predicting = () if self._predicting is None else self._predicting.workers
+        self.others = Watch(())  # threads of the window itself
         self._watch = Watch((self.network.worker, *predicting))  # where no collector has one
 
     def __enter__(self) -> Self:
@@ -127,7 +128,8 @@ class Feeds:
             self._collector.wait(0.0)
         elif self._record is not None and recording.is_alone(GIVE_WAY_S):
             self._take_over(recording)
-        recording.see((self._watch if self._collector is None else self._collector.watch).look())
+        watch = self._watch if self._collector is None else self._collector.watch
+        recording.see((*watch.look(), *self.others.look()))
         recording.look()
 
     # --- inside

@@ -1,6 +1,7 @@
 """Threads that die or stand still are an alarm and begun anew; nothing is called recorded that is not."""
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,9 +14,9 @@ from server_gui.commands.collect import status_text
 from server_gui.core.desk.news import News
 from server_gui.core.desk.recording import By, Recording, Tone
 from server_gui.core.fleet.collector import Collector
+from server_gui.core.prediction.settings import PredictionSettings
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
-from server_gui.core.prediction.settings import PredictionSettings
 from server_gui.core.settings import (
     RecordingSettings,
     RobotSettings,
@@ -66,6 +67,24 @@ def test_a_thread_that_dies_again_and_again_does_not_work() -> None:
     assert "2 times" in watch.look()[0].text
     worker.join()
     assert watch.look() == ()
+
+
+def test_a_thread_that_waits_as_long_as_it_takes_does_not_stand_still_but_its_death_is_said() -> None:
+    ending = threading.Event()
+
+    def run() -> None:
+        ending.wait(WAIT_S)
+
+    worker = Worker("stop keys", run, math.inf)
+    watch = Watch(())
+    watch.add(worker)
+    worker.start()
+    time.sleep(STILL_S + 0.3)
+    assert watch.look() == ()
+    ending.set()  # it returns, though its owner has not asked for that
+    until(watch.look)
+    assert watch.look()[0].thread == "stop keys"
+    worker.join()
 
 
 def test_a_thread_that_stands_still_is_said_within_a_second_and_over_when_it_moves(
