@@ -34,6 +34,7 @@ class Described:
     """What the robot is made of; comes anew with every link."""
 
     description: Description
+    calendar_ns: int = 0  # the robot's minus ours when it came
 
 
 @dataclass(frozen=True, slots=True)

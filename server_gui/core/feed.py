@@ -146,7 +146,7 @@ class Feed:
         async with asyncio.TaskGroup() as group:
             group.create_task(self._until_dropped())
             description = await self._client.describe()
-            self._admit(Described(description))
+            self._admit(Described(description, description.clock.utc_ns - time.time_ns()))
             group.create_task(self._stream(self._channels(description)))
             changeable = (known.name for known in description.parameters if known.read_only is None)
             parameters = _matching(following.parameters, changeable)

@@ -73,7 +73,7 @@ class LinkStatistics:
                 self._look(event.received_bytes, event.at_ns)
             case Described():
                 self._calls_itself = event.description.robot
-                self._monitor.calendar(event.description.clock.utc_ns - time.time_ns())
+                self._monitor.calendar(event.calendar_ns)
             case Refused():
                 self._monitor.refused(event.reason, time.monotonic_ns())
             case LinkChanged():

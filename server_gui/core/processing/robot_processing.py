@@ -40,7 +40,7 @@ class RobotProcessing:
                 )
             case Described():
                 self._described(event.description)
-                self.communication.calendar(event.description.clock.utc_ns - time.time_ns())
+                self.communication.calendar(event.calendar_ns)
             case Refused():
                 self.communication.refused(event.reason, time.monotonic_ns())
             case _:
