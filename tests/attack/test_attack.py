@@ -114,14 +114,12 @@ def test_a_hostile_sensor_harms_no_other_and_is_taken_up_again(victim: Robot) ->
 # What has no limit yet
 
 
-@pytest.mark.xfail(strict=True, reason="a body of JSON lines is served, whatever stands before it")
 def test_a_web_page_changes_no_parameter(tmp_path: Path) -> None:
     with robot(tmp_path, rate=RATE) as walking:  # nobody has stopped it: a write would be done
         barrage(Target(walking.address, SECONDS), 1, Manner(strangers.HTTP, pause_s=0.3))
         assert walking.bus.wrote == 0
 
 
-@pytest.mark.xfail(strict=True, reason="what is no JSON is answered, and the next line is awaited")
 @pytest.mark.parametrize("name", ["http", "tls", "ssh"])
 def test_who_speaks_another_protocol_is_answered_nothing_and_ended(victim: Robot, name: str) -> None:
     _, said = struck(victim, name)
@@ -129,7 +127,6 @@ def test_who_speaks_another_protocol_is_answered_nothing_and_ended(victim: Robot
     assert said.ended
 
 
-@pytest.mark.xfail(strict=True, reason="a client's name may be as long as a line")
 def test_nobody_is_shown_a_name_without_end(victim: Robot) -> None:
     with Client(victim.address) as named, Client(victim.address) as other:
         named.send(NAMES.splitlines(keepends=True)[0] + request("clock.read", number=2))

@@ -74,8 +74,10 @@ WRONG = {
     ),
     "packed, then damaged": (b"\x1f\x8b\x08\0\0\0\0\0\0\x03" + b"\xff" * 40, "damaged"),
     "a time too large": (
-        b'{"session":"a","subject":1,"columns":["time","label","left_phase","right_phase"]}\n'
-        b'[99999999999999999999,"walk",0,0]\n',
+        (
+            b'{"session":"a","subject":1,"columns":["time","label","left_phase","right_phase"]}\n'
+            b'[99999999999999999999,"walk",0,0]\n'
+        ),
         "damaged",
     ),
     "lists too deep": (b"[" * 100_000 + b"\n", "damaged"),
