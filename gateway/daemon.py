@@ -21,6 +21,9 @@ from gateway.sharing import Sharing
 
 log = logging.getLogger(__name__)
 
+MUCH_BYTES = 64 * 1024  # that a client has sent or got
+TIDY_S = 5.0  # after it has gone
+
 
 class Daemon:
     """One robot's gateway on one listening socket."""
@@ -47,6 +50,7 @@ class Daemon:
         self._sharing = Sharing(self._loop)
         self._ending = False
         self._told = False
+        self._tidying = False
         self._ends_idle = ends_idle
         self._idle: Timer | None = None
         self._intake = Intake(self._loop, listener, self._open, lambda: self._service.registry.stop_now)
@@ -124,7 +128,20 @@ class Daemon:
         opened = self._places.admit(inlet.peer.rpartition(":")[0], session)
         if opened is not None:
             opened.on_close(self._left)
+            opened.on_close(lambda: self._tidy_after(opened))
             self._service.opened(opened)
+
+    def _tidy_after(self, gone: Session) -> None:
+        """Where somebody who moved much has gone, the system soon gets back what that took."""
+        if gone.received_bytes + gone.sent_bytes >= MUCH_BYTES and not self._tidying:
+            self._tidying = True
+            self._loop.call_later(TIDY_S, self._tidy)
+
+    def _tidy(self) -> None:
+        from gateway.modules.stop.memory import MemoryLock  # for a gateway that has worked
+
+        self._tidying = False
+        MemoryLock.give_back()
 
     def _left(self) -> None:
         """Somebody has gone, or nobody has come yet: `linger_s` from now it may be idle."""

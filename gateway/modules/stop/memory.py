@@ -6,6 +6,7 @@ import resource
 import threading
 
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall(2), asm-generic/mman.h
+_ALL = _CURRENT | _FUTURE | _ON_FAULT
 
 
 class MemoryLock:
@@ -20,8 +21,19 @@ class MemoryLock:
         """Lock what is used now, and what is used from now on as soon as it is."""
         with cls._lock:
             if cls._held == 0:
-                cls.problem = _call("mlockall", _CURRENT | _FUTURE | _ON_FAULT) if _is_allowed() else _LIMITED
+                cls.problem = _call("mlockall", _ALL) if _is_allowed() else _LIMITED
             cls._held += 1
+
+    @classmethod
+    def give_back(cls) -> None:
+        """Let the system have what is free within the process; for that a lock is lifted for a moment."""
+        with cls._lock:
+            is_locked = cls._held > 0 and cls.problem is None
+            if is_locked:
+                _call("munlockall")
+            _call("malloc_trim", 0)
+            if is_locked:
+                cls.problem = _call("mlockall", _ALL)
 
     @classmethod
     def end(cls) -> None:
@@ -42,6 +54,8 @@ def _is_allowed() -> bool:
 
 def _call(name: str, *arguments: int) -> str | None:
     libc = ctypes.CDLL(None, use_errno=True)
+    if not hasattr(libc, name):  # malloc_trim is the GNU C library's
+        return f"this system has no {name}"
     if getattr(libc, name)(*arguments) == 0:
         return None
     return f"memory is not locked ({os.strerror(ctypes.get_errno())})"
