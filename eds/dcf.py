@@ -136,7 +136,8 @@ def _set_values(sections: list[_Section], values: Mapping[Key, Number], end: str
         key = int(match[1], 16), int(match[2] or "0", 16)
         if any(_key_of(line) == "compactsubobj" for line in section.lines):
             entries = sorted(one for one in left if one[0] == key[0])
-            compact[match[1]] = {sub: value_text(left.pop((index, sub)), key) for index, sub in entries}
+            texts = {sub: value_text(left.pop((index, sub)), key) for index, sub in entries}
+            compact[match[1]] = compact.get(match[1], {}) | texts  # the section may stand twice
         elif key in left:
             section.set({"ParameterValue": value_text(left.pop(key), key)}, end)
     if left:

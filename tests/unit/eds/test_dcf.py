@@ -231,3 +231,9 @@ def test_a_damaged_file_is_read_or_refused_in_words(data: st.DataObject) -> None
         with contextlib.suppress(EdsError):
             node_id, _name = dcf.owner(path)
             assert dcf.read(path, node_id or 1).values
+
+
+def test_an_array_whose_section_stands_twice_keeps_its_values(tmp_path: Path) -> None:
+    section = "[2003]\nParameterName=Y\nObjectType=8\nDataType=0x0007\nAccessType=rw\nCompactSubObj=3\n"
+    path = made(tmp_path, (section + "[1000]\n" + section).encode(), {(0x2003, 1): 5, (0x2003, 3): 6})
+    assert dcf.read(path, 5).values == {(0x2003, 1): 5, (0x2003, 3): 6}
