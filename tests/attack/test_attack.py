@@ -26,7 +26,7 @@ from tests.unit.gateway.harness import Client, until
 pytestmark = pytest.mark.timeout(120)
 
 RATE = 400.0  # TPDOs a second, for slow machines
-SECONDS = 0.7
+SECONDS = 0.5
 NODES = tuple(range(1, 9))
 LONGEST_NAME = 1000  # characters, of whatever a client calls itself; no limit need be so wide
 
