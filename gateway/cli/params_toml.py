@@ -73,7 +73,7 @@ def _document(path: Path) -> dict[str, dict[str, object]]:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise FileProblem(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise FileProblem(f"{path}: is no TOML: {error}") from error
     for name, table in document.items():
         if name not in _TABLES or not isinstance(table, dict):

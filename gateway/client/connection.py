@@ -26,7 +26,7 @@ from gateway.client.errors import (
 OnNotification = Callable[[str, msgspec.Raw], None]
 OnResult = Callable[[msgspec.Raw], None]
 LONGEST_REFUSAL = 4096  # letters of it that are told
-UNREADABLE = (msgspec.MsgspecError, RecursionError)  # what decoding raises; the second is nested too deeply
+UNREADABLE = (ValueError, RecursionError)  # what decoding raises: also for bad UTF-8, and nesting
 
 
 class Refusal(msgspec.Struct):

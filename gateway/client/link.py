@@ -270,6 +270,8 @@ class Link:
             data = self._decode_data(params)
         except UNREADABLE as error:
             raise ProtocolError(f"{self.address} sent stream data that cannot be read: {error}") from error
+        if any(len(column) != len(data.stamp_ns) for column in data.columns.values()):
+            raise ProtocolError(f"{self.address} sent a batch whose columns are not as long as its stamps")
         subscription = self._streams.get(data.stream)
         if subscription is not None:
             subscription.feed(data, time.monotonic_ns())

@@ -127,7 +127,7 @@ def load(path: Path | None = None) -> ServerSettings:
         raise SettingsError(f"{file}: is not there; name the server's file with --config") from error
     except OSError as error:
         raise SettingsError(f"{file}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise SettingsError(f"{file}: is no TOML: {error}") from error
     try:
         return _settings(document, file.parent)

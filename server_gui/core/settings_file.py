@@ -34,7 +34,7 @@ def change(file: Path, changes: Changes) -> None:
     try:
         if tomllib.loads(new) != _with(tomllib.loads(old), changes):
             raise ValueError
-    except ValueError:  # also what is no TOML any more
+    except (ValueError, RecursionError):  # also what is no TOML any more
         keys = ", ".join(f"[{table}] {key}" for table, key in changes)
         raise SettingsError(f"{file} cannot be changed here as it is written: change {keys} in it") from None
     try:
