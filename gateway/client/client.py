@@ -70,6 +70,7 @@ class Client:
         where = Address.parse(address) if isinstance(address, str) else address
         self.link = Link(where, settings or LinkSettings(), on_state)
         self._writing: list[float] = []  # blocks that hold the lease, each with how long it asked for it
+        self._trying: set[int] = set()  # writes on trial that were neither confirmed nor reverted here
 
     async def __aenter__(self) -> Self:
         self.link.start()
@@ -160,11 +161,17 @@ class Client:
 
     async def confirm(self, write: int) -> Confirmed:
         """Keep what is on trial; raises `RemoteError` where it has ended, or is not what was written."""
-        return await self.link.call("parameter.confirm", WriteNumberParams(write), Confirmed, WRITE_TIMEOUT_S)
+        number = WriteNumberParams(write)
+        ended = await self.link.call("parameter.confirm", number, Confirmed, WRITE_TIMEOUT_S)
+        self._trying.discard(write)
+        return ended
 
     async def revert(self, write: int) -> Reverted:
         """Take back what is on trial; raises `RemoteError` where it has ended, or could not be taken back."""
-        return await self.link.call("parameter.revert", WriteNumberParams(write), Reverted, WRITE_TIMEOUT_S)
+        number = WriteNumberParams(write)
+        ended = await self.link.call("parameter.revert", number, Reverted, WRITE_TIMEOUT_S)
+        self._trying.discard(write)
+        return ended
 
     @contextlib.asynccontextmanager
     async def trial(self, changes: Mapping[str, float], trial_s: float) -> AsyncIterator[Written]:
@@ -176,10 +183,12 @@ class Client:
         """
         async with self.writing(min(trial_s + LEASE_MARGIN_S, LONGEST_LEASE_S)):
             written = await self.write(changes, trial_s)
+            self._trying.add(written.write)
             try:
                 yield written
-            finally:  # giving back the lease takes back what is on trial; within another block it is kept
-                if len(self._writing) > 1:
+            finally:  # before the lease is given back: that would take it back too, but is answered sooner
+                if written.write in self._trying:
+                    self._trying.discard(written.write)
                     await self._take_back(written.write)
 
     async def _take_back(self, write: int) -> None:
