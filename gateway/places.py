@@ -7,7 +7,7 @@ from gateway import wire
 from gateway.limits import CLIENTS, CLIENTS_OF_ONE_ADDRESS, STOPPERS
 from gateway.session import Session
 
-FRESH_S = 1.0  # how long one of these keeps its place whoever comes: its stop is still on its way
+FRESH_S = 0.3  # how long one of these keeps its place whoever comes: its stop is still on its way
 SILENT_S = 10.0  # who has said nothing for so long since it came makes room where all places are taken
 
 
