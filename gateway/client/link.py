@@ -270,8 +270,10 @@ class Link:
             data = self._decode_data(params)
         except UNREADABLE as error:
             raise ProtocolError(f"{self.address} sent stream data that cannot be read: {error}") from error
-        if any(len(column) != len(data.stamp_ns) for column in data.columns.values()):
-            raise ProtocolError(f"{self.address} sent a batch whose columns are not as long as its stamps")
+        rows = len(data.stamp_ns)
+        for length in set(map(len, data.columns.values())) - {rows}:
+            why = f"{rows} stamps, but {length} values of a channel"
+            raise ProtocolError(f"{self.address} sent stream data that cannot be read: {why}")
         subscription = self._streams.get(data.stream)
         if subscription is not None:
             subscription.feed(data, time.monotonic_ns())

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from tests.attack import calls, connections, devices, lines, resting, strangers
+from tests.attack import calls, connections, desk, devices, lines, resting, strangers
 from tests.attack.attack import Attack
 
 MODULES: tuple[tuple[Attack, ...], ...] = (
@@ -12,5 +12,6 @@ MODULES: tuple[tuple[Attack, ...], ...] = (
     strangers.ATTACKS,
     devices.ATTACKS,
     resting.ATTACKS,
+    desk.ATTACKS,
 )
 ATTACKS: Mapping[str, Attack] = {attack.name: attack for module in MODULES for attack in module}
