@@ -27,6 +27,7 @@ RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long 
 ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
 PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read …
 COSTLY_NS = 300_000  # … and one whose read took more of the thread than this: so many times as long,
+LONGEST_REST_S = 0.1
 PACE_FACTOR = 4  # for each client that is left alone just now. So they all together leave it most of its time
 LAST_READS = 16  # of a connection that ends: a stop may still be in it
 
@@ -34,6 +35,9 @@ _TOO_MANY = wire.refuse(
     wire.Kind.UNAVAILABLE,
     "too many requests wait; this one is not done: ask again when some have been answered",
 )
+
+# What a client of ours begins with, or a stop in an odd form: no method of HTTP, no TLS and no SSH.
+_BEGINNINGS = frozenset(b"{[ \t\"'")
 
 # Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
@@ -70,7 +74,7 @@ class Pace:
 
     def rest_s(self, spent_ns: int) -> float:
         """How long who has cost so much is left alone."""
-        return max(PACE_S, PACE_FACTOR * (self.resting + 1) * spent_ns / 1e9)
+        return min(LONGEST_REST_S, max(PACE_S, PACE_FACTOR * (self.resting + 1) * spent_ns / 1e9))
 
 
 class Inlet:
@@ -101,7 +105,7 @@ class Inlet:
         self._rests = False
         self._bad = 0  # lines that are no requests, whatever is in them
         self._splitter = StopSplitter()
-        self._ended = self._closed = False
+        self._began = self._ended = self._closed = False
         # Each is counted by one thread: by the intake what was handed over, by the loop what it has done.
         self._handed = self._handed_bytes = self._done = self._done_bytes = 0
         self._cpu_ns = 0
@@ -142,6 +146,7 @@ class Inlet:
 
     def _receive(self) -> bool:
         """Read once; false where there was nothing."""
+        self._spent()  # what was worked for others
         try:
             data = self.socket.recv(RECEIVE_BYTES)
         except BlockingIOError:
@@ -152,9 +157,11 @@ class Inlet:
         if not data:
             self._end(None, self._sorted(self._splitter.end()))
             return True
-        if not self.received_bytes and _is_foreign(data):
-            self._end("it speaks another protocol", Heard())
-            return True
+        if not self._began:
+            self._began = bool(begin := data.lstrip(b"\r\n"))
+            if self._began and begin[0] not in _BEGINNINGS and begin[0] < 0x80:
+                self._end("it speaks another protocol", Heard())
+                return True
         self.received_bytes += len(data)
         lines = self._splitter.feed(data)
         heard = self._sorted(lines)
@@ -162,9 +169,10 @@ class Inlet:
         if self._is_full or self._splitter.dropping or spent_ns > COSTLY_NS:
             self._rest(spent_ns)
         self._cpu_ns += spent_ns
-        if self._bad >= BAD_LINES:
-            self._end(None, heard)
-        elif lines:
+        if self._bad >= BAD_LINES:  # from now on only stops are heard, until the loop has closed it
+            heard.ended = True
+            self._rest(spent_ns)
+        if lines or heard.ended:
             self._hand_over(heard)
         return True
 
@@ -224,7 +232,7 @@ class Inlet:
             elif self._bad >= BAD_LINES:
                 self.unanswered += 1
             elif not self._is_full:
-                self._bad += isinstance(line, wire.BadLine) or not line.startswith(b"{")
+                self._bad += isinstance(line, wire.BadLine) or line.lstrip()[:1] != b"{"
                 heard.lines.append((asked_ns, line))
                 self._handed += 1
                 self._handed_bytes += wire.size(line)
@@ -309,14 +317,6 @@ class Intake:
         inlet = Inlet(self._front, self._loop, connection, peer, stop_now, spent, finished, self._pace)
         self._inlets.add(inlet)
         self._loop.post(lambda: self._opened(inlet))
-
-
-def _is_foreign(first: bytes) -> bool:
-    """Whether a connection begins as no client of ours does, but as a browser, TLS or SSH would.
-
-    What could be a stop in an odd form (a list, a blank, a quotation mark first) is not: it is read.
-    """
-    return first[:1].isalnum() or first[0] < ord("\t") or ord("\r") < first[0] < ord(" ")
 
 
 def _prepare(connection: socket.socket) -> None:

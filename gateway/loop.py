@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 # What a file can be watched for; that its peer is gone is told in any case.
 READ, WRITE, HANGUP = select.POLLIN, select.POLLOUT, select.POLLHUP | select.POLLERR
 
+FEW_TIMERS = 256
 TIMERS_NS = 5_000_000  # what the timers of one turn may take; those that are left follow in the next
 
 Callback = Callable[[], object]
@@ -64,6 +65,7 @@ class Loop:
         self._watched: dict[int, tuple[int, Callable[[int], object]]] = {}
         self._ready: deque[Callback] = deque()
         self._timers: list[tuple[int, int, Timer]] = []
+        self._many = FEW_TIMERS  # so many timers that the cancelled ones are looked for
         self._order = itertools.count()
         self.turns = 0  # so far
         self._stopping = False
@@ -105,9 +107,17 @@ class Loop:
     def call_later(self, delay_s: float, callback: Callback) -> Timer:
         """Run `callback` once after `delay_s`."""
         timer = Timer(callback)
+        if len(self._timers) > self._many:
+            self._forget_cancelled()
         due_ns = time.monotonic_ns() + max(0, round(delay_s * 1e9))
         heapq.heappush(self._timers, (due_ns, next(self._order), timer))
         return timer
+
+    def _forget_cancelled(self) -> None:
+        """Who sets a timer anew again and again leaves no more of them than there are others."""
+        self._timers = [one for one in self._timers if one[2].callback is not None]
+        heapq.heapify(self._timers)
+        self._many = max(FEW_TIMERS, 2 * len(self._timers))
 
     def stop(self) -> None:
         """Let `run` return after its turn; may be called from any thread."""

@@ -153,6 +153,12 @@ class Service:
             )
         if not params.client.isprintable():
             raise wire.refuse(wire.Kind.BAD_PARAMS, "a client's name is of printable characters")
+        if session.named not in (None, params.client):
+            raise wire.refuse(
+                wire.Kind.BAD_PARAMS,
+                f"this connection has called itself {session.named!r} already; keep to it",
+            )
+        session.named = params.client
         session.who = f"{params.client} ({session.peer})"
         robot = self._config.robot.name
         return messages.Hello(wire.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)

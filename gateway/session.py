@@ -88,6 +88,7 @@ class Session:
         self.requests = self.sent_bytes = 0
         self.outlets: dict[int, Outlet] = {}
         self.closed = False
+        self.named: str | None = None  # what it has called itself
         self.spoke = False  # whether it has said anything yet
         self.heard_ns = time.monotonic_ns()  # when it did last, or came
         self.spending = False  # whether what is worked now is put down already
@@ -110,7 +111,7 @@ class Session:
         self._stuck: Timer | None = None
         self._end: Timer | None = None
         self._moved_ns = 0
-        self._farewells: list[Callable[[], None]] = []
+        self._farewells: dict[object, Callable[[], None]] = {}
         inlet.receiver = self.hear
         self._bad = 0  # lines that were no requests
         if refusal is not None:
@@ -146,9 +147,14 @@ class Session:
         """Whether it is still to be told something that it has asked for."""
         return bool(self._queue or self._pending or self._output)
 
-    def on_close(self, farewell: Callable[[], None]) -> None:
-        """Call `farewell` when the connection has ended; what was asked for last goes first."""
-        self._farewells.append(farewell)
+    def on_close(self, farewell: Callable[[], None], whose: object = None) -> None:
+        """Call `farewell` when the connection has ended; what was asked for last goes first.
+
+        Another one of the same `whose`, where that is given, takes the place of the first.
+        """
+        key = object() if whose is None else whose
+        self._farewells.pop(key, None)
+        self._farewells[key] = farewell
 
     def send(self, line: bytes) -> None:
         """Queue one line and send what the socket takes now."""
@@ -190,7 +196,7 @@ class Session:
         self._output.clear()
         self._count_output(-self._output_bytes)
         self.outlets.clear()
-        for farewell in reversed(self._farewells):  # a lease ends before the module that knows it
+        for farewell in reversed(self._farewells.values()):  # a lease ends before the module that knows it
             try:
                 farewell()
             except Exception:  # the others are still to be told
@@ -214,21 +220,26 @@ class Session:
             log.info("%s: %s", self.peer, heard.lost)
             self.close()
             return
-        allowed = [one for one in heard.lines if self._refusal is None or _is_greeting(one[1])]
-        self._queue.extend(allowed)
-        if self._refusal is not None and len(allowed) < len(heard.lines):
-            refused = [line for _asked_ns, line in heard.lines if not _is_greeting(line)]
-            self._end_refused(refused, self._refusal)
+        if self._refusal is None:
+            self._queue.extend(heard.lines)
+        else:
+            self._hear_greetings(heard.lines, self._refusal)
         if heard.ended:
             self._end_input()
         if not self._scheduled:
             self._scheduled = True
             self._sharing.take(self.address, self._run_next)
 
-    def _end_refused(self, lines: list[bytes | wire.BadLine], refusal: wire.RpcError) -> None:
-        self._inlet.done(len(lines), sum(map(wire.size, lines)))
-        self._send_if_room([wire.encode_refusal(line, refusal) for line in lines])
-        self._end_input()
+    def _hear_greetings(self, lines: list[tuple[int, bytes | wire.BadLine]], refusal: wire.RpcError) -> None:
+        """Up to the first line that is none: that one is answered, and ends what is heard."""
+        others = (at for at, (_asked_ns, line) in enumerate(lines) if not _is_greeting(line))
+        heard = 0 if self._input_ended else next(others, len(lines))
+        self._queue.extend(lines[:heard])
+        rest = [line for _asked_ns, line in lines[heard:]]
+        self._inlet.done(len(rest), sum(map(wire.size, rest)))
+        if rest and not self._input_ended:
+            self._send_if_room([wire.encode_refusal(rest[0], refusal)])
+            self._end_input()
 
     def _end_input(self) -> None:
         """Nothing more is asked: what was asked is answered, as far as that can be soon."""

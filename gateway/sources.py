@@ -10,7 +10,7 @@ from msgspec import UNSET
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.limits import GLOBS, NAME_OR_GLOB_LENGTH, NAMES
+from gateway.limits import GLOBS, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
 from gateway.messages import ChannelInfo
 from gateway.wire import Kind, refuse
 
@@ -62,6 +62,12 @@ class Wanted:
                 "use a glob such as left_* for many",
             )
         patterns = dict.fromkeys(one for one in named if not _WILD.isdisjoint(one))
+        for one in patterns:
+            if not one.isascii() or sum(map(one.count, _WILD)) > WILD_CARDS:
+                raise refuse(
+                    Kind.BAD_PARAMS,
+                    f"a glob is of ASCII, and has at most {WILD_CARDS} of * ? and [; use another",
+                )
         if len(patterns) > GLOBS:
             raise refuse(Kind.BAD_PARAMS, f"a request may have {GLOBS} globs, not {len(patterns)}")
         self._all = globs is None

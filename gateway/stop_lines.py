@@ -8,7 +8,7 @@ import re
 from typing import Any, Final
 
 import msgspec
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Raw, UnsetType
 
 from gateway.limits import REASON_LENGTH
 from gateway.wire import Id, Line, LineSplitter, StopRequest
@@ -32,16 +32,33 @@ def stop_in(line: bytes) -> StopRequest | None:
     if not any(mark in line for mark in _MARKS):
         return None  # as nearly all are
     try:
-        found = msgspec.json.decode(line)
+        found = _decode(line)
+        # Of a batch, which is refused, only its stop is done.
+        return next((_request(one) for one in found if _is_stop(one)), None)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return _read(line) if StopSearch().is_in(line) else None
-    # Of a batch, which is refused, only its stop is done.
-    asked = (one for one in (found if isinstance(found, list) else [found]) if isinstance(one, dict))
-    return next((_request(one) for one in asked if one.get("method") == STOP), None)
 
 
-def _request(found: dict[str, Any]) -> StopRequest:
-    return StopRequest(_reason(found.get("params")), _id(found))
+def _decode(line: bytes) -> list[dict[str, Raw]]:
+    """The objects of a line, only as far as their keys: numbers by the thousand cost much to read."""
+    begins = line.lstrip()[:1]
+    each = (
+        msgspec.json.decode(line, type=list[Raw]) if begins == b"[" else [msgspec.json.decode(line, type=Raw)]
+    )
+    objects = (one for one in each if bytes(one).lstrip().startswith(b"{"))
+    return [msgspec.json.decode(one, type=dict[str, Raw]) for one in objects]
+
+
+def _is_stop(found: dict[str, Raw]) -> bool:
+    method = found.get("method")
+    return method is not None and len(bytes(method)) < _KEPT_BYTES and msgspec.json.decode(method) == STOP
+
+
+def _request(found: dict[str, Raw]) -> StopRequest:
+    known: dict[str, Any] = {
+        key: msgspec.json.decode(found[key]) for key in ("params", "id", "jsonrpc") if key in found
+    }
+    return StopRequest(_reason(known.get("params")), _id(known))
 
 
 def _id(found: dict[str, Any]) -> Id | float | UnsetType:

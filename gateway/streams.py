@@ -162,10 +162,11 @@ class TickFeed(Feed):
         began_ns, now_ns = time.thread_time_ns(), time.monotonic_ns()
         self._late_ns = max(self._late_ns, now_ns - self._next_ns)
         self._skip_what_is_too_old(now_ns)
+        self._early = self._drained()
         self._forget_what_is_gone()
         rows: list[list[float | None]] = []
         stamps: list[int] = []
-        updates = iter(self._drained())
+        updates = iter(self._early)
         update = next(updates, None)
         most_rows = 1 + TURN_VALUES // (1 + len(self._cells))
         until_ns = min(now_ns, self._next_ns + most_rows * self._period_ns)
@@ -296,7 +297,7 @@ class Streams:
         outlet = Outlet(next(self._numbers), session, feed, self._buffer_bytes)
         feed.outlets.append(outlet)
         if not session.outlets:
-            session.on_close(lambda: self._forget(session))
+            session.on_close(lambda: self._forget(session), self)
         session.outlets[outlet.number] = outlet
         self._share(session)
         return outlet.number

@@ -197,7 +197,8 @@ class Client:
         except (NotConnected, LinkLost):  # the lease went with the connection, and the trial with it
             return
         except RemoteError as error:
-            if error.kind != "unknown_name":  # it has ended: confirmed, or taken over
+            # It has ended: confirmed, taken over, or with its connection.
+            if error.kind not in ("unknown_name", "no_lease"):
                 raise
 
     async def store(self, component: str) -> Stored:
@@ -230,8 +231,17 @@ class Client:
         finally:
             self._writing.remove(ttl_s)
             if not self._writing:
-                with contextlib.suppress(NotConnected, LinkLost):  # the lease went with the connection
-                    await self.release()
+                await self._give_back()
+
+    async def _give_back(self) -> None:
+        """Release the lease, unless it has gone with a connection, perhaps an earlier one."""
+        try:
+            await self.release()
+        except (NotConnected, LinkLost):
+            return
+        except RemoteError as error:
+            if error.kind != "no_lease":
+                raise
 
     async def stop(self, reason: str) -> Stopped:
         """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed.

@@ -48,7 +48,7 @@ class Leases:
         expires_ns = time.monotonic_ns() + round(ttl_s * 1e9)
         timer = self._loop.call_later(ttl_s, lambda: self._end(session, "lease ran out"))
         if held is None:
-            session.on_close(lambda: self._end(session, "lease lost with the connection"))
+            session.on_close(lambda: self._end(session, "lease lost with the connection"), self)
             held = self._lease = _Held(session, secrets.token_hex(8), expires_ns, timer)
             self._changed(session, TAKEN)
         else:

@@ -248,6 +248,7 @@ class Journal:
             with contextlib.suppress(OSError), file:
                 os.ftruncate(file.fileno(), size)
                 os.fsync(file.fileno())
+            with contextlib.suppress(OSError):  # also where that has failed: the head must not say more
                 durable.write(head_file(self.path), msgspec.json.encode(self._head))
             raise
 

@@ -19,6 +19,7 @@ ENTRIES_A_SECOND: Final = 20  # what it may write on and on
 BYTES_AT_ONCE: Final = 4 * 1024 * 1024
 BYTES_A_SECOND: Final = 2 * 1024
 CLIENTS: Final = 512  # accounts at a time, two a client; who comes then shares one
+NAMES_OF_ONE_ADDRESS: Final = 16  # clients of one address with accounts of their own; those beyond share one
 FIELD_BYTES: Final = 16 * 1024  # of one field of an entry, as JSON
 WHO_BYTES: Final = 256
 SUM_UP_S: Final = 5.0  # what is left out is summed up so often
@@ -129,6 +130,8 @@ class Limits:
     def _account(self, whose: str, share: Share, now_ns: int) -> tuple[str, _Account] | None:
         """With its name; `None` for a stop of who has none, which is not left out because of strangers."""
         key = whose, share is Share.ACT
+        if key not in self._accounts and self._neighbours(whose) >= 2 * NAMES_OF_ONE_ADDRESS:
+            key = f"others of {_address(whose)}", share is Share.ACT
         if key not in self._accounts and len(self._accounts) >= CLIENTS:
             self._forget_full(now_ns)
             if len(self._accounts) >= CLIENTS and share is Share.ACT:
@@ -137,6 +140,11 @@ class Limits:
         account = self._accounts.setdefault(key, _Account(now_ns))
         account.refill(now_ns)
         return key[0], account
+
+    def _neighbours(self, whose: str) -> int:
+        """How many accounts there are of its address, two a client."""
+        address = _address(whose)
+        return sum(_address(one) == address for one, _is_act in self._accounts)
 
     def _forget_full(self, now_ns: int) -> None:
         """Whoever has written nothing for a while has as much as who comes new."""
@@ -148,6 +156,10 @@ class Limits:
 def client(who: str) -> str:
     """Who it is without its port: the same program has another one with each connection."""
     return _PORT.sub(r"\1", who)
+
+
+def _address(whose: str) -> str:
+    return whose.rpartition("(")[2].rstrip(")")
 
 
 def within_limits(fields: Entry) -> tuple[Entry, int]:

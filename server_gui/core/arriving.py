@@ -14,6 +14,8 @@ from gateway.client import Batch, ProtocolError
 from gateway.messages import Description
 from server_gui.core.events import Described, Event, Journalled, Looked, Resources, Telemetry
 
+MOST_ROWS: Final = 10_000  # of one notification: a gateway sends what came in milliseconds
+IN_ENTRIES: Final = range(-(2**63), 2**64)  # what a device's object can hold; kept as text
 NUMBERS: Final = range(-(2**62), 2**62)  # what is kept in 8 bytes, and may be added up in them
 COUNTS: Final = range(2**53)  # that every reader of JSON takes
 MOST_COLUMNS: Final = 4096  # that one robot may put into the store's table while this program runs
@@ -125,6 +127,8 @@ def name(what: str, given: str) -> None:
 def batch(stream: int, given: Batch) -> None:
     """Refuse rows that are not whole, or have numbers that 8 bytes do not hold."""
     rows = len(given.stamps_ns)
+    if rows > MOST_ROWS:
+        raise Unfit(f"{rows} rows in one notification; {MOST_ROWS} are the most that are taken at once")
     for length in set(map(len, given.columns.values())) - {rows}:
         raise Unfit(f"{rows} stamps, but {length} values of a channel")
     if not all(number in NUMBERS for number in (stream, given.seq, *given.stamps_ns)):
@@ -161,7 +165,7 @@ def _entry(entry: Mapping[str, Any], before: int) -> int:
             raise Unfit(f"`{key}` of {where} is no text")
         if said is not None and len(said) > LONGEST_TEXT:
             raise Unfit(f"`{key}` of {where} is longer than {LONGEST_TEXT} letters")
-    _sound(where, entry, ENTRY_BYTES)
+    _sound(where, entry, ENTRY_BYTES, IN_ENTRIES)
     return number
 
 
@@ -172,11 +176,11 @@ def _text(what: str, given: str, longest: int) -> None:
         )
 
 
-def _sound(what: str, given: object, most_bytes: int) -> None:
+def _sound(what: str, given: object, most_bytes: int, numbers: range = NUMBERS) -> None:
     """Refuse what is too large, too deep, or has numbers that are not finite or need more than 8 bytes."""
     try:
         plain = msgspec.to_builtins(given)
-        _numbers(what, (plain,), DEEPEST)
+        _numbers(what, (plain,), DEEPEST, numbers)
         size = len(msgspec.json.encode(plain))
     except (RecursionError, ValueError, TypeError, OverflowError, msgspec.MsgspecError) as error:
         raise Unfit(f"{what} cannot be written down: {error}") from error
@@ -184,7 +188,7 @@ def _sound(what: str, given: object, most_bytes: int) -> None:
         raise Unfit(f"{what} takes {size} bytes; at most {most_bytes} are kept")
 
 
-def _numbers(what: str, values: Iterable[object], deeper: int) -> None:
+def _numbers(what: str, values: Iterable[object], deeper: int, numbers: range) -> None:
     for value in values:
         kind = type(value)
         if kind is str or value is None or kind is bool:
@@ -193,12 +197,12 @@ def _numbers(what: str, values: Iterable[object], deeper: int) -> None:
             if not math.isfinite(value):
                 raise Unfit(f"{what} has a number that is not finite")
         elif kind is int:
-            if value not in NUMBERS:
+            if value not in numbers:
                 raise Unfit(f"{what} has a number that is larger than 8 bytes hold")
         elif not deeper:
             raise Unfit(f"{what} has values within values, more than {DEEPEST} deep")
         else:
-            _numbers(what, value.values() if isinstance(value, dict) else _all(value), deeper - 1)
+            _numbers(what, value.values() if isinstance(value, dict) else _all(value), deeper - 1, numbers)
 
 
 def _all(values: object) -> Iterable[object]:

@@ -174,15 +174,19 @@ class StopControl:
 
     def _wait(self, waiting: "_Waiting") -> None:
         """Those that come before the thread turns to them are one stop."""
-        self._waiting.append(waiting)
-        if len(self._waiting) == 1:
+        if not self._waiting:
             self._thread.put(self._stop_all)
+        self._waiting.append(waiting)
 
     def _stop_all(self) -> None:
         """In the stop's thread: it acts first, and is written down then."""
-        first = stop_all(self._targets)
-        with self.authority.settled():
-            stops, self._waiting = tuple(self._waiting), []
+        try:
+            first = stop_all(self._targets)
+        except Exception as error:
+            for one in self._take_waiting():  # the next stop begins anew
+                one.asked.answer.set_exception(error)
+            raise
+        stops = self._take_waiting()
         try:
             recorded = _newest_of_each(one.asked for one in stops if one.recorded)
             for asked in recorded:
@@ -194,6 +198,11 @@ class StopControl:
             self._claimed = self.claim()
         finally:
             self._loop.post(partial(self._follow, stops, first))
+
+    def _take_waiting(self) -> "tuple[_Waiting, ...]":
+        with self.authority.settled():
+            stops, self._waiting = tuple(self._waiting), []
+        return stops
 
     def _hold_on(self) -> None:
         """In the stop's thread: what is seen to be stopped since the last gateway's time is left alone."""

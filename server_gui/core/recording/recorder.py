@@ -4,6 +4,7 @@ import functools
 import logging
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -24,6 +25,7 @@ from server_gui.core.watching import BEAT_S, Worker
 
 log = logging.getLogger(__name__)
 
+SHARES: Final = 2  # of several robots, one may have this part of what waits: its flood leaves the others room
 COMMIT_S: Final = 0.05  # rows of so long go to the disk together
 HELD_S: Final = 60.0  # that a mistake of ours stays an alarm, so that it is seen
 AGAIN_S: Final = 1.0  # between attempts on a disk that refuses, and looks at how full it is
@@ -101,14 +103,16 @@ class Recorder:
         self._queued_rows = 0
         self._handed = 0
         self._acknowledged = 0
-        self._overflowed = 0
+        self._overflowed: Counter[str] = Counter()  # rows that found no room, of each robot
+        self._waiting: Counter[str] = Counter()  # rows that wait, of each robot
+        self._senders: set[str] = set()  # robots that have sent something
         self._ending = threading.Event()
         # The recorder's thread.
         self._robots = Robots(spool.heads)
         self._alarms: dict[AlarmKind, Alarm] = {}
         self._recorded = 0
         self._lost = 0
-        self._lost_untold = 0
+        self._untold: Counter[str] = Counter()  # rows that were lost, of each robot; "": nobody knows whose
         self._commit_s = 0.0
         self._looked_s = -AGAIN_S
         self._broke_s = -HELD_S
@@ -213,7 +217,7 @@ class Recorder:
     def state(self) -> RecorderState:
         """How recording goes now."""
         alarms = tuple(self._alarms.copy().values())
-        lost = self._lost + self._overflowed
+        lost = self._lost + self._overflowed.total()
         return RecorderState(self._recorded, self._queued_rows, lost, self._commit_s, alarms)
 
     def flush(self, timeout_s: float) -> bool:
@@ -225,10 +229,14 @@ class Recorder:
     def _put(self, robot: str, rows: int, work: Work) -> int:
         with self._changed:
             self._handed += 1
-            if self._queued_rows + rows > self._settings.capacity:
-                self._overflowed += rows
+            capacity, own = self._settings.capacity, self._waiting[robot] + rows
+            self._senders.add(robot)
+            share = capacity if len(self._senders) == 1 else capacity // SHARES
+            if self._queued_rows + rows > capacity or own > share:
+                self._overflowed[robot] += rows
             else:
                 self._queued_rows += rows
+                self._waiting[robot] = own
                 self._queue.append(Item(robot, rows, work))
             self._changed.notify_all()
             return self._handed
@@ -276,13 +284,14 @@ class Recorder:
         with self._changed:
             queue, self._queue = self._queue, []
             self._queued_rows = 0
-            self._lost_untold += self._overflowed
-            self._lost += self._overflowed
-            overflowed, self._overflowed = self._overflowed, 0
+            self._waiting.clear()
+            overflowed, self._overflowed = self._overflowed, Counter()
+            self._untold.update(overflowed)
+            self._lost += overflowed.total()
             handed, ending = self._handed, self._ending.is_set()
         self._alarm(
             AlarmKind.OVERFLOW,
-            f"{overflowed} rows were lost: the disk takes them more slowly than they come"
+            f"{overflowed.total()} rows were lost: the disk takes them more slowly than they come"
             if overflowed
             else None,
         )
@@ -304,9 +313,9 @@ class Recorder:
         if not self._has_room():
             self._lose(rows)
             return
-        if self._lost_untold:
-            found += self._robots.lost(self._lost_untold)
-            self._lost_untold = 0
+        for robot, count in self._untold.items():
+            found += self._robots.lost(count, robot)
+        self._untold.clear()
         parts: list[Part] = [*runs, *found]
         left: list[list[Part]] = [[*parts, *self._robots.heads.items()]] if parts else []
         while left:
@@ -351,12 +360,12 @@ class Recorder:
         if isinstance(part, tuple):
             self._robots.forget(part[0], self._spool.heads)
         self._lost += _rows(part)
-        self._lost_untold += _rows(part)
+        self._untold[""] += _rows(part)
         self._break(error)
 
     def _lose(self, rows: int) -> None:
         self._lost += rows
-        self._lost_untold += rows
+        self._untold[""] += rows
         self._robots.heads = dict(self._spool.heads)  # those entries are still to be seen
 
     def _has_room(self) -> bool:

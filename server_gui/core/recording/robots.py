@@ -110,10 +110,13 @@ class Robots:
         if robot in kept:
             self.heads[robot] = kept[robot]
 
-    def lost(self, rows: int) -> list[Record]:
-        """That rows of nobody knows whom were lost here, told in the recording of every robot there is."""
-        text = f"this server lost {rows} rows of all its robots"
+    def lost(self, rows: int, whose: str = "") -> list[Record]:
+        """That rows were lost here; of nobody knows whom: told in the recording of every robot there is."""
         now_ns = time.time_ns()
+        if whose in self._robots:
+            text = f"this server lost {rows} rows of {whose}"
+            return [self._robots[whose].event(EventKind.LOST, text, now_ns, rows=rows)]
+        text = f"this server lost {rows} rows of all its robots"
         return [robot.event(EventKind.LOST, text, now_ns, rows=rows) for robot in self._robots.values()]
 
     def refused(self, robot: str, what: str, why: str) -> list[Record]:

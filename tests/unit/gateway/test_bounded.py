@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from gateway import limits, session
-from gateway.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES
+from gateway.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
 from gateway.sources import Wanted
 from gateway.stop_lines import StopSplitter
 from gateway.wire import BadLine, RpcError, decode_request
@@ -119,6 +119,8 @@ class TestGlobs:
         [
             (["x"] * (NAMES + 1), f"{NAMES} names and globs"),
             (["x" * (NAME_OR_GLOB_LENGTH + 1)], f"each of {NAME_OR_GLOB_LENGTH} characters"),
+            (["*a" * (WILD_CARDS + 1)], f"at most {WILD_CARDS} of"),
+            (["[\u4e00-\uff00]"], "a glob is of ASCII"),
             ([f"{number}*" for number in range(GLOBS + 1)], f"may have {GLOBS} globs, not {GLOBS + 1}"),
         ],
     )
@@ -140,7 +142,7 @@ class TestGlobs:
 
     def test_the_worst_of_them_cost_little(self) -> None:
         """Work is compared, not time alone: a thousand names against one."""
-        globs = ["*a" * (NAME_OR_GLOB_LENGTH // 2 - 1) + "*"] * 3 + ["*" * NAME_OR_GLOB_LENGTH]
+        globs = ["*a" * (WILD_CARDS - 1) + "*", "*" * WILD_CARDS]
 
         def cost_s(count: int) -> float:
             wanted, names = Wanted(globs), ["a" * 60 + str(number) for number in range(count)]

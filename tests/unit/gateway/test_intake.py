@@ -14,7 +14,7 @@ import pytest
 from gateway import intake, wire
 from gateway.daemon import Daemon
 from gateway.intake import Heard, Inlet, Pace
-from gateway.limits import QUEUED_BYTES, QUEUED_LINES
+from gateway.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
 from gateway.listeners import listen
 from gateway.loop import HANGUP, READ, Loop
 from gateway.messages import Stopped
@@ -430,3 +430,50 @@ def test_a_client_that_says_nothing_wakes_nobody(tmp_path: Path) -> None:
         before = processes.kernel_saw(running.pid)
         slept.wait(1.0)
         assert processes.kernel_saw(running.pid) == before
+
+
+@pytest.mark.parametrize("line", [b" " + CLOCK % 1, b"\t" + CLOCK % 1])
+def test_a_blank_before_a_request_makes_it_none_the_worse(serving: Serving, line: bytes) -> None:
+    client = serving.connect()
+    for _ in range(2 * BAD_LINES):
+        client.send(line)
+        assert client.answer(1)
+    client.send(STOP % b"after blanks")
+    serving.wait_for_stop("after blanks")
+
+
+def test_a_stop_behind_lines_that_were_none_is_heard(
+    pair: tuple[socket.socket, socket.socket],
+) -> None:
+    client, accepted = pair
+    asked: list[str] = []
+    inlet, front, loop = inlet_of(accepted, asked)
+    inlet.receiver = lambda _heard: None
+    client.sendall(b"[]\n" * 2 * BAD_LINES)
+    inlet._on_ready(READ)
+    client.sendall(STOP % b"behind")
+    inlet.finish()
+    assert asked == ["behind"]
+    for one in (front, loop):
+        one.close()
+
+
+def test_who_has_cost_nothing_does_not_rest_for_others(pair: tuple[socket.socket, socket.socket]) -> None:
+    """The thread's work is counted since the read began, not since somebody else's was."""
+    client, accepted = pair
+    inlet, front, loop = inlet_of(accepted, [])
+    inlet.receiver = lambda _heard: None
+    spent = [1000, 1000, 50_000_000]
+    inlet._spent = lambda: spent.pop() if spent else 0
+    client.sendall(CLOCK % 1)
+    inlet._on_ready(READ)
+    assert not inlet._rests
+    inlet.finish()
+    for one in (front, loop):
+        one.close()
+
+
+def test_no_rest_is_long(pair: tuple[socket.socket, socket.socket]) -> None:
+    pace = Pace()
+    pace.resting = 100
+    assert pace.rest_s(50_000_000) == intake.LONGEST_REST_S

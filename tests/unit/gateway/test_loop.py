@@ -134,3 +134,13 @@ def test_a_file_is_watched_for_what_is_asked_and_its_end_is_told_in_any_case(loo
         loop.post(lambda: None)
         loop._turn()
         assert len(told) == 3
+
+
+def test_timers_that_are_set_anew_again_and_again_do_not_pile_up() -> None:
+    loop = Loop()
+    kept = loop.call_later(1000.0, lambda: None)
+    for _ in range(100_000):
+        loop.call_later(300.0, lambda: None).cancel()
+    assert len(loop._timers) < 1000
+    assert kept.callback is not None
+    loop.close()

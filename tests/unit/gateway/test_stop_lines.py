@@ -199,3 +199,19 @@ def test_nothing_is_kept_of_what_is_dropped() -> None:
         splitter.feed(LONG + b"x")
         assert splitter._search is not None
         assert len(splitter._rest) + len(splitter._search._tail) < 1000
+
+
+def test_numbers_by_the_thousand_are_not_read_to_see_that_a_line_is_no_stop() -> None:
+    """Some take the reader of numbers very long: the thread that hears stops must not read them."""
+    slow = b'{"params":[' + b"5e-324," * 9000 + b'1],"x":"\\n","method":"clock.read"}'
+    quick = b'{"params":["' + b"5e-324," * 9000 + b'1"],"x":"\\n","method":"clock.read"}'
+
+    def cost_s(line: bytes) -> float:
+        times = []
+        for _ in range(5):
+            began_s = time.thread_time()
+            assert stop_in(line) is None
+            times.append(time.thread_time() - began_s)
+        return min(times)
+
+    assert cost_s(slow) < 20 * cost_s(quick)

@@ -33,7 +33,7 @@ class FakeSession:
         self.cpu_ns = 0
         self.closed = False
         self.outlets: dict[int, Outlet] = {}
-        self.on_close = lambda farewell: None
+        self.on_close = lambda farewell, whose=None: None
 
     def pump(self) -> None:
         self.pumped += 1

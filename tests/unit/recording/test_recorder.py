@@ -383,3 +383,22 @@ def test_a_mistake_of_ours_is_an_alarm_and_the_recorder_goes_on(
         assert recorder.flush(WAIT_S)
     assert [alarm.kind for alarm in alarms] == [AlarmKind.BROKEN]
     assert rows(kept(spool)[0])[-1][3] == 1
+
+
+def test_the_flood_of_one_robot_takes_no_room_from_another_and_is_told_in_its_own_recording(
+    tmp_path: Path,
+) -> None:
+    with StuckSpool(tmp_path) as spool:
+        with Recorder(spool, lambda _alarm: None, RecorderSettings(capacity=100)) as recorder:
+            recorder.record("good", 1, batch(0))
+            assert spool.reached.wait(WAIT_S)
+            for seq in range(500):
+                recorder.record("bad", 1, batch(seq))
+            for seq in range(1, 50):
+                recorder.record("good", 1, batch(seq))
+            assert recorder.state.lost == 450
+            spool.let_go.set()
+            assert recorder.flush(WAIT_S)
+        (event,) = events(spool, "lost")
+        assert (event["robot"], json.loads(str(event["data"]))) == ("bad", {"rows": 450})
+        assert len(rows(kept(spool)[0])) == 100

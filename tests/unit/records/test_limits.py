@@ -22,6 +22,7 @@ from gateway.records.limits import (
     ENTRIES_AT_ONCE,
     FIELD_BYTES,
     LEFT_OUT,
+    NAMES_OF_ONE_ADDRESS,
     WHO_BYTES,
     Limits,
     _LeftOut,
@@ -170,17 +171,30 @@ def test_strangers_without_end_share_one_account_and_lose_no_stop() -> None:
     limits = Limits()
     for number in range(CLIENTS):
         for _ in range(2):
-            assert limits.refusal(f"{number} (1.2.3.4:5)", "lease", Share.ASKED, 100, SECOND_NS) is None
+            assert (
+                limits.refusal(f"{number} (1.2.{number // 9}.4:5)", "lease", Share.ASKED, 100, SECOND_NS)
+                is None
+            )
     refused = [
-        limits.refusal(f"more {number} (1.2.3.4:5)", "lease", Share.ASKED, 100, SECOND_NS)
+        limits.refusal(f"more {number} (5.{number // 9}.3.4:5)", "lease", Share.ASKED, 100, SECOND_NS)
         for number in range(ENTRIES_AT_ONCE + 10)
     ]
     assert sum(refusal is not None for refusal in refused) == 10
     for number in range(2 * ENTRIES_AT_ONCE):
-        who = f"more {number} (1.2.3.4:5)"
+        who = f"more {number} (5.{number // 9}.3.4:5)"
         assert limits.refusal(who, "stop", Share.ACT, 100, SECOND_NS) is None
     (summary,) = limits.summaries(None)
     assert summary["left_out"] == {"lease": 10}
+
+
+def test_one_that_calls_itself_ever_something_else_has_little_more_and_leaves_the_others_theirs() -> None:
+    limits = Limits()
+    written = sum(
+        limits.refusal(f"{number % 600} (1.2.3.4:5)", "lease", Share.ASKED, 100, SECOND_NS) is None
+        for number in range(100_000)
+    )
+    assert written <= (2 * NAMES_OF_ONE_ADDRESS + 1) * ENTRIES_AT_ONCE
+    assert limits.refusal("ada (9.9.9.9:5)", "write", Share.ASKED, 100, SECOND_NS) is None
 
 
 def test_who_has_written_nothing_for_a_while_is_forgotten() -> None:
