@@ -10,6 +10,10 @@ from gateway.session import Session
 FRESH_S = 0.3  # how long one of these keeps its place whoever comes: its stop is still on its way
 SILENT_S = 10.0  # who has said nothing for so long since it came makes room where all places are taken
 
+_STOPS_ONLY = (
+    "this is not done, and this connection ends: to stop the robot, connect and send robot.stop first"
+)
+
 
 class Places:
     """Every session that is open. It belongs to the loop's thread."""
@@ -31,7 +35,7 @@ class Places:
         """
         if self._has_place(address):
             return self._placed(open_(None), self._clients)
-        opened = open_(_refusal("this connection takes robot.stop only"))
+        opened = open_(_refusal(_STOPS_ONLY))
         if not self._has_place_to_stop(address):
             opened.close(_refusal("and as many who may only stop; connect again"))
             return None

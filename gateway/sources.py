@@ -55,19 +55,21 @@ class Wanted:
 
     def __init__(self, globs: Sequence[str] | None) -> None:
         named = globs or ()
-        if len(named) > NAMES or any(len(one) > NAME_OR_GLOB_LENGTH for one in named):
+        if len(named) > NAMES:
             raise refuse(
                 Kind.BAD_PARAMS,
-                f"a request may list {NAMES} names and globs, each of {NAME_OR_GLOB_LENGTH} characters; "
-                "use a glob such as left_* for many",
+                f"{len(named)} names and globs, and {NAMES} are the most: use a glob such as left_*",
             )
+        for one in named:
+            if len(one) > NAME_OR_GLOB_LENGTH:
+                why = f"a name or glob has {len(one)} characters, and {NAME_OR_GLOB_LENGTH} are the most"
+                raise refuse(Kind.BAD_PARAMS, f"{why}: {one[:20]!r}…")
         patterns = dict.fromkeys(one for one in named if not _WILD.isdisjoint(one))
         for one in patterns:
-            if not one.isascii() or sum(map(one.count, _WILD)) > WILD_CARDS:
-                raise refuse(
-                    Kind.BAD_PARAMS,
-                    f"a glob is of ASCII, and has at most {WILD_CARDS} of * ? and [; use another",
-                )
+            if not one.isascii():
+                raise refuse(Kind.BAD_PARAMS, f"the glob {one!r} has characters beyond ASCII: use others")
+            if sum(map(one.count, _WILD)) > WILD_CARDS:
+                raise refuse(Kind.BAD_PARAMS, f"the glob {one!r} has more than {WILD_CARDS} of * ? and [")
         if len(patterns) > GLOBS:
             raise refuse(Kind.BAD_PARAMS, f"a request may have {GLOBS} globs, not {len(patterns)}")
         self._all = globs is None

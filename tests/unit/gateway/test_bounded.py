@@ -117,10 +117,10 @@ class TestGlobs:
     @pytest.mark.parametrize(
         ("globs", "words"),
         [
-            (["x"] * (NAMES + 1), f"{NAMES} names and globs"),
-            (["x" * (NAME_OR_GLOB_LENGTH + 1)], f"each of {NAME_OR_GLOB_LENGTH} characters"),
-            (["*a" * (WILD_CARDS + 1)], f"at most {WILD_CARDS} of"),
-            (["[\u4e00-\uff00]"], "a glob is of ASCII"),
+            (["x"] * (NAMES + 1), f"and {NAMES} are the most"),
+            (["x" * (NAME_OR_GLOB_LENGTH + 1)], f"and {NAME_OR_GLOB_LENGTH} are the most"),
+            (["*a" * (WILD_CARDS + 1)], f"more than {WILD_CARDS} of"),
+            (["[\u4e00-\uff00]"], "beyond ASCII"),
             ([f"{number}*" for number in range(GLOBS + 1)], f"may have {GLOBS} globs, not {GLOBS + 1}"),
         ],
     )

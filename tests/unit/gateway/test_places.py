@@ -54,7 +54,7 @@ def test_beyond_the_last_place_all_else_is_refused_and_ends_the_connection(
     late = connect()
     error = late.refused("robot.describe")
     assert error.kind == "unavailable"
-    assert "this connection takes robot.stop only" in str(error)
+    assert "to stop the robot, connect and send robot.stop first" in str(error)
     assert late.line() is None
     full[0].close()
     until(lambda: _is_served(connect), "a place is free again")
