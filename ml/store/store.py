@@ -128,11 +128,11 @@ class Store:
             f"{self.url}/{location} cannot be written: {ATTEMPTS} times another writer was faster"
         )
 
-    def replace(self, table: Table, location: str, rows: pa.RecordBatchReader, where: str) -> None:
-        """Put these rows in the place of those that meet the condition, all at once.
+    def add(self, table: Table, location: str, rows: pa.RecordBatchReader) -> None:
+        """Add these rows, all at once, which the table does not have.
 
         Raises:
-            StoreError: it is not known whether that was done; repeat it.
+            StoreError: it is not known whether that was done; see which rows it lacks, and add those.
 
         """
         with translated(f"{self.url}/{location} cannot be written"):
@@ -140,8 +140,7 @@ class Store:
             write_deltalake(
                 delta,
                 rows,
-                mode="overwrite",
-                predicate=where,
+                mode="append",
                 schema_mode="merge",
                 writer_properties=writer_properties(rows.schema),
                 post_commithook_properties=NO_HOOKS,

@@ -1,20 +1,18 @@
 """Some robots or sessions, copied as rows into a store of their own."""
 
-import functools
+import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import pyarrow as pa
-import pyarrow.dataset
 
 from ml.store import reading
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.sessions import Session
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY, Table
+from server_gui.core.cloud.merging import Merge
 
-ROWS_AT_ONCE: Final = 20_000
 Advance = Callable[[int], object]
 
 
@@ -36,33 +34,50 @@ def copy(
 ) -> int:
     """Copy these sessions, and everything else of these robots; how many rows of telemetry that were.
 
-    What the target has of them is replaced. A session of which it has as many rows is left as it is, so a
-    copy that was interrupted is called again. `advance` hears of rows.
+    What the target has stays, and what it lacks is added, so a copy that was interrupted, or is older, is
+    called again. `advance` hears of rows.
 
     Raises:
-        StoreError: a store cannot be used, or rows are missing afterwards.
+        StoreError: a store cannot be used, or the target has something else by the same name: then nothing
+            is copied. Or rows are missing afterwards.
 
     """
-    copied = sum(_telemetry(source, target, session, advance) for session in sessions)
     parts = {Part(each.robot, None if each.robot in robots else each.session) for each in sessions}
     parts |= {Part(robot) for robot in robots}
-    for table in TABLES.values():
-        for part in sorted(parts, key=str) if table is not TELEMETRY else ():
-            _replace(source, target, table, part)
+    others = [table for table in TABLES.values() if table is not TELEMETRY]
+    merges = [
+        (_merge(source, target, table, part), table, part) for table in others for part in _sorted(parts)
+    ]
+    for merge in (*(_of(source, target, session) for session in sessions), *(each[0] for each in merges)):
+        merge.check()
+    copied = sum(_telemetry(source, target, session, advance) for session in sessions)
+    for merge, table, part in merges:
+        _add(target, merge, table, part)
     return copied
 
 
+def _sorted(parts: Collection[Part]) -> list[Part]:
+    return sorted(parts, key=str)
+
+
+def _merge(source: Store, target: Store, table: Table, part: Part) -> Merge:
+    return Merge(source, target, table, part.values(table))
+
+
+def _of(source: Store, target: Store, session: Session) -> Merge:
+    return _merge(source, target, TELEMETRY, Part(session.robot, session.session))
+
+
 def _telemetry(source: Store, target: Store, session: Session, advance: Advance) -> int:
-    there = functools.partial(_rows, target, session)
-    if there() == session.rows:
-        advance(session.rows)
-        return 0
-    _replace(source, target, TELEMETRY, Part(session.robot, session.session), advance)
-    if there() < session.rows:  # there are more where it went on meanwhile
+    part = Part(session.robot, session.session)
+    added = _add(target, _of(source, target, session), TELEMETRY, part, advance)
+    there = _rows(target, session)
+    if there < session.rows:  # there are more where it went on meanwhile
         raise StoreError(
-            f"{target.url} has {there()} of the {session.rows} rows of {session.session}; copy it again"
+            f"{target.url} has {there} of the {session.rows} rows of {session.session}; copy it again"
         )
-    return there()
+    advance(max(session.rows - added, 0))
+    return added
 
 
 def _rows(store: Store, session: Session) -> int:
@@ -71,25 +86,21 @@ def _rows(store: Store, session: Session) -> int:
     return sum(file.rows for file in files if (file.robot, file.session) == mine)
 
 
-def _replace(
-    source: Store, target: Store, table: Table, part: Part, advance: Advance = lambda _: None
-) -> None:
-    values = part.values(table)
-    wanted = functools.reduce(
-        lambda one, other: one & other,
-        (pyarrow.dataset.field(name) == value for name, value in values.items()),
-    )
-    where = " AND ".join("{} = '{}'".format(name, value.replace("'", "''")) for name, value in values.items())
-    with translated(f"{source.url}/{table.name} cannot be read"):
-        rows = reading.dataset(source, table, part.robot)
-        if not rows.head(1, filter=wanted).num_rows:
-            return
-        reader = rows.scanner(filter=wanted, batch_size=ROWS_AT_ONCE).to_reader()
-        told = pa.RecordBatchReader.from_batches(reader.schema, _told(reader, advance))
-        target.replace(table, table.location(part.robot, target.about.shards), told, where)
+def _add(target: Store, merge: Merge, table: Table, part: Part, advance: Advance = lambda _: None) -> int:
+    """Add what is new; how many rows that are."""
+    added = 0
 
+    def told(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+        nonlocal added
+        for batch in batches:
+            yield batch
+            added += batch.num_rows
+            advance(batch.num_rows)
 
-def _told(reader: pa.RecordBatchReader, advance: Advance) -> Iterator[pa.RecordBatch]:
-    for batch in reader:
-        yield batch
-        advance(batch.num_rows)
+    with merge.new() as rows:
+        first = next((batch for batch in rows if batch.num_rows), None)
+        if first is not None:
+            batches = told(itertools.chain([first], rows))
+            reader = pa.RecordBatchReader.from_batches(rows.schema, batches)
+            target.add(table, table.location(part.robot, target.about.shards), reader)
+    return added

@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pytest
 
 from ml.store import NoSuchTable, Store, StoreError, UnsafeStore
 from ml.store.objects import Object, Objects
 from ml.store.sessions import find, sessions, telemetry
-from ml.store.tables import EVENTS
+from ml.store.tables import EVENTS, TELEMETRY, field
 from ml.store.upkeep import Pin, compact, pin, pins
 from server_gui.core.cloud import parts, transfer
 from server_gui.core.cloud.transfer import Copied
@@ -185,6 +186,65 @@ def test_sessions_are_copied_alone_with_everything_that_belongs_to_them(
     parts.copy(first.store, target, [find(first.store, second.session)], {"exo-02"}, lambda _: None)
     assert sorted(session.robot for session in sessions(target)) == ["exo-01", "exo-02"]
     assert target.dataset("events").count_rows() == 4
+
+
+def all_of(source: Store, target: Store, robot: str = "exo-01") -> int:
+    return parts.copy(source, target, sessions(source, robot), {robot}, lambda _: None)
+
+
+def test_a_robots_rows_of_two_stores_come_together_in_one_folder(store_url: str, tmp_path: Path) -> None:
+    first = record(store_url, tmp_path / "one")
+    second = record((tmp_path / "second").as_uri(), tmp_path / "two")
+    target = Store((tmp_path / "both").as_uri())
+    for again in (BATCHES * ROWS, 0):
+        assert [all_of(each.store, target) for each in (first, second)] == [again, again]
+        assert {each.session for each in sessions(target)} == {first.session, second.session}
+        for each in (first, second):
+            assert values(target, each.session) == values(each.store, each.session)
+        assert target.dataset("labels").count_rows() == 2
+        assert target.dataset("events").count_rows() == 4
+
+
+def test_what_came_later_is_added_to_a_copy_of_a_robot(folder_url: str, tmp_path: Path) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    target = Store((tmp_path / "part").as_uri())
+    all_of(recorded.store, target)
+    rows = EVENTS.rows([{"robot": "exo-01", "session": recorded.session, "kind": "marker"}])  # of no spool
+    recorded.store.append(EVENTS, "events", rows.schema, rows.to_reader, "spool-x", 1)
+    for _ in range(2):
+        all_of(recorded.store, target)
+        assert target.dataset("events").count_rows() == 3
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "named"),
+    [
+        ("labels", {"label": "'sit'"}, "labels has other contents .* batch 1, number"),
+        ("sessions", {"began": "began + INTERVAL 1 DAY"}, "sessions has other contents"),
+        ("telemetry/000", {f'"{KNEE}"': f'"{KNEE}" + 1'}, "telemetry has other contents .* seq 0, row 0"),
+    ],
+)
+def test_other_contents_by_the_same_name_are_refused_and_nothing_is_copied(
+    folder_url: str, tmp_path: Path, table: str, change: dict[str, str], named: str
+) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    record(folder_url, tmp_path / "later")
+    target = Store((tmp_path / "part").as_uri())
+    parts.copy(recorded.store, target, [find(recorded.store, recorded.session)], (), lambda _: None)
+    target.table(table).update(change)
+    before = {name: target.table(name).version() for name in ("sessions", "labels", "telemetry/000")}
+    with pytest.raises(StoreError, match=named):
+        all_of(recorded.store, target)
+    assert {name: target.table(name).version() for name in before} == before
+
+
+def test_a_column_of_another_unit_is_refused(folder_url: str, tmp_path: Path) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    target = Store((tmp_path / "part").as_uri())
+    degrees = pa.schema([*TELEMETRY.schema, field(KNEE, pa.float64(), "°")])
+    target.append(TELEMETRY, "telemetry/000", degrees, lambda: iter(()), "spool-x", 1)
+    with pytest.raises(StoreError, match=rf"has {KNEE} in °, and .* in rad: copy to a folder of its own"):
+        all_of(recorded.store, target)
 
 
 @pytest.mark.usefixtures("fake_s3")
