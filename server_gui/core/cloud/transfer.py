@@ -26,7 +26,9 @@ _LOG: Final = f"/{durable.LOG}/"
 # What is no part of a store, and the one object that changes: a hint, which the next checkpoint makes anew.
 _NOT_COPIED: Final = re.compile(rf"_probe/.*|.*{re.escape(PART)}|.*{_LOG}_last_checkpoint")
 _ENTRY: Final = re.compile(rf"(.*){_LOG}(\d{{20}})\.json")
+_NAMED: Final = ("models/", "pins/")  # what has a name that says nothing of its contents
 _NO_NAMES: Final = ("", ".", "..")
+TOLD: Final = 5  # names of what is in the way
 Listing = Mapping[str, Object]
 
 
@@ -58,7 +60,8 @@ def missing(source: Objects, target: Objects) -> list[Object]:
     """What the target lacks, in the order in which it is to be copied.
 
     Raises:
-        StoreError: the target is no earlier state of the source, or an object has no place in a folder.
+        StoreError: the target is no earlier state of the source, has another model, pointer to one or pin
+            by the same name, or an object has no place in a folder.
 
     """
     before = _listing(source)
@@ -69,6 +72,7 @@ def missing(source: Objects, target: Objects) -> list[Object]:
             beneath(_folder(target), path)
     there = _listing(target)
     _check(source, target, now, there)
+    _check_named(source, target, wanted, there)
     return sorted((found for path, found in wanted.items() if _differs(found, there.get(path))), key=_order)
 
 
@@ -172,3 +176,15 @@ def _check(source: Objects, target: Objects, ours: Listing, theirs: Listing) -> 
                 f"{target.url}/{table} is no earlier state of {source.url}/{table}: something else was "
                 "written there. Copy to a place where nothing is yet"
             )
+
+
+def _check_named(source: Objects, target: Objects, ours: Listing, theirs: Listing) -> None:
+    """Models, what says which serves, and pins: both have the same where both have one."""
+    both = sorted(path for path in ours.keys() & theirs.keys() if path.startswith(_NAMED))
+    wrong = [path for path in both if source.read(path) != target.read(path)]
+    if wrong:
+        more = f" and {len(wrong) - TOLD} more" if len(wrong) > TOLD else ""
+        raise StoreError(
+            f"{target.url} has other contents than {source.url} in {', '.join(wrong[:TOLD])}{more}: nothing "
+            "was copied. Copy to a place where nothing is yet"
+        )

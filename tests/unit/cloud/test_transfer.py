@@ -169,6 +169,21 @@ def test_a_place_where_something_else_was_written_is_refused(store_url: str, tmp
     assert Objects(target).names("") == before
 
 
+@pytest.mark.parametrize("other", [b"as long", b"or of another length"])
+@pytest.mark.parametrize("path", ["models/serving/falling/_all/000001.json", "pins/0123.json"])
+def test_another_pointer_or_pin_by_the_same_name_is_refused(
+    store_url: str, tmp_path: Path, path: str, other: bytes
+) -> None:
+    source, target = Objects(store_url), Objects((tmp_path / "folder").as_uri())
+    source.create(path, b"another")
+    source.create("models/new/model.json", b"{}")
+    target.create(path, other)
+    with pytest.raises(StoreError, match=f"has other contents than .* in {path}: nothing was copied"):
+        copy(store_url, target.url)
+    assert target.read(path) == other
+    assert target.names("") == [path]
+
+
 def test_sessions_are_copied_alone_with_everything_that_belongs_to_them(
     store_url: str, tmp_path: Path
 ) -> None:
