@@ -1,8 +1,9 @@
 """Keeping a store in order: small files become few, old rows go, what a model names stays."""
 
 import hashlib
+import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Final
@@ -23,6 +24,7 @@ TARGET_BYTES: Final = 256 << 20  # of a file that compaction makes
 GRACE: Final = timedelta(
     days=7
 )  # a file that nobody needs any more stays so long, for whoever still reads it
+LOOKED_BACK: Final = 20  # versions, from the newest on, for one that can be pinned
 _PINS: Final = "pins"
 
 
@@ -44,10 +46,46 @@ class Compacted:
 
 
 def pin(store: Store, location: str, version: int, by: str) -> None:
-    """Keep this version of the table readable until `unpin`; raises `NoSuchTable` where it is not there."""
-    store.table(location, version)
+    """Keep this version of the table readable until `unpin`.
+
+    Raises:
+        NoSuchTable: it is not there, or files of it are gone; the message says which versions are whole.
+
+    """
+    there = set(store.objects.names(location))
+    gone = _gone(location, store.table(location, version), there)
+    if gone:
+        raise NoSuchTable(
+            f"{store.url}/{location} has {gone} of the files of version {version} no more: old ones were "
+            f"removed (gwrms cloud vacuum): {_can_be_pinned(store, location, there)}"
+        )
     named = Pin(location, version, by)
     store.objects.create(_path(named), msgspec.json.encode(named))
+
+
+def _gone(location: str, delta: DeltaTable, there: Set[str]) -> int:
+    """How many of the version's files are not there."""
+    paths = delta.get_add_actions(flatten=True).column("path").to_pylist()
+    return sum(
+        f"{location}/{path}" not in there and f"{location}/{unquote(path)}" not in there for path in paths
+    )
+
+
+def _can_be_pinned(store: Store, location: str, there: Set[str]) -> str:
+    """The newest versions that are whole, in words."""
+    newest = store.table(location).version()
+    back = range(newest, max(newest - LOOKED_BACK, -1), -1)
+    whole = list(itertools.takewhile(lambda each: _whole(store, location, each, there), back))
+    if not whole:
+        return "nor is the newest one whole, see gwrms cloud verify"
+    return f"the versions {whole[-1]} to {newest} can be pinned"
+
+
+def _whole(store: Store, location: str, version: int, there: Set[str]) -> bool:
+    try:
+        return not _gone(location, store.table(location, version), there)
+    except NoSuchTable:  # the log does not go back so far
+        return False
 
 
 def unpin(store: Store, location: str, version: int, by: str) -> None:

@@ -65,6 +65,20 @@ def test_a_version_that_is_not_there_cannot_be_pinned(folder_url: str) -> None:
         pin(filled(folder_url, 1), HERE, 99, "gait-3")
 
 
+def test_a_version_whose_files_are_gone_cannot_be_pinned(store_url: str) -> None:
+    store = filled(store_url)
+    old = store.table(HERE).version()
+    compact(store)
+    newest = store.table(HERE).version()
+    vacuum(store, grace=NOW)
+    whole = rf"6 of the files of version {old} no more: .*the versions {newest} to \d+ can be pinned"
+    with pytest.raises(NoSuchTable, match=whole):
+        pin(store, HERE, old, "gait-3")
+    assert pins(store) == []
+    pin(store, HERE, newest, "gait-3")
+    assert store.dataset(HERE, newest).to_table().num_rows == 18
+
+
 def test_compaction_disturbs_nobody_who_writes(store_url: str) -> None:
     filled(store_url, 4)
 
