@@ -163,7 +163,15 @@ class Registry:
             for name in (*card.sha256, CARD):
                 self._create(model, name, self.file(model, name))
         check = partial(self._check_serves, card, robot, over)
-        return Pointers(self._objects, card.task, robot).promote(model, who, why, check)
+        pointers, every = (Pointers(self._objects, card.task, whose) for whose in (robot, ""))
+        if over is None or not robot:
+            return pointers.promote(model, who, why, check)
+        own, before = pointers.newest(), every.newest()
+        done = pointers.promote(model, who, why, check)
+        stood = done == own or (own is not None and own.model and own.model == over)
+        if not stood and every.newest() != before:  # which does not take our number
+            self._withdraw(pointers, done, over, every.newest())
+        return done
 
     def rollback(self, task: str, robot: str = "", *, who: str, why: str = "") -> Pointer:
         """Let that serve which did before; after another rollback, what did before that.
@@ -205,6 +213,17 @@ class Registry:
                 f"{now or 'nothing'} serves by now (gwrms models history {card.task}): train again, or "
                 "gwrms models promote without --instead-of"
             )
+
+    def _withdraw(self, pointers: Pointers, done: Pointer, over: str, now: Pointer | None) -> None:
+        """Take back what was promoted while what serves every robot changed; raises `Overtaken`."""
+        target = pointers.target()
+        if pointers.newest() == done:  # else somebody has taken its place already
+            pointers.roll_back(target, done.who, f"withdrawn: {over or 'nothing'} did not serve any more")
+        raise Overtaken(
+            f"{done.model} was to serve in the place of {over or 'nothing'}, and "
+            f"{(now and now.model) or 'nothing'} serves every robot by now: train again, or "
+            "gwrms models promote without --instead-of"
+        )
 
     def _places(self) -> Iterator[Objects]:
         yield self._objects

@@ -382,6 +382,28 @@ def test_a_model_for_one_robot_takes_the_place_of_that_for_all_only_while_it_ser
     assert serves(in_folder) == other
 
 
+@pytest.mark.parametrize("earlier", [False, True])
+def test_a_model_for_one_robot_is_withdrawn_where_that_for_all_changes_just_then(
+    in_folder: Registry, monkeypatch: pytest.MonkeyPatch, earlier: bool
+) -> None:
+    one, other, own, gone = (published(in_folder, seed=seed) for seed in range(4))
+    in_folder.promote(one, **BY)
+    if earlier:
+        in_folder.promote(gone, "exo-01", **BY)
+        in_folder.rollback("falling", "exo-01", who="Ada")
+    check = Registry._check_serves
+
+    def overtaken(self: Registry, *arguments: Any) -> None:
+        check(self, *arguments)
+        Pointers(Objects(self.url), "falling").promote(other, "Bob", "faster")
+
+    monkeypatch.setattr(Registry, "_check_serves", overtaken)
+    with pytest.raises(Overtaken, match=f"the place of {one}, and {other} serves every robot by now"):
+        in_folder.promote(own, "exo-01", **BY, over=one)
+    assert serves(in_folder, "exo-01") == other
+    assert in_folder.history("falling", "exo-01")[-1].why == f"withdrawn: {one} did not serve any more"
+
+
 def test_of_two_who_roll_back_at_once_one_is_told(in_folder: Registry) -> None:
     for seed in range(3):
         in_folder.promote(published(in_folder, seed=seed), **BY)
