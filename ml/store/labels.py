@@ -5,6 +5,8 @@ robot, session, time, author and source the same label, the newest (`written`) c
 however often it was written.
 """
 
+import itertools
+import unicodedata
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime, timedelta
 from enum import Enum
@@ -100,6 +102,28 @@ def _source(row: Mapping[str, Any]) -> Source:
 def wearer(label: str) -> str | None:
     """Whom the label names as the wearer, if it does."""
     return label.removeprefix(WEARER) if label.startswith(WEARER) else None
+
+
+def person(name: str) -> str:
+    """What all spellings of somebody's name have in common: `P01`, `p01 `, `P-01` and `P1` are `p1`.
+
+    Capitals, spaces, signs and leading zeros are nothing; but numbers stay apart: `1-11` is not `11-1`.
+    """
+    text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
+    found: list[str] = []
+    for kind, run in itertools.groupby(text, _kind):
+        if kind != "-":
+            word = "".join(run)
+            found.append((word.lstrip("0") or "0") if kind == "N" else word)
+    return "".join(
+        f"-{word}" if before and before[-1].isdigit() and word[0].isdigit() else word
+        for before, word in itertools.pairwise(["", *found])
+    )
+
+
+def _kind(sign: str) -> str:
+    """Of a letter (with its marks), a number, or anything else."""
+    return {"L": "L", "M": "L", "N": "N"}.get(unicodedata.category(sign)[0], "-")
 
 
 def holding(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

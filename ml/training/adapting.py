@@ -34,7 +34,7 @@ def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
         UnusableData: they are of several wearers, or do not step for a minute and some more.
 
     """
-    wearers = sorted({each.group for each in parts if each.group != each.ask.session})
+    wearers = sorted({each.group for each in parts if each.named})
     if len(wearers) > 1:
         raise UnusableData(f"{', '.join(wearers)} walk there: name the sessions of one wearer (--session)")
     every_s = EVERY_MS["gait_phase"] / 1e3

@@ -7,6 +7,7 @@ from typing import Final
 from ml.errors import UnusableData
 from ml.features.recipe import Recipe
 from ml.robot.task import Task
+from ml.store.labels import person
 from ml.training.dataset import Part
 
 HELD_OUT_SHARE: Final = 0.25  # of wearers, or sessions, where nobody says which
@@ -32,33 +33,45 @@ def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
     return max(enough, key=lambda recipe: (len(recipe.channels), recipe.name))
 
 
-def held_out(groups: Iterable[str], wanted: Sequence[str] = ()) -> frozenset[str]:
+def judging(parts: Sequence[Part]) -> list[Part]:
+    """Those that may judge: one without a wearer's name may be of any wearer that has one."""
+    return [each for each in parts if each.named] or list(parts)
+
+
+def held_out(groups: Iterable[str], wanted: Sequence[str] = (), others: int = 0) -> frozenset[str]:
     """The wearers, or sessions, that judge: those that are wanted, else a quarter by a hash of their names.
 
-    So somebody who is held out once stays so, however much is recorded later.
+    So somebody who is held out once stays so, however much is recorded later. `others` are sessions that
+    only teach.
 
     Raises:
         UnusableData: one that is wanted is not there, or too few are left.
 
     """
     known = sorted(set(groups))
-    for name in wanted:
-        if name not in known:
-            raise UnusableData(f"nobody is called {name!r}; there are {', '.join(known)}")
     if wanted:
-        chosen = frozenset(wanted)
+        chosen = frozenset(_known(name, known, others) for name in wanted)
     else:
         places = {name: _place(name) for name in known}
         chosen = frozenset(name for name, place in places.items() if place < HELD_OUT_SHARE)
         chosen = chosen or frozenset(sorted(known, key=_place)[:1])
-        while len(known) - len(chosen) < 2 and len(chosen) > 1:
+        while len(known) - len(chosen) + others < 2 and len(chosen) > 1:
             chosen -= {max(chosen, key=_place)}
-    if len(known) - len(chosen) < 2:
+    if not chosen or len(known) - len(chosen) + others < 2:
         raise UnusableData(
             f"there are {len(known)} wearers or sessions with labels ({', '.join(known) or 'none'}): "
             "it takes two to learn from and one to judge by"
         )
     return chosen
+
+
+def _known(name: str, known: Sequence[str], others: int) -> str:
+    """Whom somebody means who spells it so."""
+    for each in (name, person(name)):
+        if each in known:
+            return each
+    hint = f" (and {others} sessions that do not say whose: gwrms label SESSION --wearer NAME)"
+    raise UnusableData(f"nobody is called {name!r}; there are {', '.join(known)}{hint if others else ''}")
 
 
 def _place(name: str) -> float:
@@ -70,8 +83,11 @@ def split(parts: Iterable[Part], held: Set[str]) -> tuple[list[Part], list[Part]
     """Parts to learn from, held out, and of the regression set."""
     every = list(parts)
     usual = [each for each in every if not each.regression]
+    named = any(each.named and each.group in held for each in usual)
+    judges = [each for each in usual if each.group in held and (each.named or not named)]
+    chosen = set(map(id, judges))
     return (
-        [each for each in usual if each.group not in held],
-        [each for each in usual if each.group in held],
+        [each for each in usual if id(each) not in chosen],
+        judges,
         [each for each in every if each.regression],
     )

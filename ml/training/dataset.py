@@ -23,7 +23,7 @@ from ml.robot.task import TASKS, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
 from ml.store.errors import translated
-from ml.store.labels import REGRESSION, Label, Source, holding, wearer
+from ml.store.labels import REGRESSION, Label, Source, holding, person, wearer
 from ml.store.sessions import newest
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY, Table
 from ml.training.recorded import Recorded, recorded
@@ -58,13 +58,14 @@ class Part:
     """
 
     ask: Ask
-    group: str  # the wearer's name where it is known, else the session's
+    group: str  # the wearer, as `ml.store.labels.person`, where it is known; else the session's name
     regression: bool  # never learned from: each model is judged by it
     features: Features
     truth: npt.NDArray[Any]
     source: Names
     stamps_ns: Instants  # (n,) of the newest sample
     ranges: Samples
+    named: bool = True  # whether somebody has said who the wearer was
 
     def of(self, rows: npt.NDArray[Any]) -> "Part":
         """Some of its decisions."""
@@ -77,6 +78,7 @@ class Part:
             self.source[rows],
             self.stamps_ns[rows],
             self.ranges,
+            self.named,
         )
 
 
@@ -115,7 +117,10 @@ def _part(ask: Ask) -> Part:
     if not known.any():
         raise UnusableData("nobody has said what robot or wearer did in it (gwrms label)")
     regression = any(each.label == REGRESSION for each in labels)
-    whole = Part(ask, _group(labels, ask), regression, found, truth, source, stamps_ns, ranges)
+    who = _wearer(labels)
+    whole = Part(
+        ask, who or ask.session, regression, found, truth, source, stamps_ns, ranges, named=bool(who)
+    )
     return whole.of(known)
 
 
@@ -205,11 +210,13 @@ def _truth(recipe: Recipe, said: Sequence[Said], stamps_ns: Instants) -> tuple[n
     return folded, np.where(np.isin(names, list(task.fold)), sources, NOBODY)
 
 
-def _group(labels: Sequence[Label], ask: Ask) -> str:
+def _wearer(labels: Sequence[Label]) -> str:
+    """Who it is, however that was spelled; "" where nobody says."""
     names = sorted({name for each in labels if (name := wearer(each.label))})
-    if len(names) > 1:
+    people = {who for name in names if (who := person(name))}
+    if len(people) > 1:
         raise UnusableData(f"it has labels of several wearers: {', '.join(names)}; take all but one back")
-    return names[0] if names else ask.session
+    return "".join(people)
 
 
 def _teach(ask: Ask, store: Store, known: tuple[npt.NDArray[Any], Names], stamps_ns: Instants) -> None:

@@ -26,7 +26,7 @@ from ml.robot.learned import Learned
 from ml.robot.task import Task
 from ml.store.labels import Source
 from ml.training.adapting import adapted, divided
-from ml.training.choosing import held_out, recipe_for, split
+from ml.training.choosing import held_out, judging, recipe_for, split
 from ml.training.dataset import LeftOut, Part
 from ml.training.judging import Decision, Judged, decide, judge
 from ml.training.material import Material, Wish, material
@@ -79,9 +79,11 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     if not parts:
         raise UnusableData("no session can be learned from; " + "; ".join(map(told, left_out)))
     labelled = [each for each in parts if not each.regression and (each.source != Source.PSEUDO.value).any()]
-    held = held_out((each.group for each in labelled), wish.held_out)
+    able = judging(labelled)
+    held = held_out((each.group for each in able), wish.held_out, len(labelled) - len(able))
     lessons, judges, regression = split(parts, held)
     lessons, remarks = _enough(found.task, lessons)
+    remarks += _unnamed(len(labelled) - len(able))
     if not lessons:
         raise UnusableData(f"nothing is left to learn from; {'; '.join(remarks)}")
     learned = learn(
@@ -180,6 +182,18 @@ def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]
     kept = [each.of(~np.isin(each.truth, rare)) for each in lessons]
     remarks = [f"{name} is left out: {counts[name]} examples; it takes {LEAST_ROWS}" for name in rare]
     return [each for each in kept if len(each.truth)], remarks
+
+
+def _unnamed(sessions: int) -> list[str]:
+    """What is to be known of sessions whose wearer may be any of those who judge."""
+    if not sessions:
+        return []
+    remark = (
+        f"sessions without a wearer's name, beside others with one: {sessions}; they are left out of "
+        "judging, and may have taught the model somebody who judges it: say whose they are "
+        "(gwrms label SESSION --wearer NAME)"
+    )
+    return [remark]
 
 
 def _rows(lessons: Sequence[Part]) -> Mapping[str, int]:

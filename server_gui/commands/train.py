@@ -20,8 +20,9 @@ from server_gui.commands.models import NOTHING
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
 EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
 hash of their names, or those that --held-out names, are held out to be judged by. A wearer is known by gwrms
-label SESSION --wearer NAME; else each session counts as somebody. Sessions of the regression set are never
-learned from, and judge every model.
+label SESSION --wearer NAME, however that is spelled: P01, p01 and P-1 are one. Where nobody is named each
+session counts as somebody; beside named ones, sessions without a name judge nothing. Sessions of the
+regression set are never learned from, and judge every model.
 
 The model is published (gwrms models ls), and with --promote it serves: where it is better on the held-out
 people than the model that serves now, and nowhere much worse; and where that one still serves at its end.

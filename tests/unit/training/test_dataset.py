@@ -58,6 +58,7 @@ def test_decisions_have_the_features_that_there_would_be_live_and_the_label_of_t
     assert found.truth.tolist() == [("stand", "walk", "sit")[at // (8 * S)] for at in about_ns.tolist()]
     assert set(found.source) == {"person"}
     assert (found.group, found.regression) == ("s", False)
+    assert not found.named
     assert found.ranges.shape == (len(CHANNELS), 2)
 
 
@@ -72,7 +73,14 @@ def test_phases_are_known_where_legs_step_and_where_they_stand(folder_url: str, 
 def test_who_wore_the_robot_and_the_regression_set_are_labels_too(folder_url: str, spool: Path) -> None:
     made = day("s", 1, wearer="P03")
     found = had(folder_url, spool, replace(made, said=[*made.said, (0.0, 24.0, REGRESSION, Source.PERSON)]))
-    assert (found.group, found.regression) == ("P03", True)
+    assert (found.group, found.regression) == ("p3", True)
+    assert found.named
+
+
+def test_a_wearer_is_one_however_he_is_spelled(folder_url: str, spool: Path) -> None:
+    made = day("s", 1, wearer="P-03")
+    found = had(folder_url, spool, replace(made, said=[*made.said, (0.0, 1.0, "wearer p03 ", Source.PERSON)]))
+    assert (found.group, found.named) == ("p3", True)
 
 
 def test_two_wearers_at_once_are_refused(folder_url: str, spool: Path) -> None:

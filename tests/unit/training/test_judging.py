@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from ml.errors import UnusableData
 from ml.registry.card import ClassScore, Metrics
 from ml.robot.task import TASKS
+from ml.store.labels import person
 from ml.training.choosing import held_out, recipe_for
 from ml.training.judging import Judged, decide
 
@@ -97,6 +98,33 @@ def test_who_is_held_out_stays_so_when_others_come() -> None:
     assert 1 <= len(held) <= 6
     assert held <= held_out([*few, *(f"Q{number:02}" for number in range(12))])
     assert held_out(few, ["P03"]) == {"P03"}
+
+
+@pytest.mark.parametrize(
+    "spelled", ["P01", "p01", "P01 ", "P-01", " p_01", "P 1", "\uff30\uff10\uff11", "P.01"]
+)
+def test_one_wearer_is_one_person_however_he_is_spelled(spelled: str) -> None:
+    assert person(spelled) == "p1"
+    assert held_out(["p1", "p2", "p3"], [spelled]) == {"p1"}
+
+
+def test_different_wearers_stay_different_people() -> None:
+    names = [
+        "P1",
+        "P10",
+        "P100",
+        "1-11",
+        "11-1",
+        "111",
+        "0",
+        "Ada",
+        "Jos\u00e9",
+        "Jose",
+        "\u0915\u093f",
+        "\u0915\u093e",
+    ]
+    assert len({person(name) for name in names}) == len(names)
+    assert person(" - ") == person("") == ""
 
 
 @pytest.mark.parametrize(

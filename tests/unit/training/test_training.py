@@ -124,10 +124,29 @@ def test_other_sessions_judge_and_teach_and_a_rare_class_is_left_out(
     assert found.card.held_out == ("s4", "s6", "s7")
     assert found.regression is not None
     assert found.regression.people == {"s4": 220}
-    assert found.remarks == ("stairs_up is left out: 10 examples; it takes 20",)
+    rare_class, unnamed = found.remarks
+    assert rare_class == "stairs_up is left out: 10 examples; it takes 20"
+    assert unnamed.startswith(
+        "sessions without a wearer's name, beside others with one: 4; they are left out"
+    )
     assert [(each.ask.session, each.why) for each in found.left_out] == [
         ("s5", "it lasts 1.5 s: activity/hips+knees looks back 2 s")
     ]
+
+
+def test_no_wearer_is_on_both_sides_and_nobody_knows_whose_is_no_judge(
+    people: list[Made], tmp_path: Path
+) -> None:
+    names = ("P01", "p01 ", "P-01", "P02", "P03")
+    named = [replace(each, wearer=name) for each, name in zip(people, names, strict=True)]
+    mine = stored(tmp_path, [*named, replace(people[0], session="whose")])
+    found = train(registry_of(mine), Wish("activity", held_out=("P1",)))
+    assert found.card.held_out == ("s0", "s1", "s2")
+    assert found.held_out.people == {"p1": 660}
+    assert "beside others with one: 1;" in found.remarks[0]
+    assert "whose" not in train(registry_of(mine), ACTIVITY).card.held_out
+    with pytest.raises(UnusableData, match=r"nobody is called 'whose'.*1 sessions that do not say whose"):
+        train(registry_of(mine), Wish("activity", held_out=("whose",)))
 
 
 def test_a_serving_model_with_other_sensors_judges_the_same_decisions(
