@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from gateway.client import Batch
 from gateway.messages import Description, ResourceSnapshot
-from ml.store.tables import TABLES
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES
 from server_gui.core.recording import records
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.gathering import EventKind, Notification
@@ -25,6 +25,7 @@ from server_gui.core.watching import BEAT_S, Worker
 
 log = logging.getLogger(__name__)
 
+CONTROL: Final = frozenset({SESSIONS.name, LABELS.name, EVENTS.name})  # few, and what rows are told apart by
 SHARES: Final = 2  # of several robots, one may have this part of what waits: its flood leaves the others room
 COMMIT_S: Final = 0.05  # rows of so long go to the disk together
 HELD_S: Final = 60.0  # that a mistake of ours stays an alarm, so that it is seen
@@ -153,16 +154,16 @@ class Recorder:
     def begin(self, robot: str, facts: Facts) -> str:
         """Begin a session, end the one before, and give its name. The first row begins one where none is."""
         session = records.begin(robot, facts)
-        self._put(robot, 1, functools.partial(self._robots.begin, session))
+        self._put(robot, 1, functools.partial(self._robots.begin, session), control=True)
         return session.name
 
     def amend(self, robot: str, facts: Facts) -> int:
         """Say more about the robot's session than was known when it began."""
-        return self._put(robot, 1, functools.partial(self._robots.amend, robot, facts))
+        return self._put(robot, 1, functools.partial(self._robots.amend, robot, facts), control=True)
 
     def end(self, robot: str) -> int:
         """End the robot's session."""
-        return self._put(robot, 1, functools.partial(self._robots.end, robot))
+        return self._put(robot, 1, functools.partial(self._robots.end, robot), control=True)
 
     def resources(self, robot: str, snapshot: ResourceSnapshot) -> int:
         """Keep a look at the robot's computer."""
@@ -185,7 +186,9 @@ class Recorder:
     def event(self, robot: str, kind: EventKind, text: str, **data: Any) -> int:
         """Keep that something happened to the robot now."""
         utc_ns = time.time_ns()
-        return self._put(robot, 1, lambda: [self._robots.known(robot).event(kind, text, utc_ns, **data)])
+        return self._put(
+            robot, 1, lambda: [self._robots.known(robot).event(kind, text, utc_ns, **data)], control=True
+        )
 
     def add(self, *added: Record) -> int:
         """Keep rows of any tables: labels, predictions.
@@ -195,7 +198,8 @@ class Recorder:
 
         """
         _check(added)
-        return self._put(added[0].fields.get("robot", ""), len(added), lambda: added)
+        control = {record.table for record in added} <= CONTROL
+        return self._put(added[0].fields.get("robot", ""), len(added), lambda: added, control=control)
 
     def cut(self, then: Callable[[], None]) -> int:
         """End the batch with what was handed in until now; `then` is called when it waits for upload."""
@@ -226,13 +230,14 @@ class Recorder:
             wanted = self._handed
             return self._changed.wait_for(lambda: self._acknowledged >= wanted, timeout_s)
 
-    def _put(self, robot: str, rows: int, work: Work) -> int:
+    def _put(self, robot: str, rows: int, work: Work, *, control: bool = False) -> int:
+        """Let it wait for the disk, where there is room; what rows are told apart by (`control`) always."""
         with self._changed:
             self._handed += 1
             capacity, own = self._settings.capacity, self._waiting[robot] + rows
             self._senders.add(robot)
             share = capacity if len(self._senders) == 1 else capacity // SHARES
-            if self._queued_rows + rows > capacity or own > share:
+            if not control and (self._queued_rows + rows > capacity or own > share):
                 self._overflowed[robot] += rows
             else:
                 self._queued_rows += rows

@@ -211,6 +211,34 @@ def test_nobody_waits_for_the_disk_and_an_overflow_is_counted_told_and_recorded(
         assert json.loads(str(event["data"])) == {"rows": 50}
 
 
+def test_however_full_the_queue_is_rows_stay_with_their_session_and_labels_and_events_are_kept(
+    tmp_path: Path,
+) -> None:
+    with StuckSpool(tmp_path) as spool:
+        with Recorder(spool, settings=RecorderSettings(capacity=10)) as recorder:
+            old = recorder.begin("exo-01", Facts())
+            assert spool.reached.wait(WAIT_S)
+            for seq in range(20):
+                recorder.record("exo-01", 1, batch(seq))
+            lost = recorder.state.lost
+            recorder.end("exo-01")
+            new = recorder.begin("exo-01", Facts())
+            recorder.amend("exo-01", Facts(notes="after a reboot"))
+            recorder.mark("exo-01", "here")
+            recorder.add(label(Label("exo-01", new, 1, 2, "walk", "ada")))
+            assert recorder.state.lost == lost == 10
+            spool.let_go.set()
+            assert recorder.flush(WAIT_S)
+            recorder.record("exo-01", 1, batch(20))
+        runs, records = kept(spool)
+        assert {run.session: len(run) for run in runs} == {old: 10, new: 1}
+        told = [record.fields for record in records if record.table == "sessions"]
+        assert {each["session"] for each in told if each["ended"]} == {old, new}
+        assert "after a reboot" in [each["notes"] for each in told if each["session"] == new]
+        assert [event["text"] for event in events(spool, "marker")] == ["here"]
+        assert [record.fields["label"] for record in records if record.table == "labels"] == ["walk"]
+
+
 def test_what_the_disk_refused_is_tried_again(tmp_path: Path) -> None:
     alarms: list[Alarm] = []
     with StuckSpool(tmp_path) as spool:
