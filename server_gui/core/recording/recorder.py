@@ -114,6 +114,7 @@ class Recorder:
         self._recorded = 0
         self._lost = 0
         self._untold: Counter[str] = Counter()  # rows that were lost, of each robot; "": nobody knows whose
+        self._sessions_lost = False  # rows of sessions may be among what was lost: they are written again
         self._commit_s = 0.0
         self._looked_s = -AGAIN_S
         self._broke_s = -HELD_S
@@ -321,6 +322,9 @@ class Recorder:
         for robot, count in self._untold.items():
             found += self._robots.lost(count, robot)
         self._untold.clear()
+        if self._sessions_lost:
+            found = [*self._robots.sessions(), *found]
+            self._sessions_lost = False
         parts: list[Part] = [*runs, *found]
         left: list[list[Part]] = [[*parts, *self._robots.heads.items()]] if parts else []
         while left:
@@ -366,11 +370,13 @@ class Recorder:
             self._robots.forget(part[0], self._spool.heads)
         self._lost += _rows(part)
         self._untold[""] += _rows(part)
+        self._sessions_lost = True
         self._break(error)
 
     def _lose(self, rows: int) -> None:
         self._lost += rows
         self._untold[""] += rows
+        self._sessions_lost = True
         self._robots.heads = dict(self._spool.heads)  # those entries are still to be seen
 
     def _has_room(self) -> bool:

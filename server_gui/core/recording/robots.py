@@ -66,6 +66,10 @@ class Robots:
         session = self._sessions.pop(robot, None)
         return [] if session is None else [session.ended().record()]
 
+    def sessions(self) -> list[Record]:
+        """Of every session that goes on what is known of it, once more."""
+        return [session.record() for session in self._sessions.values()]
+
     def end_all(self) -> list[Record]:
         """End every session."""
         return [record for robot in list(self._sessions) for record in self.end(robot)]

@@ -271,8 +271,13 @@ def test_a_nearly_full_disk_stops_recording_with_an_alarm_and_it_goes_on_when_th
             assert recorder.flush(WAIT_S)
             assert recorder.state.alarms == ()
         assert [alarm.kind for alarm in alarms] == [AlarmKind.DISK_FULL]
-        assert [row[3] for row in rows(kept(spool)[0])] == [1]
+        runs, records = kept(spool)
+        assert [row[3] for row in rows(runs)] == [1]
         assert json.loads(str(events(spool, "lost")[0]["data"])) == {"rows": 2}
+        # The session that began while nothing was kept is written again, before its first row and its end.
+        told = [record.fields for record in records if record.table == "sessions"]
+        assert [each["session"] for each in told] == [runs[0].session] * 2
+        assert [each["ended"] is None for each in told] == [True, False]
 
 
 def test_a_batch_is_frozen_when_it_is_long_enough(spool: Spool) -> None:
