@@ -157,7 +157,10 @@ def status_text(report: CollectorReport) -> str:
         *(f"ALARM  {trouble.text}" for trouble in report.threads),
         *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
         *([f"ALARM  {uploader.problem}"] if uploader.problem else []),
-        *(f"ALARM  {file} is damaged: its rows are not in the store" for file in uploader.damaged),
+        *(
+            f"ALARM  {file} is damaged: what is damaged of it is not in the store"
+            for file in uploader.damaged
+        ),
     ]
     robots = report.robots.items()
     links = table(HEADER, [_row(name, link) for name, link in robots], RIGHT)

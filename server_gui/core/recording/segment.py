@@ -4,9 +4,10 @@ import contextlib
 import itertools
 import operator
 import sqlite3
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
@@ -20,6 +21,7 @@ CREATE TABLE IF NOT EXISTS run (
     robot TEXT NOT NULL, connection TEXT NOT NULL, stream INTEGER NOT NULL,
     seq INTEGER NOT NULL, row INTEGER NOT NULL, -- of the first of its rows
     rows INTEGER NOT NULL, session TEXT NOT NULL, layout INTEGER NOT NULL, data BLOB NOT NULL,
+    crc INTEGER, -- as `_crc`; null in segments from before there was one
     PRIMARY KEY (robot, connection, stream, seq, row)
 );
 CREATE TABLE IF NOT EXISTS record (number INTEGER PRIMARY KEY, content BLOB NOT NULL);
@@ -28,7 +30,8 @@ CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT N
 ROWS_AT_ONCE: Final = 20_000  # that are in memory as columns
 PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hardly one
 MAPPED_BYTES: Final = 1 << 28
-_NAME: Final = operator.itemgetter(slice(5))
+_ALIKE: Final = operator.itemgetter(0, 6, 1, 2, 7)
+_COLUMNS: Final = "robot, connection, stream, seq, row, rows, session, layout, data, crc"
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -47,8 +50,19 @@ def translated(file: Path) -> Iterator[None]:
         damaged = getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED
         kind, how = (Damaged, "is damaged") if damaged else (SpoolUnusable, "cannot be used")
         raise kind(f"the spool's file {file} {how}: {error}") from error
-    except (msgspec.MsgspecError, ValueError, LookupError) as error:
+    except (msgspec.MsgspecError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise Damaged(f"the spool's file {file} is damaged: {error}") from error
+
+
+class DamagedRun(NamedTuple):
+    """What a run that is not as it was written says of itself, which may be wrong too."""
+
+    robot: str
+    session: str
+    connection: str
+    stream: int
+    seq: int
+    rows: int
 
 
 class Segment:
@@ -66,12 +80,21 @@ class Segment:
             # WAL with FULL: a commit has returned only when the log is on the disk.
             self._database.execute("PRAGMA journal_mode=WAL")
             self._database.execute("PRAGMA synchronous=FULL")
+            self._database.text_factory = _text
             self._database.executescript(SCHEMA)
-            self._layouts: dict[tuple[str, Layout], int] = {
-                (robot, _layout_decoder.decode(description)): number
-                for number, robot, description in self._database.execute("SELECT * FROM layout")
-            }
+            self._bring_forward()
+            self._layouts: dict[tuple[str, Layout], int] = {}
+            self._sums: dict[int, int] = {}  # of each layout, which its runs' checksums begin with
+            for number, robot, description in self._database.execute("SELECT * FROM layout"):
+                self._layouts[robot, _layout_decoder.decode(description)] = number
+                self._sums[number] = _sum(robot, description)
             self.rows = self._count()
+
+    def _bring_forward(self) -> None:
+        """Give a segment from before there were checksums room for them."""
+        columns = [column[1] for column in self._database.execute("PRAGMA table_info(run)")]
+        if "crc" not in columns:
+            self._database.execute("ALTER TABLE run ADD COLUMN crc INTEGER")
 
     def _count(self) -> int:
         runs = self._database.execute("SELECT coalesce(sum(rows), 0) FROM run").fetchone()[0]
@@ -88,7 +111,8 @@ class Segment:
         """
         with self._transaction():
             self._database.executemany(
-                "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", [self._line(run) for run in runs]
+                f"INSERT INTO run ({_COLUMNS}) VALUES ({', '.join('?' * 10)})",
+                [self._line(run) for run in runs],
             )
             self._database.executemany(
                 "INSERT INTO record (content) VALUES (?)",
@@ -102,15 +126,19 @@ class Segment:
 
     def _line(self, run: Run) -> tuple[object, ...]:
         first = (int(run.seqs[0]), int(run.rows[0]))
-        name = (run.robot, run.connection, run.stream, *first)
-        return (*name, len(run), run.session, self._layout(run), pack(run))
+        layout = self._layout(run)
+        name = (run.robot, run.connection, run.stream, *first, len(run), run.session, layout)
+        data = pack(run)
+        return (*name, data, _crc(self._sums[layout], name, data))
 
     def _layout(self, run: Run) -> int:
         number = self._layouts.get((run.robot, run.layout))
         if number is None:
             number = len(self._layouts) + 1
-            line = (number, run.robot, _encoder.encode(run.layout))
+            description = _encoder.encode(run.layout)
+            line = (number, run.robot, description)
             self._database.execute("INSERT INTO layout VALUES (?, ?, ?)", line)
+            self._sums[number] = _sum(run.robot, description)
             self._layouts[run.robot, run.layout] = number
         return number
 
@@ -134,17 +162,37 @@ class Segment:
     def runs(self) -> Iterator[Run]:
         """Every row: robot by robot, connection by connection, stream by stream, in the order of `seq`.
 
-        What follows each other with the same name and columns is one run, up to `ROWS_AT_ONCE`.
+        Without the runs that are `damaged`. What follows each other with the same name and columns is one
+        run, up to `ROWS_AT_ONCE`.
         """
         layouts = {number: layout for (_, layout), number in self._layouts.items()}
         with translated(self.path):
-            found = self._database.execute(
-                "SELECT robot, session, connection, stream, layout, rows, data FROM run "
-                "ORDER BY robot, connection, stream, seq, row"
-            )
-            for (robot, session, connection, stream, layout), alike in itertools.groupby(found, _NAME):
+            found = filter(self._sound, self._lines())
+            for (robot, session, connection, stream, layout), alike in itertools.groupby(found, _ALIKE):
                 for data in _portions(alike):
                     yield unpack(robot, session, connection, stream, layouts[layout], data)
+
+    def damaged(self) -> list[DamagedRun]:
+        """The runs that are not as they were written: `runs` leaves them out."""
+        with translated(self.path):
+            return [
+                DamagedRun(str(robot), str(session), str(connection), stream, seq, rows)
+                for robot, connection, stream, seq, _, rows, session, *_ in itertools.filterfalse(
+                    self._sound, self._lines()
+                )
+            ]
+
+    def _lines(self) -> Iterator[tuple[Any, ...]]:
+        return self._database.execute(
+            f"SELECT {_COLUMNS} FROM run ORDER BY robot, connection, stream, seq, row"
+        )
+
+    def _sound(self, line: tuple[Any, ...]) -> bool:
+        """Whether a run is as it was written, as far as anybody knows."""
+        *name, data, crc = line
+        if not isinstance(data, bytes):
+            return False
+        return crc is None or crc == _crc(self._sums.get(name[-1], 0), tuple(name), data)
 
     def records(self) -> Iterator[Record]:
         """Every record, in the order in which it was recorded."""
@@ -178,13 +226,27 @@ class Segment:
         return size
 
 
+def _text(raw: bytes) -> str:
+    """Also what is no text any more: its checksum tells."""
+    return raw.decode(errors="replace")
+
+
+def _sum(robot: str, description: bytes) -> int:
+    return zlib.crc32(description, zlib.crc32(robot.encode()))
+
+
+def _crc(layout: int, name: tuple[object, ...], data: bytes) -> int:
+    """Of all that a run is: its layout (`_sum`), its name and its rows."""
+    return zlib.crc32(data, zlib.crc32(repr(name).encode(), layout))
+
+
 def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:
     """The packed rows of these lines, put together."""
     portion: list[bytes] = []
     rows = 0
-    for *_, count, data in lines:
-        portion.append(data)
-        rows += count
+    for line in lines:
+        portion.append(line[8])
+        rows += line[5]
         if rows >= ROWS_AT_ONCE:
             yield b"".join(portion)
             portion, rows = [], 0

@@ -2,8 +2,8 @@
 
 `00000007.db` is a segment; the highest number is written, all others are frozen, and a segment's number is
 the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in the store and goes when room
-is needed. `00000005.damaged.db` cannot be read: its rows are not in the store, and it stays for somebody to
-look at. The highest number is never removed, so that no number is given twice.
+is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are not in the store, and it
+stays for somebody to look at. The highest number is never removed, so that no number is given twice.
 """
 
 import contextlib

@@ -127,7 +127,7 @@ class Uploader:
             try:
                 self._upload(number)
             except Damaged as error:
-                log.error("batch %d is not uploaded: %s", number, error)
+                log.error("batch %d is not uploaded as a whole: %s", number, error)
                 self._tell(waiting[done:])
                 continue
             except Exception as error:  # noqa: BLE001 - uploading goes on, whatever a library raises

@@ -93,7 +93,7 @@ def test_a_status_says_what_people_ask_first() -> None:
         "ALARM  recording has stopped",
         "ALARM  no network",
         "2 batches uploaded, 7 wait (upload = idle)",
-        "ALARM  /spool/00000003.damaged.db is damaged: its rows are not in the store",
+        "ALARM  /spool/00000003.damaged.db is damaged: what is damaged of it is not in the store",
         "5.0 MiB",
         "192.0.2.7:7420",
         "exo-01: the link is idle",

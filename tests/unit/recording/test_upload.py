@@ -16,11 +16,12 @@ from ml.store import Store, StoreUnreachable
 from ml.store.labels import Label
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.columns import Columns
+from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts, label
 from server_gui.core.recording.rows import Layout, Record
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import upload
+from server_gui.core.recording.upload import send, upload
 from server_gui.core.recording.uploader import Uploader
 from tests.unit.recording.robots import CHANNELS, batch, description, stamp_ns, value
 
@@ -194,9 +195,57 @@ def test_a_damaged_batch_keeps_none_after_it_from_the_store(
         assert uploader.drain(WAIT_S)
         assert [Path(file).name for file in uploader.state.damaged] == ["00000002.damaged.db"]
         assert uploader.state.uploaded == batches - 1
-    assert "batch 2 is not uploaded: the spool's file" in caplog.text
+    assert "batch 2 is not uploaded as a whole: " in caplog.text
     texts = Store(folder_url).dataset("events").to_table()["text"].to_pylist()
-    assert sorted(texts) == ["0", "2"]
+    if part != "run":
+        assert sorted(texts) == ["0", "2"]
+        return
+    assert {"0", "1", "2"} < set(texts)
+    assert any(text.startswith("1 rows of exo-01, stream 7 from notification 1 on, were") for text in texts)
+    assert sorted(Store(folder_url).dataset(HERE).to_table()["seq"].to_pylist()) == [0, 2]
+
+
+@pytest.mark.parametrize("column", ["data", "session", "layout.description"])
+def test_one_flipped_bit_in_a_run_arrives_as_no_value_but_as_a_loss(
+    spool: Spool, folder_url: str, column: str
+) -> None:
+    with Recorder(spool) as recorder:
+        for seq in range(3):
+            recorder.record("exo-01", 7, batch(seq, channels=CHANNELS[: seq + 1]))
+    [number] = spool.waiting()
+    flip(spool.folder / f"{number:08}.db", column)
+    with pytest.raises(Damaged, match=r"1 rows of exo-01, stream 7 from notification 1 on, were damaged"):
+        send(spool, number, Store(folder_url))
+    assert [file.name for file in spool.damaged()] == [f"{number:08}.damaged.db"]
+    store = Store(folder_url)
+    assert sorted(store.dataset(HERE).to_table()["seq"].to_pylist()) == [0, 2]
+    [lost] = [row for row in store.dataset("events").to_table().to_pylist() if row["kind"] == "lost"]
+    assert (lost["robot"], msgspec.json.decode(lost["data"])) == (
+        "exo-01",
+        {"rows": 1, "stream": 7, "seq": 1},
+    )
+
+
+def test_a_segment_from_before_there_were_checksums_arrives(spool: Spool, folder_url: str) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 7, batch(0))
+    with contextlib.closing(sqlite3.connect(spool.folder / "00000001.db")) as database, database:
+        database.execute("ALTER TABLE run DROP COLUMN crc")
+    send(spool, 1, Store(folder_url))
+    assert Store(folder_url).dataset(HERE).to_table()["seq"].to_pylist() == [0]
+
+
+def flip(file: Path, column: str) -> None:
+    """One bit of the second run, in its middle; or of its layout."""
+    table, _, column = column.rpartition(".")
+    key, at = ("id", 2) if table else ("seq", 1)
+    table = table or "run"
+    with contextlib.closing(sqlite3.connect(file)) as database, database:
+        [value] = database.execute(f"SELECT {column} FROM {table} WHERE {key} = ?", [at]).fetchone()
+        raw = bytearray(value.encode() if isinstance(value, str) else value)
+        raw[len(raw) // 2] ^= 1
+        new = raw.decode() if isinstance(value, str) else bytes(raw)
+        database.execute(f"UPDATE {table} SET {column} = ? WHERE {key} = ?", [new, at])
 
 
 def damage(file: Path, part: str) -> None:
