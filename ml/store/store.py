@@ -112,7 +112,7 @@ class Store:
                 delta = self._writable(table, location, schema)
                 seen = delta.version()
                 try:
-                    self._widen(delta, location, schema)
+                    self._widen(delta, table, location, schema)
                     new = (delta.transaction_version(writer) or 0) < sequence
                     if new:
                         files = files or self._files(table, location, batches())
@@ -231,19 +231,31 @@ class Store:
             durable.synchronise(self.folder / location / file.path for file in files)
         return files
 
-    def _widen(self, delta: DeltaTable, location: str, schema: pa.Schema) -> None:
+    def _widen(self, delta: DeltaTable, table: Table, location: str, schema: pa.Schema) -> None:
         """Add the columns that the table does not have."""
         known = {field.name: field.type for field in delta.schema().fields}
         wanted = DeltaSchema.from_arrow(schema).fields
         wrong = [field.name for field in wanted if known.get(field.name, field.type) != field.type]
         if wrong:
             raise StoreError(f"{self.url}/{location} has {', '.join(wrong)} of another type")
+        self._check_units(delta, table, location, schema)
         new = [field for field in wanted if field.name not in known]
         if new:
             delta.alter.add_columns(new, post_commithook_properties=NO_HOOKS)
             if self.folder is not None:
                 entry = f"{delta.version():020}.json"
                 durable.synchronise([self.folder / location / durable.LOG / entry])
+
+    def _check_units(self, delta: DeltaTable, table: Table, location: str, schema: pa.Schema) -> None:
+        """Values in different units never stand in one column, also where another has just added it."""
+        known = {each.name: each.metadata.get("unit") for each in delta.schema().fields}
+        for each in DeltaSchema.from_arrow(schema).fields:
+            unit = each.metadata.get("unit")
+            if each.name not in table.schema.names and known.get(each.name, unit) != unit:
+                raise StoreError(
+                    f"{self.url}/{location} has {each.name} in {known[each.name] or 'no unit'}, and it was "
+                    f"to be written in {unit or 'no unit'}: look at its units again, and upload again"
+                )
 
     def _commit(
         self, delta: DeltaTable, table: Table, files: list[AddAction], transaction: Transaction

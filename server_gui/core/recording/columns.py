@@ -18,12 +18,13 @@ class Columns:
     """Where each channel of these layouts goes, in a table whose columns have these units already.
 
     A channel's column has its name. Where that column has another unit, because another robot means something
-    else by the name, it is `name@unit`: values in different units never stand in one column. Where the name
-    is one of the table's own, or another one in other letters' case, which the table format takes for the
-    same, it is `name@2`.
+    else by the name, or none although this channel has one, it is `name@unit`: values in different units
+    never stand in one column. Where the name is one of the table's own, or another in other letters' case,
+    which the table format takes for the same, it is `name@2`.
     """
 
     def __init__(self, layouts: Iterable[Layout], units: Mapping[str, str | None]) -> None:
+        self._there = frozenset(name.lower() for name in units)  # whose unit, or that they have none, stays
         self._columns = {name.lower(): (name, unit) for name, unit in units.items()}
         self._names: dict[tuple[str, str | None], str] = {}
         for layout in layouts:
@@ -51,7 +52,8 @@ class Columns:
         if name.lower() in OWN:
             return False
         taken, known = self._columns.get(name.lower(), (name, None))
-        return taken == name and (unit is None or known in {None, unit})
+        open_ = known is None and name.lower() not in self._there
+        return taken == name and (unit is None or open_ or known == unit)
 
     def batch(self, run: Run) -> pa.RecordBatch:
         """A run's rows."""

@@ -132,6 +132,12 @@ def test_values_in_different_units_never_share_a_column(spool: Spool, folder_url
     assert "left_knee.position" not in columns.schema.names
 
 
+def test_a_column_that_was_written_without_a_unit_takes_none_later() -> None:
+    layouts = [Layout(("knee",), (unit,)) for unit in ("rad", "°", None)]
+    assert Columns(layouts, {"knee": None}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
+    assert Columns([Layout(("knee",), (unit,)) for unit in (None, "rad")], {}).schema.names[-1] == "knee"
+
+
 @pytest.mark.parametrize(
     "channels", [("seq", "robot"), ("Utc",), ("a.b", "A.b"), ("a b", "a,b;{}()=", "a/b", "é"), ("`x`", '"x"')]
 )

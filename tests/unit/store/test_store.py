@@ -67,6 +67,20 @@ def test_two_that_append_the_same_with_an_old_view_do_it_once(store_url: str) ->
     assert numbers(stores[0]) == [0, 1, 2, 3]
 
 
+@pytest.mark.parametrize("unit", ["°", None])
+def test_a_column_that_another_has_just_added_in_another_unit_is_refused(
+    store_url: str, unit: str | None
+) -> None:
+    stores = [Store(store_url), Store(store_url)]
+    for number, store in enumerate(stores):
+        store.append(TELEMETRY, HERE, *telemetry(1), f"spool-{number}", 1)  # both have the table open now
+    stores[0].append(TELEMETRY, HERE, *telemetry(1, 1, tilt="rad"), "spool-0", 2)
+    with pytest.raises(StoreError, match=f"has tilt in rad, and it was to be written in {unit or 'no unit'}"):
+        stores[1].append(TELEMETRY, HERE, *telemetry(1, 2, tilt=unit), "spool-1", 2)
+    assert stores[1].units(HERE)["tilt"] == "rad"
+    assert stores[1].append(TELEMETRY, HERE, *telemetry(1, 2, tilt="rad"), "spool-1", 2)
+
+
 def test_new_channels_become_columns_and_keep_their_units(store_url: str) -> None:
     store = Store(store_url)
     store.append(TELEMETRY, HERE, *telemetry(2), "spool-a", 1)
