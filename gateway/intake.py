@@ -27,7 +27,7 @@ RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long 
 ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
 PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read …
 COSTLY_NS = 300_000  # … and one whose read took more of the thread than this: so many times as long,
-LONGEST_REST_S = 0.1
+LONGEST_REST_S = 1.0
 PACE_FACTOR = 4  # for each client that is left alone just now. So they all together leave it most of its time
 LAST_READS = 16  # of a connection that ends: a stop may still be in it
 
