@@ -7,7 +7,7 @@ it should be, and the only one; else `distrust` says why not.
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -155,6 +155,13 @@ class Node(BusUser):
     def upload(self, index: int, subindex: int) -> Future[bytes]:
         """Read an object's bytes, no more than its type has."""
         return self.worker.submit(lambda sdo: self._trim(index, subindex, sdo.upload(index, subindex)))
+
+    def upload_all(self, objects: Sequence[tuple[int, int]]) -> Future[list[bytes | DriverError]]:
+        """Read several objects in a row, nothing in between; an error stands in its object's place.
+
+        After one that was not answered the others are not asked for: the list ends there.
+        """
+        return self.worker.submit(lambda sdo: list(self._upload_each(sdo, objects)))
 
     def download(
         self,
@@ -361,6 +368,17 @@ class Node(BusUser):
             return unsigned(self._trim(index, subindex, sdo.upload(index, subindex)))
         except DeviceAbort:
             return None
+
+    def _upload_each(
+        self, sdo: SdoChannel, objects: Sequence[tuple[int, int]]
+    ) -> Iterator[bytes | DriverError]:
+        for index, subindex in objects:
+            try:
+                yield self._trim(index, subindex, sdo.upload(index, subindex))
+            except DriverError as error:
+                yield error
+                if not isinstance(error, DeviceAbort):
+                    return
 
     def _trim(self, index: int, subindex: int, data: bytes) -> bytes:
         """Some devices answer with four bytes whatever the object's size."""

@@ -48,7 +48,7 @@ class ControlModule:
             "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
             "control.release": self._release,
             "parameter.list": lambda _session, params: self._tuning.listed(params.names),
-            "parameter.read": lambda _session, params: self._tuning.read(params.names),
+            "parameter.read": lambda session, params: self._tuning.read(params.names, session),
             "parameter.write": self._write,
             "parameter.confirm": self._confirm,
             "parameter.revert": self._revert,

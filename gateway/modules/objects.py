@@ -5,7 +5,7 @@ the device.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -38,6 +38,8 @@ class Node(Protocol):
         """Why nothing may be written to it."""
 
     def upload(self, index: int, subindex: int) -> "Future[bytes]": ...
+
+    def upload_all(self, objects: Sequence[tuple[int, int]]) -> "Future[list[bytes | DriverError]]": ...
 
     def download(
         self,

@@ -7,7 +7,7 @@ for them: what is not written by then is not written any more.
 import itertools
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from drivers.errors import DriverError
 from drivers.samples import State
 from gateway.config import RobotConfig
-from gateway.futures import back, done, failed, gather, then
+from gateway.futures import back, done, gather, then
 from gateway.loop import Loop
 from gateway.messages import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
 from gateway.modules.catalogue import resolve
@@ -24,6 +24,7 @@ from gateway.modules.component import ComponentModule
 from gateway.modules.ledger import WriteLedger
 from gateway.modules.objects import Change, device_error
 from gateway.modules.parameters import Parameter
+from gateway.modules.reads import Reader, Reads
 from gateway.modules.rules import Rules
 from gateway.modules.stop.authority import Authority, Permit
 from gateway.modules.stop.machine import Phase
@@ -82,6 +83,7 @@ class Tuning:
         self._infos = [one.info for one in self._parameters.values()]
         self._joints = tuple(config.joint)
         self._rules = Rules(config, component, self._parameters)
+        self._reads = Reads(loop, self._read_some)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
@@ -139,11 +141,11 @@ class Tuning:
         lost = self._lost(chosen)
         return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
-    def read(self, names: list[str] | None) -> "Future[ParameterValues]":
+    def read(self, names: list[str] | None, reader: Reader) -> "Future[ParameterValues]":
         """What the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
-        return then(then(ready, lambda _none: self._uploads(chosen)), self._values)
+        return then(ready, lambda _none: self._reads.ask(reader, chosen))
 
     def write(
         self, values: Mapping[str, float], session: "Session", trial_s: float | None
@@ -196,24 +198,36 @@ class Tuning:
         stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
         return _value(parameter, value, stamp_ns, problem)
 
-    def _uploads(self, parameters: list[Parameter]) -> "Future[dict[str, bytes | Exception]]":
-        silent = {name: self._rules.silence(name) for name in {one.component for one in parameters}}
-        return gather({one.name: self._upload(one, silent[one.component]) for one in parameters})
+    def _read_some(self, parameters: Sequence[Parameter]) -> "Future[list[ParameterValue]]":
+        """For `Reads`: the first parameters, of one device, that can be asked for or that cannot."""
+        silence = self._rules.silence(parameters[0].component)
+        whys = [self._refusal(one, silence) for one in parameters]
+        refused = list(itertools.takewhile(bool, whys))
+        if refused:
+            return done([self._found(one, why) for one, why in zip(parameters, refused, strict=False) if why])
+        asked = [
+            one
+            for one, _why in itertools.takewhile(lambda pair: not pair[1], zip(parameters, whys, strict=True))
+        ]
+        uploads = self._rules.node(asked[0]).upload_all([(one.index, one.subindex) for one in asked])
+        return then(back(self._loop, gather({"all": uploads})), lambda told: self._told(asked, told["all"]))
 
-    def _upload(self, parameter: Parameter, silence: str | None) -> "Future[bytes]":
+    def _refusal(self, parameter: Parameter, silence: str | None) -> RpcError | None:
+        """Why it is not asked for."""
         problem = parameter.problem or (silence and f"{parameter.component} is not there: {silence}")
         if problem is not None:
-            return failed(parameter.refusal(Kind.UNAVAILABLE, problem))
+            return parameter.refusal(Kind.UNAVAILABLE, problem)
         try:
             parameter.check_readable()
-            return self._rules.node(parameter).upload(parameter.index, parameter.subindex)
         except RpcError as error:
-            return failed(error)
+            return error
+        return None
 
-    def _values(self, found: Mapping[str, bytes | Exception]) -> ParameterValues:
-        return ParameterValues(
-            {name: self._found(self._parameters[name], one) for name, one in found.items()}
-        )
+    def _told(
+        self, asked: Sequence[Parameter], told: "Sequence[bytes | DriverError] | Exception"
+    ) -> list[ParameterValue]:
+        found = [told] * len(asked) if isinstance(told, Exception) else told
+        return [self._found(one, each) for one, each in zip(asked, found, strict=False)]
 
     def _found(self, parameter: Parameter, found: bytes | Exception) -> ParameterValue:
         stamp_ns = time.monotonic_ns()

@@ -29,7 +29,7 @@ from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from gateway.config import RobotConfig, load
 from gateway.daemon import Daemon
-from gateway.futures import done
+from gateway.futures import done, gather, then
 from gateway.listeners import listen
 from gateway.modules.assembly import Robot
 
@@ -161,6 +161,10 @@ class FakeNode:
 
     def upload(self, index: int, subindex: int) -> "Future[bytes]":
         return self._do(lambda: self._upload(index, subindex))
+
+    def upload_all(self, objects: Sequence[tuple[int, int]]) -> "Future[list[bytes | Exception]]":
+        each = {str(number): self.upload(*one) for number, one in enumerate(objects)}
+        return then(gather(each), lambda found: list(found.values()))
 
     def download(
         self,

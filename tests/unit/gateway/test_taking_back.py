@@ -150,7 +150,7 @@ def test_a_drive_whose_samples_are_missing_is_taken_back_all_the_same(robot: Tun
     bench.left.lost = "no position for 3 s"
     assert robot.revert(write) == {MAX_TORQUE: "taken back"}
     assert held(bench, TORQUE) == 1000
-    read = robot.do(lambda: robot.tuning.read([MAX_TORQUE])).values[MAX_TORQUE]
+    read = robot.do(lambda: robot.tuning.read([MAX_TORQUE], robot.session)).values[MAX_TORQUE]
     assert (read.value, read.problem) == (100.0, None)
 
 

@@ -39,6 +39,10 @@ class _Asking:
     """A session whose requests come in at the moment in which they are handled."""
 
     who = "tester"
+    address = "here"
+
+    def on_close(self, farewell: Callable[[], None], whose: object = None) -> None:
+        """It never ends."""
 
     @property
     def asked_ns(self) -> int:
