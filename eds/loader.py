@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import canopen
-from canopen.objectdictionary import ODVariable
+from canopen.objectdictionary import ODArray, ODRecord, ODVariable
 
 from eds.datatypes import DATA_TYPES
 from eds.description import Description, EdsError
@@ -174,16 +174,30 @@ def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDict
     for name, keys in sections.items():
         if "LowLimit" not in keys and "HighLimit" not in keys:
             continue
-        index, _, subindex = name.partition("sub")
-        variable = dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
-        if variable is not None:
-            variable.min = _limit(variable, keys.get("LowLimit"))
-            variable.max = _limit(variable, keys.get("HighLimit"))
-            if variable.min is not None and variable.max is not None and variable.min > variable.max:
-                ini.warn(
-                    f"[{name}]",
-                    f"LowLimit {variable.min} is above HighLimit {variable.max}; no value is allowed",
-                )
+        low = high = None
+        for variable in _described(dictionary, sections, name):
+            variable.min = low = _limit(variable, keys.get("LowLimit"))
+            variable.max = high = _limit(variable, keys.get("HighLimit"))
+        if low is not None and high is not None and low > high:
+            ini.warn(f"[{name}]", f"LowLimit {low} is above HighLimit {high}; no value is allowed")
+
+
+def _described(dictionary: canopen.ObjectDictionary, sections: Sections, section: str) -> list[ODVariable]:
+    """What a section like [1018] or [1018sub1] describes; of a compact array (CiA 306) its entries.
+
+    Those that have a section of their own are described there.
+    """
+    index, _, subindex = section.partition("sub")
+    found = dictionary.get(int(index, 16))
+    if not subindex and isinstance(found, ODArray | ODRecord):
+        data_type = int(sections[section]["DataType"], 16)
+        return [
+            one
+            for number, one in found.subindices.items()
+            if number and one.data_type == data_type and f"{section}sub{number:X}" not in sections
+        ]
+    variable = dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
+    return [] if variable is None else [variable]
 
 
 def _limit(variable: ODVariable, text: str | None) -> int | None:

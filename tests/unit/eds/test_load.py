@@ -182,6 +182,27 @@ def test_a_compact_array_gives_its_unnamed_entries_a_name(tmp_path: Path) -> Non
     assert names == ["Object 20001", "Middle", "Object 20003"]
 
 
+@pytest.mark.parametrize(("type_", "limits"), [("0x0008", (-1.5, 2.5)), ("0x0003", (-3, 4))])
+def test_limits_of_a_compact_array_are_its_entries_not_its_counts(
+    tmp_path: Path, type_: str, limits: tuple[float, float]
+) -> None:
+    low, high = limits
+    body = variable(
+        "2000", ObjectType="8", CompactSubObj="3", DataType=type_, LowLimit=f"{low}", HighLimit=f"{high}"
+    )
+    description = load(tmp_path, body)
+    found = [description.variable(0x2000, entry) for entry in range(4)]
+    assert [one and (one.min, one.max) for one in found] == [(None, None), limits, limits, limits]
+
+
+def test_an_entry_of_a_compact_array_with_a_section_of_its_own_has_its_own_limits(tmp_path: Path) -> None:
+    body = variable("2000", ObjectType="8", CompactSubObj="2", DataType="0x000F", LowLimit="0xFFFF")
+    body += variable("2000sub0", DataType="0x0008") + variable("2000sub1", DataType="0x0008", HighLimit="2.5")
+    found = load(tmp_path, body).variable(0x2000, 1)
+    assert found is not None
+    assert (found.min, found.max) == (None, 2.5)
+
+
 def test_a_number_that_reads_as_octal_and_as_decimal_is_not_guessed(tmp_path: Path) -> None:
     description = load(
         tmp_path, variable("2000", DefaultValue="0010") + variable("2001", DefaultValue="0007")
