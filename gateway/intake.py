@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Any
 
 from drivers.urgency import make_urgent
@@ -25,11 +24,14 @@ log = logging.getLogger(__name__)
 
 RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it
 ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
-PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read …
-COSTLY_NS = 300_000  # … and one whose read took more of the thread than this: so many times as long,
-LONGEST_REST_S = 1.0
-PACE_FACTOR = 4  # for each client that is left alone just now. So they all together leave it most of its time
-LAST_READS = 16  # of a connection that ends: a stop may still be in it
+PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read
+COSTLY_NS = 300_000  # what a client's reads may take of the thread at once; beyond, it is left alone …
+PACE_FACTOR = 4  # … for so many times as long as they took, and for each client that is left alone just now.
+LONGEST_REST_S = 1.0  # So they all together leave the thread most of its time
+FLOOD = 8  # stops in one read: whoever sends more floods the drives with them …
+FLOOD_NS = 12_500_000  # … and that read counts as one that took so long
+LAST_READS = 16  # of a connection that ends: a stop may still be in it …
+LAST_NS = 4_000_000  # … which is looked for so long
 
 _TOO_MANY = wire.refuse(
     wire.Kind.UNAVAILABLE,
@@ -43,22 +45,16 @@ _BEGINNINGS = frozenset(b"{[ \t\"'")
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
 
 
-@dataclass(frozen=True, slots=True)
-class Stopping:
-    """A stop that came in: what will answer it, or `None` where nobody could act on it yet."""
-
-    request: wire.StopRequest
-    answer: Future[Any] | None
-
-
 class Heard:
     """What one read has brought, on its way to the loop."""
 
-    __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stops")
+    __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stop", "stopped", "stops")
 
     def __init__(self) -> None:
         self.stamp_ns = time.monotonic_ns()
-        self.stops: list[Stopping] = []
+        self.stops: list[wire.StopRequest] = []  # which are one stop …
+        self.stop: wire.StopRequest | None = None  # … the newest of them
+        self.stopped: Future[Any] | None = None  # what answers it, or `None` where nobody could act on it yet
         self.lines: list[tuple[int, bytes | wire.BadLine]] = []  # with when they came in (monotonic, ns)
         self.refusals: list[bytes] = []  # of what was too much, ready to be sent
         self.ended = False  # the client will say nothing more
@@ -109,6 +105,7 @@ class Inlet:
         # Each is counted by one thread: by the intake what was handed over, by the loop what it has done.
         self._handed = self._handed_bytes = self._done = self._done_bytes = 0
         self._cpu_ns = 0
+        self._owed_ns = self._owed_at_ns = 0  # of the thread's time
         _prepare(connection)
         front.watch(connection, READ, self._on_ready)
 
@@ -129,14 +126,36 @@ class Inlet:
         """Read what is there, for the stops in it, and close; idempotent."""
         if self._closed:
             return
-        for _ in range(LAST_READS):
-            if self._ended or not self._receive():
-                break
+        if not self._ended:
+            self._read_last()
         self._closed = True
         self._wake()
         self._front.watch(self.socket, 0, self._on_ready)
         self.socket.close()
         self._finished(self)
+
+    def _read_last(self) -> None:
+        """For the stops in it, as far as that takes no long time."""
+        data = self._unread()
+        lines: list[wire.Line] = []
+        if self._splitter.may_stop(data):
+            until_ns = time.monotonic_ns() + LAST_NS
+            for start in range(0, len(data), RECEIVE_BYTES):
+                if time.monotonic_ns() < until_ns:
+                    lines += self._splitter.feed(data[start : start + RECEIVE_BYTES])
+            lines += self._splitter.end()
+        self._hand_over(self._sorted([one for one in lines if isinstance(one, wire.StopRequest)]))
+
+    def _unread(self) -> bytes:
+        data = b""
+        try:
+            for _ in range(LAST_READS):
+                data += (more := self.socket.recv(RECEIVE_BYTES))
+                if not more:
+                    break
+        except OSError:
+            pass  # there is no more
+        return data
 
     def _on_ready(self, events: int) -> None:
         if not self._ended:
@@ -166,20 +185,27 @@ class Inlet:
         lines = self._splitter.feed(data)
         heard = self._sorted(lines)
         spent_ns = self._spent()
-        if self._is_full or self._splitter.dropping or spent_ns > COSTLY_NS:
-            self._rest(spent_ns)
         self._cpu_ns += spent_ns
+        self._owe(max(spent_ns, FLOOD_NS * (len(heard.stops) > FLOOD)))
+        if self._is_full or self._splitter.dropping or self._owed_ns > COSTLY_NS:
+            self._rest()
         if self._bad >= BAD_LINES:  # from now on only stops are heard, until the loop has closed it
             heard.ended = True
-            self._rest(spent_ns)
+            self._rest()
         if lines or heard.ended:
             self._hand_over(heard)
         return True
 
-    def _rest(self, spent_ns: int) -> None:
+    def _owe(self, spent_ns: int) -> None:
+        """Put down what it has cost; while it costs nothing, that is forgotten."""
+        now_ns = time.monotonic_ns()
+        forgotten_ns = (now_ns - self._owed_at_ns) // PACE_FACTOR
+        self._owed_ns, self._owed_at_ns = max(0, self._owed_ns - forgotten_ns) + spent_ns, now_ns
+
+    def _rest(self) -> None:
         """Leave it alone for a while."""
         self._front.watch(self.socket, HANGUP, self._on_ready)
-        self._front.call_later(self._pace.rest_s(spent_ns), self._go_on)
+        self._front.call_later(self._pace.rest_s(self._owed_ns), self._go_on)
         self._pace.resting += not self._rests
         self._rests = True
 
@@ -218,14 +244,15 @@ class Inlet:
     def _sorted(self, lines: list[wire.Line]) -> Heard:
         heard = Heard()
         newest = next((one for one in reversed(lines) if isinstance(one, wire.StopRequest)), None)
-        answer = None if newest is None else self._stop(newest)  # those of one read are one stop
+        if newest is not None:
+            heard.stop, heard.stopped = newest, self._stop(newest)
         asked_ns = heard.stamp_ns  # before that stop
         for line in lines:
             if line is newest:
                 asked_ns = time.monotonic_ns()  # what follows was asked for after it
             if isinstance(line, wire.StopRequest):
                 if self._has_room:
-                    heard.stops.append(Stopping(line, answer))
+                    heard.stops.append(line)
                     self._handed += 1
                 else:  # it acts; only its answer is lost
                     self.unanswered += 1

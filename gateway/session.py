@@ -18,7 +18,7 @@ from msgspec import UNSET, UnsetType
 
 from gateway import wire
 from gateway.futures import outcome
-from gateway.intake import Heard, Inlet, Stopping
+from gateway.intake import Heard, Inlet
 from gateway.limits import BAD_LINES, OUTPUT_BYTES, PENDING, SPEAK_S
 from gateway.loop import WRITE, Loop, Timer
 from gateway.sharing import Sharing
@@ -208,8 +208,8 @@ class Session:
     def hear(self, heard: Heard) -> None:
         """Take what one read has brought; stops first, and also of a client that has gone."""
         self.cpu_ns += heard.cpu_ns
-        for stopping in heard.stops:
-            self._stop(stopping)
+        if heard.stop is not None:
+            self._stop(heard.stop, heard)
         self._inlet.done(len(heard.stops) + len(heard.refusals))
         if self.closed:
             return
@@ -265,17 +265,16 @@ class Session:
 
     # Answering
 
-    def _stop(self, stopping: Stopping) -> None:
+    def _stop(self, stop: wire.StopRequest, heard: Heard) -> None:
         """Answer a stop that has acted; where nobody could act yet, let it be done now, ahead of all else."""
-        self.requests += 1
-        answer: Answer = stopping.answer
+        self.requests += len(heard.stops)
+        answer: Answer = heard.stopped
         if answer is None:
-            params = msgspec.Raw(msgspec.json.encode({"reason": stopping.request.reason}))
+            params = msgspec.Raw(msgspec.json.encode({"reason": stop.reason}))
             answer = self._handled(wire.Request("2.0", STOP, params))
-        if self._pending < MOST_STOPS:
-            self._follow(stopping.request.id, STOP, answer)
-        else:
-            self._unanswered += 1
+        room = max(0, MOST_STOPS - self._pending)
+        self._unanswered += len(heard.stops[room:])
+        self._follow([one.id for one in heard.stops[:room]], STOP, answer)
 
     @property
     def _may_run(self) -> bool:
@@ -307,7 +306,7 @@ class Session:
             self._answer_bad(error)
             return
         self.requests += 1
-        self._follow(request.id, request.method, self._handled(request))
+        self._follow([request.id], request.method, self._handled(request))
 
     def _answer_bad(self, error: wire.BadLine) -> None:
         self._bad += 1
@@ -322,36 +321,32 @@ class Session:
         except Exception as error:  # noqa: BLE001 - whatever it is, this client is told and the others never notice
             return error
 
-    def _follow(self, id_: wire.Id | float | UnsetType, method: str, answer: Answer) -> None:
+    def _follow(self, ids: list[wire.Id | float | UnsetType], method: str, answer: Answer) -> None:
+        """Answer these requests, which are one, once that is known."""
         if isinstance(answer, Future):
-            self._pending += 1
+            self._pending += len(ids)
             answer.add_done_callback(
-                lambda future: self._loop.call(lambda: self._complete(id_, method, future))
+                lambda future: self._loop.call(lambda: self._complete(ids, method, future))
             )
         else:
-            self._answer(id_, method, answer)
+            self._answer(ids, method, answer)
 
     @_spends
-    def _complete(self, id_: wire.Id | float | UnsetType, method: str, future: Future[object]) -> None:
-        self._pending -= 1
-        self._answer(id_, method, outcome(future))
+    def _complete(self, ids: list[wire.Id | float | UnsetType], method: str, future: Future[object]) -> None:
+        self._pending -= len(ids)
+        self._answer(ids, method, outcome(future))
         self._schedule()
         self._finish_if_done()
 
-    def _answer(self, id_: wire.Id | float | UnsetType, method: str, answer: object) -> None:
+    def _answer(self, ids: list[wire.Id | float | UnsetType], method: str, answer: object) -> None:
         if isinstance(answer, Exception) and not isinstance(answer, wire.RpcError):
             log.error("%s from %s failed", method, self.peer, exc_info=answer)
             answer = wire.internal_error(method, answer)
-        if id_ is UNSET:
-            return
-        if isinstance(answer, wire.RpcError):
-            line = wire.encode_error(id_, answer)
-        else:
-            line = wire.encode_result(id_, answer)
+        lines = wire.encode_answers([id_ for id_ in ids if id_ is not UNSET], answer)
         if method == STOP:
-            self._send_if_room([line])
-        else:
-            self.send(line)
+            self._send_if_room(lines)
+        elif lines:
+            self.send(b"".join(lines))
 
     def _finish_if_done(self) -> None:
         """A client that says nothing more gets its answers, then the end, streams or not."""

@@ -17,6 +17,7 @@ STOP: Final = "robot.stop"
 
 _BLANK = bytes(range(33))  # white space, and what no text should hold
 _MARKS = (b"stop", b"\\", b"\0")  # one of these is in every line that asks for a stop: letters may be escaped
+_LONGEST_MARK = max(map(len, _MARKS))
 _KEPT_BYTES = 160  # of what was dropped: more than a method takes with every letter escaped
 _ESCAPED = re.compile(rb"\\u00([2-7][0-9A-Fa-f])")
 _METHOD = re.compile(rb"""(?<![\w.])method["']{0,2}:["']{0,2}robot\.stop(?=[^\w.])""")
@@ -135,8 +136,13 @@ class StopSplitter(LineSplitter):
         self._search: StopSearch | None = None
 
     def feed(self, data: bytes) -> list[Line]:
-        self._suspect = bool(self._rest) or any(mark in data for mark in _MARKS)
+        self._suspect = self.may_stop(data)
         return super().feed(data)
+
+    def may_stop(self, data: bytes) -> bool:
+        """Whether there may be a stop in what these bytes end or hold; costs little."""
+        seam = bytes(self._rest[-_LONGEST_MARK:]) + data
+        return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
 
     def _take(self, line: bytes, lines: list[Line]) -> None:
         lines.append((stop_in(line) if self._suspect else None) or line)

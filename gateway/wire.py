@@ -5,7 +5,7 @@ the wire: msgspec encodes NaN and infinities as `null`.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Final, Literal, TypeVar
 
@@ -264,6 +264,15 @@ def encode_request(id: Id, method: str, params: object = UNSET) -> bytes:  # noq
 def encode_result(id: Id | float, result: object) -> bytes:  # noqa: A002
     """One successful answer as a line."""
     return _line(_Outgoing(id=id, result=result))
+
+
+def encode_answers(ids: Sequence[Id | float], answer: object) -> list[bytes]:
+    """One answer, or one `RpcError`, to each of these requests."""
+    if isinstance(answer, RpcError):
+        return [encode_error(id_, answer) for id_ in ids]
+    if len(ids) > 1:
+        answer = msgspec.Raw(_encoder.encode(answer))  # once for all
+    return [encode_result(id_, answer) for id_ in ids]
 
 
 def encode_error(id: Id | float, error: RpcError) -> bytes:  # noqa: A002
