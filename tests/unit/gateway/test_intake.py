@@ -301,109 +301,134 @@ def test_nobody_ever_gets_another_s_answer_however_connections_end(serving: Serv
     assert serving.connect().call("clock.read")
 
 
+class Turned:
+    """An inlet whose two loops a test turns by hand, and its client."""
+
+    def __init__(self, client: socket.socket, accepted: socket.socket) -> None:
+        self.client, self.accepted = client, accepted
+        self.front, self.loop = Loop(), Loop()
+        self.asked: list[str] = []  # reasons of the stops that have acted
+        self.heard: list[Heard] = []
+        self.spent: list[int] = []  # what the thread will have worked, the last first
+        answer: Future[Any] = Future()
+
+        def stop_now(_who: str, reason: str) -> "Future[Any]":
+            self.asked.append(reason)
+            return answer
+
+        self.inlet = Inlet(
+            self.front,
+            self.loop,
+            accepted,
+            "x",
+            lambda: stop_now,
+            lambda: self.spent.pop() if self.spent else 0,
+            lambda _inlet: None,
+            Pace(),
+        )
+        self.inlet.receiver = self.heard.append
+
+    def says(self, data: bytes) -> None:
+        """One read."""
+        self.client.sendall(data)
+        self.inlet._on_ready(READ)
+
+    def turn_loop(self) -> float | None:
+        """As long as there is something to do; how long it would sleep then."""
+        while (patience_s := self.loop._patience_s()) == 0.0:
+            self.loop._turn()
+        return patience_s
+
+    def close(self) -> None:
+        self.inlet.finish()
+        self.front.close()
+        self.loop.close()
+
+
 @pytest.fixture
-def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
+def turned() -> Iterator[Turned]:
     with listen("127.0.0.1", 0) as listener, socket.create_connection(listener.getsockname()) as client:
         accepted, _ = listener.accept()
-        with accepted:
-            yield client, accepted
+        with accepted, contextlib.closing(Turned(client, accepted)) as turned:
+            yield turned
 
 
-def _nothing(_inlet: Inlet) -> None:
-    """Nobody wants to know that it is over."""
+def test_a_stop_that_has_arrived_acts_though_the_loop_has_closed_its_client(turned: Turned) -> None:
+    turned.client.sendall(CLOCK % 1 * 2000 + STOP % b"unread")
+    turned.inlet.finish()
+    assert turned.asked == ["unread"]
+    assert turned.accepted.fileno() == -1
+    assert len(turned.front._watched) == 1
+    turned.inlet.finish()
 
 
-def inlet_of(connection: socket.socket, asked: list[str]) -> tuple[Inlet, Loop, Loop]:
-    """An inlet whose two loops a test turns by hand."""
-    front, loop = Loop(), Loop()
-    answer: Future[Any] = Future()
-
-    def stop_now(_who: str, reason: str) -> "Future[Any]":
-        asked.append(reason)
-        return answer
-
-    return Inlet(front, loop, connection, "x", lambda: stop_now, lambda: 0, _nothing, Pace()), front, loop
+@pytest.mark.parametrize("cut", range(1, 33))
+def test_a_stop_cut_by_the_end_of_reading_acts(turned: Turned, cut: int) -> None:
+    """Its first part was read, the second is still in the socket when the connection is closed."""
+    line = b'{"method": "robot.stop", "id": 1}'
+    turned.says(line[:cut])
+    turned.client.sendall(line[cut:])
+    turned.inlet.finish()
+    assert turned.asked == [""]
 
 
-def test_a_stop_that_has_arrived_acts_though_the_loop_has_closed_its_client(
-    pair: tuple[socket.socket, socket.socket],
-) -> None:
-    client, accepted = pair
-    asked: list[str] = []
-    inlet, front, loop = inlet_of(accepted, asked)
-    client.sendall(CLOCK % 1 * 2000 + STOP % b"unread")
-    inlet.finish()
-    assert asked == ["unread"]
-    assert accepted.fileno() == -1
-    assert len(front._watched) == 1
-    inlet.finish()
-    for one in (front, loop):
-        one.close()
+def test_stops_that_come_together_are_one_and_each_is_answered(turned: Turned) -> None:
+    turned.says(STOP % b"more" * 100 + STOP % b"last")
+    turned.turn_loop()
+    assert turned.asked == ["last"]
+    assert [(one.stop and one.stop.reason, len(one.stops)) for one in turned.heard] == [("last", 101)]
 
 
-def test_stops_that_come_together_are_one_and_each_is_answered(
-    pair: tuple[socket.socket, socket.socket],
-) -> None:
-    client, accepted = pair
-    asked: list[str] = []
-    inlet, front, loop = inlet_of(accepted, asked)
-    heard: list[Heard] = []
-    inlet.receiver = heard.append
-    client.sendall(STOP % b"more" * 100 + STOP % b"last")
-    inlet._on_ready(READ)
-    while loop._patience_s() == 0.0:
-        loop._turn()
-    assert asked == ["last"]
-    assert [(each.stop and each.stop.reason, len(each.stops)) for each in heard] == [("last", 101)]
-    inlet.finish()
-    for one in (front, loop):
-        one.close()
+def test_who_floods_with_stops_is_left_alone_and_who_stops_is_not(turned: Turned) -> None:
+    turned.says(STOP % b"a few" * intake.FLOOD)
+    assert not turned.inlet._rests
+    turned.says(STOP % b"many" * (intake.FLOOD + 1))
+    assert turned.inlet._rests
+    assert turned.asked == ["a few", "many"]
 
 
-def test_what_ends_with_a_client_ends_though_something_else_cannot(
-    pair: tuple[socket.socket, socket.socket],
-) -> None:
+def test_small_costs_add_up(turned: Turned, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No single read is dear, and yet they are all that the thread does."""
+    monkeypatch.setattr(intake, "PACE_FACTOR", 1 << 60)  # nothing is forgotten
+    reads = 0
+    while not turned.inlet._rests:
+        turned.spent = [intake.COSTLY_NS // 5, 0]
+        turned.says(CLOCK % 1)
+        reads += 1
+        assert reads < 100
+    assert reads > 1
+
+
+def test_what_ends_with_a_client_ends_though_something_else_cannot(turned: Turned) -> None:
     """What came last goes first: a lease is given back before the module that knows it stops."""
-    inlet, front, loop = inlet_of(pair[1], [])
     ended: list[str] = []
-    session = Session(loop, inlet, lambda _session, _request: None, 30.0, Sharing(loop))
+    session = Session(turned.loop, turned.inlet, lambda _session, _request: None, 30.0, Sharing(turned.loop))
     session.on_close(lambda: ended.append("module"))
     session.on_close(lambda: ended.remove("nothing"))
     session.on_close(lambda: ended.append("lease"))
     session.close()
     session.close()
     assert ended == ["lease", "module"]
-    inlet.finish()
-    for one in (front, loop):
-        one.close()
 
 
-def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
-    pair: tuple[socket.socket, socket.socket],
-) -> None:
-    client, accepted = pair
-    asked: list[str] = []
-    inlet, front, loop = inlet_of(accepted, asked)
-    heard: list[Heard] = []
-    inlet.receiver = heard.append
-    client.setblocking(False)
+def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(turned: Turned) -> None:
+    inlet, front, heard = turned.inlet, turned.front, turned.heard
+    turned.client.setblocking(False)
     rest = CLOCK % 1 * 2 * QUEUED_LINES + STOP % b"paced"
     watched_for: set[int] = set()
 
     def paced() -> bool:
         nonlocal rest
         with contextlib.suppress(BlockingIOError):
-            rest = rest[client.send(rest) :] if rest else rest
+            rest = rest[turned.client.send(rest) :] if rest else rest
         front._turn()
-        watched_for.add(front._watched[accepted.fileno()][0])
-        return bool(asked)
+        watched_for.add(front._watched[turned.accepted.fileno()][0])
+        return bool(turned.asked)
 
     front.call_later(DEADLINE_S, lambda: None)
     until(paced, "the stop is read")
     assert watched_for == {READ, HANGUP}
-    while (patience_s := loop._patience_s()) == 0.0:
-        loop._turn()
-    assert patience_s is None
+    assert turned.turn_loop() is None
     assert sum(len(one.lines) for one in heard) == QUEUED_LINES
     assert sum(len(one.refusals) for one in heard) == intake.ON_THE_WAY
     inlet.done(
@@ -411,9 +436,6 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(
         sum(wire.size(line) for one in heard for _, line in one.lines),
     )
     assert not inlet._is_full
-    inlet.finish()
-    for one in (front, loop):
-        one.close()
 
 
 def test_a_client_that_says_nothing_wakes_nobody(tmp_path: Path) -> None:
@@ -441,38 +463,21 @@ def test_a_blank_before_a_request_makes_it_none_the_worse(serving: Serving, line
     serving.wait_for_stop("after blanks")
 
 
-def test_a_stop_behind_lines_that_were_none_is_heard(
-    pair: tuple[socket.socket, socket.socket],
-) -> None:
-    client, accepted = pair
-    asked: list[str] = []
-    inlet, front, loop = inlet_of(accepted, asked)
-    inlet.receiver = lambda _heard: None
-    client.sendall(b"[]\n" * 2 * BAD_LINES)
-    inlet._on_ready(READ)
-    client.sendall(STOP % b"behind")
-    inlet.finish()
-    assert asked == ["behind"]
-    for one in (front, loop):
-        one.close()
+def test_a_stop_behind_lines_that_were_none_is_heard(turned: Turned) -> None:
+    turned.says(b"[]\n" * 2 * BAD_LINES)
+    turned.client.sendall(STOP % b"behind")
+    turned.inlet.finish()
+    assert turned.asked == ["behind"]
 
 
-def test_who_has_cost_nothing_does_not_rest_for_others(pair: tuple[socket.socket, socket.socket]) -> None:
+def test_who_has_cost_nothing_does_not_rest_for_others(turned: Turned) -> None:
     """The thread's work is counted since the read began, not since somebody else's was."""
-    client, accepted = pair
-    inlet, front, loop = inlet_of(accepted, [])
-    inlet.receiver = lambda _heard: None
-    spent = [1000, 1000, 50_000_000]
-    inlet._spent = lambda: spent.pop() if spent else 0
-    client.sendall(CLOCK % 1)
-    inlet._on_ready(READ)
-    assert not inlet._rests
-    inlet.finish()
-    for one in (front, loop):
-        one.close()
+    turned.spent = [1000, 1000, 50_000_000]
+    turned.says(CLOCK % 1)
+    assert not turned.inlet._rests
 
 
-def test_no_rest_is_long(pair: tuple[socket.socket, socket.socket]) -> None:
+def test_no_rest_is_long() -> None:
     pace = Pace()
     pace.resting = 100
     assert pace.rest_s(50_000_000) == intake.LONGEST_REST_S
