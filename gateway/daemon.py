@@ -138,7 +138,7 @@ class Daemon:
             self._loop.call_later(TIDY_S, self._tidy)
 
     def _tidy(self) -> None:
-        from gateway.modules.stop.memory import MemoryLock  # for a gateway that has worked
+        from gateway.memory import MemoryLock  # for a gateway that has worked
 
         self._tidying = False
         MemoryLock.give_back()

@@ -59,6 +59,7 @@ def then(first: "Future[T]", continue_: Callable[[T], Any]) -> "Future[Any]":
 
 def gather(futures: "Mapping[str, Future[T]]") -> "Future[dict[str, T | Exception]]":
     """All results by name, once the last is there; an error stands in its place as itself."""
+    names = tuple(futures)  # and not the futures, whose callbacks would hold themselves then
     results: dict[str, T | Exception] = {}
     everything: Future[dict[str, T | Exception]] = Future()
     lock = threading.Lock()
@@ -67,9 +68,9 @@ def gather(futures: "Mapping[str, Future[T]]") -> "Future[dict[str, T | Exceptio
         found = outcome(finished)
         with lock:
             results[name] = found
-            complete = len(results) == len(futures)
+            complete = len(results) == len(names)
         if complete:
-            everything.set_result({name: results[name] for name in futures})
+            everything.set_result({name: results[name] for name in names})
 
     if not futures:
         everything.set_result({})

@@ -133,6 +133,11 @@ class Inlet:
         self._front.watch(self.socket, 0, self._on_ready)
         self.socket.close()
         self._finished(self)
+        self._loop.post(self._forget_receiver)
+
+    def _forget_receiver(self) -> None:
+        """It has heard all; so neither keeps the other in memory."""
+        self.receiver = bool
 
     def _read_last(self) -> None:
         """For the stops in it, as far as that takes no long time."""

@@ -196,7 +196,8 @@ class Session:
         self._output.clear()
         self._count_output(-self._output_bytes)
         self.outlets.clear()
-        for farewell in reversed(self._farewells.values()):  # a lease ends before the module that knows it
+        farewells, self._farewells = self._farewells, {}  # a session that is closed is held by nobody
+        for farewell in reversed(farewells.values()):  # a lease ends before the module that knows it
             try:
                 farewell()
             except Exception:  # the others are still to be told
@@ -216,6 +217,8 @@ class Session:
         self.spoke, self.heard_ns = True, heard.stamp_ns
         if heard.refusals:
             self._send_if_room(heard.refusals)
+        if self.closed:
+            return
         if heard.lost is not None:
             log.info("%s: %s", self.peer, heard.lost)
             self.close()

@@ -82,7 +82,10 @@ def verify(argv: list[str]) -> int:
     if arguments.json:
         say_json({"path": str(path), "intact": True, "entries": count, "removed": unseen})
         return 0
-    say(f"{path} is intact: {count} entries, each in its place and unaltered\n")
+    if count:
+        say(f"{path} is intact: {count} entries, each in its place and unaltered\n")
+    else:
+        say(f"{path} is empty: nothing in it tells whether there ever was an entry\n")
     if unseen:
         say(f"entries 1 to {unseen} could not be seen: the journal says that it has removed them for room\n")
     return 0

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from gateway import config, notify, wire
 from gateway.daemon import Daemon
 from gateway.listeners import Listeners, inherited, listen, rest
+from gateway.memory import share_heap
 from gateway.resting import ENDING
 
 log = logging.getLogger(__name__)
@@ -80,6 +81,7 @@ def main(arguments: Sequence[str]) -> int:
         if handed is None:
             raise
         return _refuse(handed, error)
+    share_heap()
     sockets = _listeners(robot.gateway, handed)
     by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
     daemon = Daemon(robot, sockets.port, classic=sockets.classic, ends_idle=watched is None)

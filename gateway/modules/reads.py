@@ -11,27 +11,19 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Final, Protocol
+from typing import Final
 
 from gateway.futures import done, outcome
 from gateway.loop import Loop
 from gateway.messages import ParameterValue, ParameterValues
 from gateway.modules.parameters import Parameter
+from gateway.turns import Client, Turns
 
 DEVICES: Final = 2  # that are read at the same time
 OBJECTS: Final = 8  # of one device in a row
 
 Values = list[ParameterValue]
 ReadSome = Callable[[Sequence[Parameter]], "Future[Values]"]
-
-
-class Reader(Protocol):
-    """Whoever reads: a client's session."""
-
-    @property
-    def address(self) -> str: ...
-
-    def on_close(self, farewell: Callable[[], None], whose: object = None) -> None: ...
 
 
 @dataclass(slots=True, eq=False)
@@ -83,48 +75,34 @@ class Reads:
     def __init__(self, loop: Loop, read_some: ReadSome) -> None:
         self._loop = loop
         self._read_some = read_some
-        self._waiting: dict[str, dict[Reader, deque[_Reading]]] = {}  # by address
+        self._turns = Turns[_Reading]()
         self._busy: set[str] = set()  # devices
 
-    def ask(self, reader: Reader, chosen: Sequence[Parameter]) -> "Future[ParameterValues]":
+    def ask(self, client: Client, chosen: Sequence[Parameter]) -> "Future[ParameterValues]":
         """Read these, after what this client has asked for before."""
         if not chosen:
             return done(ParameterValues({}))
-        readers = self._waiting.setdefault(reader.address, {})
-        if reader not in readers:
-            readers[reader] = deque()
-            reader.on_close(lambda: self._forget(reader), self)
         reading = _Reading(chosen)
-        readers[reader].append(reading)
+        self._turns.add(client, reading)
         self._go_on()
         return reading.answer
 
     def _go_on(self) -> None:
-        while len(self._busy) < DEVICES and (following := self._next()) is not None:
+        while len(self._busy) < DEVICES:
+            following = self._turns.next(lambda reading: reading.free(self._busy))
+            if following is None:
+                return
             self._begin(*following)
 
-    def _next(self) -> tuple[Reader, str] | None:
-        """The client that has waited longest of those for whom something can be done, and a device of it."""
-        for address, readers in self._waiting.items():
-            for reader, readings in readers.items():
-                device = readings[0].free(self._busy)
-                if device is not None:
-                    readers[reader] = readers.pop(reader)  # behind the others
-                    self._waiting[address] = self._waiting.pop(address)
-                    return reader, device
-        return None
-
-    def _begin(self, reader: Reader, device: str) -> None:
-        reading = self._waiting[reader.address][reader][0]
+    def _begin(self, client: Client, reading: _Reading, device: str) -> None:
         taken = reading.take(device)
         self._busy.add(device)
-        values = self._read_some(taken)
-        ended = partial(self._end, reader, reading, device, taken)
-        values.add_done_callback(lambda found: self._loop.post(lambda: ended(found)))
+        ended = partial(self._end, client, reading, device, taken)
+        self._read_some(taken).add_done_callback(lambda found: self._loop.post(lambda: ended(found)))
 
     def _end(
         self,
-        reader: Reader,
+        client: Client,
         reading: _Reading,
         device: str,
         taken: Sequence[Parameter],
@@ -139,18 +117,5 @@ class Reads:
             if reading.complete:
                 reading.finish()
         if reading.answer.done():
-            self._dismiss(reader, reading)
+            self._turns.done(client, reading)
         self._go_on()
-
-    def _dismiss(self, reader: Reader, reading: _Reading) -> None:
-        readings = self._waiting.get(reader.address, {}).get(reader)
-        if readings and readings[0] is reading:
-            readings.popleft()
-            if not readings:
-                self._forget(reader)
-
-    def _forget(self, reader: Reader) -> None:
-        readers = self._waiting.get(reader.address, {})
-        readers.pop(reader, None)
-        if not readers:
-            self._waiting.pop(reader.address, None)

@@ -13,9 +13,10 @@ import msgspec
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.futures import back, then
+from gateway.futures import back, pass_on, then
 from gateway.messages import ResourceSnapshot, ResourceSnapshotParams
 from gateway.sources import Selection, whole
+from gateway.turns import Turns
 from gateway.wire import Kind, refuse
 
 if TYPE_CHECKING:
@@ -116,6 +117,8 @@ class ResourceModule:
         loop = context.config.control_loop
         self._control = () if loop is None else loop.processes
         self._meters: dict[tuple[Session, str], Meter] = {}
+        self._turns = Turns[Callable[[], Future[Any]]]()
+        self._measuring = False  # for a client
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.snapshot": self._snapshot}
 
     def start(self) -> None:
@@ -170,7 +173,8 @@ class ResourceModule:
         return self._for(session, lambda: msgspec.Raw(_encoder.encode(meter.snapshot(params))))
 
     def _for(self, session: "Session", work: Callable[[], T]) -> "Future[T]":
-        """Done by the worker, and put down on the session's account."""
+        """Done by the worker in turn, and put down on the session's account."""
+        answer: Future[T] = Future()
 
         def metered() -> tuple[T, int]:
             began_ns = time.thread_time_ns()
@@ -180,4 +184,24 @@ class ResourceModule:
             session.cpu_ns += done[1]
             return done[0]
 
-        return then(back(self._context.loop, self._worker.submit(metered)), give)
+        def begin() -> "Future[T]":
+            given = then(back(self._context.loop, self._worker.submit(metered)), give)
+            given.add_done_callback(lambda given: pass_on(given, answer))
+            return given
+
+        self._turns.add(session, begin)
+        self._go_on()
+        return answer
+
+    def _go_on(self) -> None:
+        """One thing at a time, so that what waits is in turn."""
+        following = None if self._measuring else self._turns.next(lambda begin: begin)
+        if following is not None:
+            client, begin, _begin = following
+            self._turns.done(client, begin)
+            self._measuring = True
+            begin().add_done_callback(lambda _given: self._context.loop.post(self._ended))
+
+    def _ended(self) -> None:
+        self._measuring = False
+        self._go_on()

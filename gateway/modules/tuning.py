@@ -24,7 +24,7 @@ from gateway.modules.component import ComponentModule
 from gateway.modules.ledger import WriteLedger
 from gateway.modules.objects import Change, device_error
 from gateway.modules.parameters import Parameter
-from gateway.modules.reads import Reader, Reads
+from gateway.modules.reads import Reads
 from gateway.modules.rules import Rules
 from gateway.modules.stop.authority import Authority, Permit
 from gateway.modules.stop.machine import Phase
@@ -35,6 +35,7 @@ from gateway.modules.trials import Coming, Trials
 from gateway.modules.writer import Turn, Writer
 from gateway.records.records import Records
 from gateway.records.undo import Undo
+from gateway.turns import Client
 from gateway.wire import Kind, RpcError, refuse
 
 if TYPE_CHECKING:
@@ -141,11 +142,11 @@ class Tuning:
         lost = self._lost(chosen)
         return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
-    def read(self, names: list[str] | None, reader: Reader) -> "Future[ParameterValues]":
+    def read(self, names: list[str] | None, client: Client) -> "Future[ParameterValues]":
         """What the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
-        return then(ready, lambda _none: self._reads.ask(reader, chosen))
+        return then(ready, lambda _none: self._reads.ask(client, chosen))
 
     def write(
         self, values: Mapping[str, float], session: "Session", trial_s: float | None

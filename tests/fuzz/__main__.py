@@ -28,6 +28,7 @@ def _tell(name: str, outcome: Outcome) -> int:
     rate = outcome.executions / max(outcome.seconds, 1e-3)
     _say(f"{name}: {outcome.executions} executions in {outcome.seconds:.0f} s ({rate:.0f} a second)")
     if outcome.said is None:
+        _say("nothing found")
         return 0
     FOUND.mkdir(exist_ok=True)
     file = FOUND / f"{name}-{len(list(FOUND.iterdir()))}"

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from drivers.urgency import make_urgent
-from gateway.modules.stop.memory import MemoryLock
+from gateway.memory import MemoryLock
 
 log = logging.getLogger(__name__)
 

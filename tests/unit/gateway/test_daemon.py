@@ -1,5 +1,6 @@
 """The daemon as clients meet it: bad input, half-closed, silent and flooding clients; nobody else notices."""
 
+import gc
 import json
 import signal
 import socket
@@ -7,17 +8,19 @@ import struct
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway import session, wire
+from gateway import daemon, session, wire
 from gateway.limits import BAD_LINES, LINE_LIMIT
 from gateway.listeners import listen
 from tests.unit.gateway import processes
@@ -309,3 +312,26 @@ def test_a_port_in_use_is_named_with_what_to_do() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"127.0.0.1:{port}: .*choose another with --host or --port"):
             listen("127.0.0.1", port)
+
+
+def test_who_has_gone_is_held_by_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is in a circle is found by the collector only, and that leaves out all it has frozen."""
+    known: weakref.WeakSet[session.Session] = weakref.WeakSet()
+
+    class Known(session.Session):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            super().__init__(*args, **options)
+            known.add(self)
+
+    monkeypatch.setattr(daemon, "Session", Known)
+    with serving(config(tmp_path)) as address, Client(address) as other:
+        gc.disable()
+        try:
+            with Client(address) as client:
+                client.call("control.acquire", ttl_s=10)
+                client.call("stream.start", modules=["component"], rate_hz=100)
+                client.call("resource.snapshot")
+                assert len(known) == 2
+            until(lambda: other.call("clock.read") and len(known) == 1, "nobody holds it")
+        finally:
+            gc.enable()

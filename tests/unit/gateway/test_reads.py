@@ -19,13 +19,14 @@ class _Parameter:
 
 class _Client:
     def __init__(self, address: str) -> None:
-        self.address = address
+        self.address, self.closed = address, False
         self.farewells: dict[object, Callable[[], None]] = {}
 
     def on_close(self, farewell: Callable[[], None], whose: object = None) -> None:
         self.farewells[whose] = farewell
 
     def leave(self) -> None:
+        self.closed = True
         for farewell in self.farewells.values():
             farewell()
 

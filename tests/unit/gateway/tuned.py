@@ -39,7 +39,7 @@ class _Asking:
     """A session whose requests come in at the moment in which they are handled."""
 
     who = "tester"
-    address = "here"
+    address, closed = "here", False
 
     def on_close(self, farewell: Callable[[], None], whose: object = None) -> None:
         """It never ends."""
