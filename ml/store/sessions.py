@@ -86,7 +86,11 @@ def sessions(
         for fields in newest([*stored, *waiting])
     ]
     told = {_name(fields) for fields in (*stored, *waiting)}
-    found += [untold(*name, Extent(files)) for name, files in extents.items() if name not in told]
+    found += [
+        untold(*name, Extent(files))
+        for name, files in extents.items()
+        if name not in told and robot in (None, name[0])
+    ]
     return in_order(found)
 
 
