@@ -1,12 +1,14 @@
 """Keeping a store in order: small files become few, old rows go, what a model names stays."""
 
+import contextlib
+import functools
 import hashlib
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from typing import Final
+from datetime import UTC, datetime, timedelta
+from typing import Final, TypeVar
 from urllib.parse import unquote
 
 import msgspec
@@ -16,6 +18,7 @@ from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError
 
 from ml.store import durable, reading
+from ml.store.alone import alone
 from ml.store.errors import NoSuchTable, StoreError, translated
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table
@@ -24,8 +27,12 @@ TARGET_BYTES: Final = 256 << 20  # of a file that compaction makes
 GRACE: Final = timedelta(
     days=7
 )  # a file that nobody needs any more stays so long, for whoever still reads it
+ATTEMPTS: Final = 10  # to compact a table, or remove rows of it, while others do
 LOOKED_BACK: Final = 20  # versions, from the newest on, for one that can be pinned
 _PINS: Final = "pins"
+_RETAINED: Final = "retained"
+_INSTANT: Final = "%Y%m%dT%H%M%S.%fZ"
+Done = TypeVar("Done")
 
 
 class Pin(msgspec.Struct, frozen=True):
@@ -52,15 +59,18 @@ def pin(store: Store, location: str, version: int, by: str) -> None:
         NoSuchTable: it is not there, or files of it are gone; the message says which versions are whole.
 
     """
+    named = Pin(location, version, by)
+    delta, path = store.table(location, version), _path(named)
+    new = store.objects.create(path, msgspec.json.encode(named))  # a vacuum that begins now knows of it
     there = set(store.objects.names(location))
-    gone = _gone(location, store.table(location, version), there)
+    gone = _gone(location, delta, there)
     if gone:
+        if new:
+            store.objects.remove(path)
         raise NoSuchTable(
             f"{store.url}/{location} has {gone} of the files of version {version} no more: old ones were "
             f"removed (gwrms cloud vacuum): {_can_be_pinned(store, location, there)}"
         )
-    named = Pin(location, version, by)
-    store.objects.create(_path(named), msgspec.json.encode(named))
 
 
 def _gone(location: str, delta: DeltaTable, there: Set[str]) -> int:
@@ -108,6 +118,7 @@ def compact(
     """
     if dry_run:
         return [found for table in tables for found in _compactable(store, table)]
+    _mend(store, tables)
     return [_compact(store, location) for location in _locations(store, tables)]
 
 
@@ -116,10 +127,13 @@ def retain(
 ) -> dict[str, int]:
     """Remove rows older than `before` (with a time zone); how many went, or would go, by location.
 
-    They stay readable in old versions until `vacuum`.
+    They stay readable in old versions until `vacuum`. Before they go it is noted that they are meant to
+    (`retained`).
     """
     if before.tzinfo is None:
         raise ValueError("`before` needs a time zone: the store's times are UTC")
+    if not dry_run:
+        _mend(store, tables)
     went: dict[str, int] = {}
     for location in _locations(store, tables):
         with translated(f"{store.url}/{location} cannot be changed"):
@@ -128,11 +142,44 @@ def retain(
                     filter=pyarrow.dataset.field("utc") < before
                 )
                 continue
-            delta = store.table(location)
-            found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
-            _make_last(store, location, delta)
-        went[location] = int(found["num_deleted_rows"] or 0)
+            went[location] = _again(store, location, functools.partial(_retain, store, location, before))
     return went
+
+
+def _retain(store: Store, location: str, before: datetime) -> int:
+    delta = store.table(location)
+    _note(store, location, before)
+    found = delta.delete(
+        f"utc < '{before.isoformat()}'",
+        post_commithook_properties=NO_HOOKS,
+    )
+    _make_last(store, location, delta)
+    return int(found["num_deleted_rows"] or 0)
+
+
+def _again(store: Store, location: str, work: Callable[[], Done]) -> Done:
+    """Do it, and again where others have changed the table meanwhile, which undoes it."""
+    for _ in range(ATTEMPTS):
+        with contextlib.suppress(CommitFailedError):
+            return work()
+    raise StoreError(f"{store.url}/{location} was changed meanwhile, {ATTEMPTS} times; try again later")
+
+
+def retained(store: Store, location: str) -> datetime | None:
+    """Up to which time rows of the table were removed because they were old; None where none were."""
+    names = [name.rpartition("/")[2].removesuffix(".json") for name in store.objects.names(_noted(location))]
+    return max((datetime.strptime(name, _INSTANT).replace(tzinfo=UTC) for name in names), default=None)
+
+
+def _note(store: Store, location: str, before: datetime) -> None:
+    name = f"{_noted(location)}/{before.astimezone(UTC).strftime(_INSTANT)}.json"
+    store.objects.create(name, msgspec.json.encode({"location": location, "before": before}))
+    if store.folder is not None:
+        durable.synchronise([store.folder / name])
+
+
+def _noted(location: str) -> str:
+    return f"{_RETAINED}/{location.replace('/', '-')}"
 
 
 def vacuum(
@@ -143,21 +190,30 @@ def vacuum(
     dry_run: bool = False,
 ) -> list[str]:
     """Delete files that no version newer than `grace` needs, nor one that is pinned; their names."""
+    if not dry_run:
+        _mend(store, tables)
     kept: dict[str, list[int]] = {}
     for named in pins(store):
         kept.setdefault(named.location, []).append(named.version)
     gone: list[str] = []
     for location in _locations(store, tables):
         with translated(f"{store.url}/{location} cannot be cleaned"):
-            found = store.table(location).vacuum(
-                retention_hours=int(grace / timedelta(hours=1)),
-                enforce_retention_duration=False,
-                dry_run=dry_run,
-                keep_versions=sorted(kept.get(location, [])) or None,
-                post_commithook_properties=NO_HOOKS,
-            )
-            gone += [f"{location}/{unquote(name)}" for name in found]
+            versions = sorted(kept.get(location, []))
+            work = functools.partial(_vacuum, store, location, grace, versions, dry_run=dry_run)
+            gone += [f"{location}/{unquote(name)}" for name in _again(store, location, work)]
     return gone
+
+
+def _vacuum(
+    store: Store, location: str, grace: timedelta, versions: list[int], *, dry_run: bool
+) -> list[str]:
+    return store.table(location).vacuum(
+        retention_hours=int(grace / timedelta(hours=1)),
+        enforce_retention_duration=False,
+        dry_run=dry_run,
+        keep_versions=versions or None,
+        post_commithook_properties=NO_HOOKS,
+    )
 
 
 def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
@@ -175,19 +231,20 @@ def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
 
 
 def _compact(store: Store, location: str) -> Compacted:
-    with translated(f"{store.url}/{location} cannot be compacted"):
-        delta = store.table(location)
-        before = len(delta.file_uris())
-        try:
-            delta.optimize.compact(
-                target_size=TARGET_BYTES,
-                writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
-                post_commithook_properties=NO_HOOKS,
-            )
-        except CommitFailedError as error:  # rows were removed meanwhile
-            raise StoreError(f"{store.url}/{location} was changed meanwhile; compact it again") from error
-        _make_last(store, location, delta)
-        return Compacted(location, before, len(delta.file_uris()))
+    with translated(f"{store.url}/{location} cannot be compacted"), alone(store, location):
+        return _again(store, location, functools.partial(_put_together, store, location))
+
+
+def _put_together(store: Store, location: str) -> Compacted:
+    delta = store.table(location)
+    before = len(delta.file_uris())
+    delta.optimize.compact(
+        target_size=TARGET_BYTES,
+        writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
+        post_commithook_properties=NO_HOOKS,
+    )
+    _make_last(store, location, delta)
+    return Compacted(location, before, len(delta.file_uris()))
 
 
 def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
@@ -198,7 +255,14 @@ def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
         files = [
             table / unquote(path) for path in delta.get_add_actions(flatten=True).column("path").to_pylist()
         ]
-        durable.synchronise([*files, *(table / durable.LOG).iterdir()])
+        log = table / durable.LOG  # where others may be writing: their drafts come and go
+        entries = (entry for entry in log.glob("*.json") if not durable.is_marked(entry))
+        durable.synchronise([*files, *entries, *log.glob("*.checkpoint.parquet"), log / "_last_checkpoint"])
+
+
+def _mend(store: Store, tables: Sequence[Table]) -> None:
+    for location in (location for table in tables for location in table.locations(store.about.shards)):
+        store.mend(location)
 
 
 def _locations(store: Store, tables: Sequence[Table]) -> list[str]:
