@@ -37,6 +37,7 @@ PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hard
 MAPPED_BYTES: Final = 1 << 28
 _ALIKE: Final = operator.itemgetter(0, 6, 1, 2, 7)
 _COLUMNS: Final = "robot, connection, stream, seq, row, rows, session, layout, data, crc"
+DATA: Final = 8  # which of them is its rows
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -310,6 +311,12 @@ def unaltered(content: object, crc: int | None = None) -> bool:
     return isinstance(content, bytes) and crc in (None, zlib.crc32(content))
 
 
+def is_sound(robot: str, description: bytes, *line: Any) -> bool:
+    """Whether a run is as it was written, by its layout's description and all of its columns."""
+    data, crc = line[DATA], line[DATA + 1] if len(line) > DATA + 1 else None
+    return isinstance(data, bytes) and crc in (None, _crc(_sum(robot, description), line[:DATA], data))
+
+
 def _text(raw: bytes) -> str:
     """Also what is no text any more: its checksum tells."""
     return raw.decode(errors="replace")
@@ -329,7 +336,7 @@ def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:
     portion: list[bytes] = []
     rows = 0
     for line in lines:
-        portion.append(line[8])
+        portion.append(line[DATA])
         rows += line[5]
         if rows >= ROWS_AT_ONCE:
             yield b"".join(portion)
