@@ -15,12 +15,14 @@ from ml.store.sessions import UNTOLD, Session
 from ml.training.recorded import recorded
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.desk.library import look
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
+from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.recording.robots import CHANNELS, batch, description
 
 ROWS, WAIT_S = 50, 30.0
@@ -79,7 +81,9 @@ def test_a_session_that_is_told_of_in_the_spool_is_listed_once(tmp_path: Path, f
         spool.append((), [_row(untold)])
         spool.freeze()
     [session] = Recordings(folder_url, tmp_path).sessions()
-    assert (session.rows, session.notes) == (ROWS, "")
+    assert (session.rows, session.notes, session.uploaded) == (ROWS, "", True)
+    [shown] = look(ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path))).sessions
+    assert (shown.rows, shown.notes, shown.uploaded) == (ROWS, "", True)
 
 
 def _row(session: Session) -> Record:
@@ -105,10 +109,24 @@ def test_rows_of_a_boot_that_began_while_the_disk_was_full_are_in_its_session(
         assert recorder.flush(WAIT_S)
         free[0] = 10
         recorder.record("exo-01", 1, batch(1, 15, link=2))
-        recorder.amend("exo-01", Facts(parameters={"gain": 3.0}))
-    upload(tmp_path, folder_url)
+        recorder.cut(lambda: None)
+        assert recorder.flush(WAIT_S)
+        for number in spool.waiting():  # before its end tells of the session once more
+            send(spool, number, Store(folder_url))
     found = {each.session: each for each in stored.sessions(Store(folder_url))}
     assert {name: (each.rows, each.parameters["gain"]) for name, each in found.items()} == {
         old: (10, 1.0),
-        new: (15, 3.0),
+        new: (15, 2.0),
     }
+
+
+def test_rows_that_are_damaged_where_they_wait_are_not_shown(tmp_path: Path, folder_url: str) -> None:
+    with Spool(tmp_path, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0, 5))
+        recorder.flush(WAIT_S)
+        recorder.record("exo-01", 1, batch(1, 5))
+    with contextlib.closing(sqlite3.connect(tmp_path / "00000001.db")) as database, database:
+        database.execute("UPDATE run SET data = zeroblob(length(data)) WHERE seq = 1")
+    known = Recordings(folder_url, tmp_path)
+    [session] = known.sessions()
+    assert known.open(session).waiting == 5
