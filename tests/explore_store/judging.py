@@ -1,0 +1,231 @@
+"""Whether what the store has is what was handed in: each once, in its right name, or told as lost."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from typing import Any
+
+
+from ml.store import NoSuchTable, Store, StoreError, reading, sessions
+from ml.store.labels import holding, utc_ns
+from ml.store.tables import EVENTS, JOURNAL, LABELS, TELEMETRY, Table
+from server_gui.core.cloud import verify
+from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.recording.errors import RecordingError
+from server_gui.core.recording.gathering import EventKind
+from tests.explore_store.ledger import Amended, Entry, Fate, Mark, Row, Said
+from tests.explore_store.robots import ANGLE, COUNT
+from tests.explore_store.server import Server
+from tests.explore_store.world import World
+
+TOLD = frozenset({EventKind.LOST.value, EventKind.REFUSED.value})
+
+
+class Wrong(AssertionError):
+    """Something that was acknowledged is lost, doubled or misnamed, and no event tells of it."""
+
+
+def check(holds: bool, sentence: str, *found: object) -> None:
+    if not holds:
+        raise Wrong(": ".join([sentence, *map(str, found)]))
+
+
+def retire(world: World, before: datetime) -> None:
+    """These rows may go."""
+    for row in world.ledger.rows():
+        if row.utc_ns // 1000 * 1000 < utc_ns(before):
+            row.fate = Fate.OPEN
+
+
+def judge(world: World) -> None:
+    """Let everything come to rest, and look."""
+    rest(world)
+    store = Store.existing(world.url) if any(True for _ in world.safe()) else world.store()
+    problems = [*verify.damages(store, verify.files(store), lambda _: None, deep=True)]
+    check(not problems, "verify finds damage where there is none", problems)
+    for server in world.servers.values():
+        missing = list(verify.batches_missing(store, server.folder))
+        check(server.damaged or not missing, "verify misses a batch", missing)
+    telemetry(world, store)
+    for server in world.servers.values():
+        _losses(server, world, store)
+    _records(world, store)
+    _sessions(world, store)
+    for server in world.servers.values():
+        exports(world, server)
+    for location, version, rows in world.pinned:
+        found = store.dataset(location, version).to_table().num_rows
+        check(found == rows, "a pinned version has other rows", location, version, found, rows)
+
+
+def rest(world: World) -> None:
+    """No more faults: every server ends as it should, and a new one brings what it has left."""
+    world.disk.disarm()
+    for name, server in world.servers.items():
+        world.times.sleep(2.0)
+        with world.alive(name):
+            server.turn()
+            server.stop()
+            problem = server.uploader.state.problem
+            check(problem is None, f"server {name} cannot upload", problem)
+
+
+def rows_of(store: Store, table: Table) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = reading.dataset(store, table).to_table().to_pylist()
+    return found
+
+
+# --- telemetry
+
+
+def telemetry(world: World, store: Store) -> None:
+    """Each row once, under its robot, session, time and unit."""
+    units = {**reading.units(store, TELEMETRY)}
+    found: dict[int, list[dict[str, Any]]] = defaultdict(list)
+    for line in rows_of(store, TELEMETRY):
+        count = next((line[name] for name in line if name.startswith(COUNT) and line[name] is not None), None)
+        found[int(count or 0)].append(line)
+    known = {row.number: row for row in world.ledger.rows()}
+    check(found.keys() <= known.keys(), "rows that nobody has sent", sorted(found.keys() - known.keys()))
+    for number, row in known.items():
+        lines = found.get(number, [])
+        check(len(lines) <= 1, "a row is there more than once", len(lines), row)
+        for line in lines:
+            _is(row, line, units)
+    for number, row in known.items():
+        if row.fate is Fate.SAFE and number not in found and not world.servers[row.server].damaged:
+            raise Wrong(f"a row was acknowledged and is not there: {row}")
+    for loss in world.ledger.losses:
+        gone = [each for each in loss.things if isinstance(each, Row) and each.number not in found]
+        gone = [each for each in gone if each.fate is Fate.COUNTED]
+        damaged = world.servers[loss.server].damaged
+        check(damaged or len(gone) <= loss.rows, "more rows are lost than were counted", len(gone), loss.rows)
+
+
+def _is(row: Row, line: Mapping[str, Any], units: Mapping[str, str | None]) -> None:
+    said = {name: line[name] for name in ("robot", "session", "seq", "row", "stamp_ns")}
+    meant = dict(zip(said, (row.robot, row.session, row.seq, row.place, row.stamp_ns), strict=True))
+    check(said == meant, "a row is misnamed", said, meant)
+    check(line["utc"] is not None and utc_ns(line["utc"]) == row.utc_ns // 1000 * 1000,
+          "a row has another time", row.number, line["utc"], row.utc_ns)  # fmt: skip
+    angles = {name: line[name] for name in line if name.startswith(ANGLE) and line[name] is not None}
+    check(list(angles.values()) == ([] if row.angle is None else [row.angle]),
+          "a row has another value", row.number, angles, row.angle)  # fmt: skip
+    for name in angles:
+        check(row.unit in (units[name], None), "a row stands in a column of another unit",
+              row.number, name, units[name], row.unit)  # fmt: skip
+
+
+def _losses(server: Server, world: World, store: Store) -> None:
+    """What was counted as lost is told by an event."""
+    told = [
+        line for line in rows_of(store, EVENTS)
+        if line["kind"] in TOLD and line["spool"] == _identity(server)
+    ]  # fmt: skip
+    for loss in world.ledger.losses:
+        if loss.server == server.name and loss.told and not server.damaged:
+            check(bool(told), "rows were lost, and no event tells of it", loss.rows)
+
+
+def _identity(server: Server) -> str:
+    return (server.folder / "id").read_text().strip()
+
+
+# --- the other tables
+
+
+def _records(world: World, store: Store) -> None:
+    marks = Counter(line["text"] for line in rows_of(store, EVENTS) if line["kind"] == "marker")
+    labels = holding(rows_of(store, LABELS))
+    entries = Counter(
+        (line["spool"], line["robot"], line["n"], line["hash"]) for line in rows_of(store, JOURNAL)
+    )
+    check(not marks or max(marks.values()) == 1, "a marker is there twice", marks)
+    check(not entries or max(entries.values()) == 1, "an entry of a journal is there twice", entries)
+    for thing in world.safe():
+        server = world.servers[thing.server]
+        if server.damaged:
+            continue
+        if isinstance(thing, Mark):
+            check(marks[f"mark {thing.number}"] == 1, "a marker was acknowledged and is not there", thing)
+        if isinstance(thing, Entry):
+            key = (_identity(server), thing.robot, thing.n, thing.hash)
+            check(entries[key] == 1, "an entry of a journal was acknowledged and is not there", thing)
+    _labels(world, {(line["robot"], line["session"], line["label"]) for line in labels})
+
+
+def _labels(world: World, hold: set[tuple[str, str, str]]) -> None:
+    """The last that was said of a label holds."""
+    said: dict[tuple[str, str, str], list[Said]] = defaultdict(list)
+    for thing in world.ledger.things:
+        if isinstance(thing, Said):
+            said[thing.robot, thing.session, thing.label].append(thing)
+    check(hold <= said.keys(), "labels hold that nobody has given", hold - said.keys())
+    for key, things in said.items():
+        newest = things[-1]
+        if newest.fate is Fate.SAFE and not world.servers[newest.server].damaged:
+            check((key in hold) != newest.removed, "a label holds that was removed, or does not", newest)
+
+
+def _sessions(world: World, store: Store) -> None:
+    """Each session with rows is listed, and says what was said of it last."""
+    listed = {(each.robot, each.session): each for each in sessions.sessions(store)}
+    for row in world.ledger.rows():
+        server = world.servers[row.server]
+        if row.fate is Fate.SAFE and not server.damaged:
+            check((row.robot, row.session) in listed, "a session with rows is not listed", row)
+    newest = {
+        (thing.robot, thing.session): thing
+        for thing in world.ledger.things if isinstance(thing, Amended)
+    }  # fmt: skip
+    for key, thing in newest.items():
+        if thing.fate is Fate.SAFE and not world.servers[thing.server].damaged:
+            found = listed[key].parameters
+            check(found == {"value": thing.value}, "a session says not what was said last", thing, found)
+
+
+# --- as people read it
+
+
+def exports(world: World, server: Server) -> None:
+    """A session's export has each of its rows once, connection by connection in its order."""
+    world.times.wall_ns = server.wall_ns
+    try:
+        known = Recordings(world.url, server.folder)
+        for session in known.sessions():
+            _export(world, server, known, session)
+    except (NoSuchTable, RecordingError):
+        return
+    except StoreError:
+        if not server.damaged:
+            raise
+
+
+def _export(world: World, server: Server, known: Recordings, session: sessions.Session) -> None:
+    found = [number for number in _exported(known, session)]
+    mine = {
+        row.number: row for row in world.ledger.rows()
+        if (row.robot, row.session) == (session.robot, session.session)
+    }  # fmt: skip
+    check(set(found) <= mine.keys(), "an export has rows of others", sorted(set(found) - mine.keys()))
+    check(len(found) == len(set(found)), "an export has rows twice", found)
+    wanted = {
+        number for number, row in mine.items()
+        if row.fate is Fate.SAFE and row.server == server.name and not server.damaged
+    }  # fmt: skip
+    check(wanted <= set(found), "an export lacks rows", session.session, sorted(wanted - set(found)))
+    orders: dict[Any, list[int]] = defaultdict(list)
+    for number in found:
+        orders[mine[number].link].append(number)
+    for link, numbers in orders.items():
+        check(numbers == sorted(numbers), "an export has rows in another order", link, numbers)
+
+
+def _exported(known: Recordings, session: sessions.Session) -> Iterator[int]:
+    recorded = known.open(session)
+    names = [each.name for each in recorded.channels if each.name.startswith(COUNT)]
+    for table in recorded.telemetry(names):
+        for line in table.to_pylist():
+            yield next(int(line[name]) for name in names if line[name] is not None)
+
+

@@ -1,0 +1,139 @@
+"""Hypothesis makes plays; where one goes wrong, steps are left out as long as it does."""
+
+import contextlib
+import re
+import shutil
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import hypothesis
+from hypothesis import strategies as st
+
+from tests.explore_store.disk import Ended
+from tests.explore_store.judging import Wrong
+from tests.explore_store.steps import KINDS, Step, play
+
+ROUND: Final = 40  # plays that one seed gives
+SHRINK_S: Final = 60.0
+MEMORY: Final = Path("/dev/shm")  # a disk that costs nothing; ours says itself what a power cut leaves
+
+
+@dataclass(slots=True)
+class Found:
+    """What a search has done, and the shortest play that went wrong."""
+
+    plays: int = 0
+    steps: int = 0
+    points: int = 0
+    wrong: list[Step] | None = None
+    error: Exception | None = None
+    seed: str = ""
+
+    @property
+    def text(self) -> str:
+        return "; ".join(map(str, self.wrong or ()))
+
+
+class _Enough(BaseException):
+    """The time is over."""
+
+
+def step(word: str) -> st.SearchStrategy[Step]:
+    below = KINDS[word].below
+    numbers = st.tuples(*(st.integers(0, each - 1) for each in below))
+    return numbers.map(lambda found: Step(word, found))
+
+
+def plays(words: Sequence[str]) -> st.SearchStrategy[list[Step]]:
+    """Lists of lists: so that plays are some 25 steps long, and any may be left out."""
+    known = {word: step(word) for word in words}
+    weighted = [word for word in words for _ in range(KINDS[word].weight)]
+    steps = st.sampled_from(weighted).flatmap(known.__getitem__)
+    acts = st.lists(st.lists(steps, max_size=12), max_size=12)
+    return acts.map(lambda found: [each for act in found for each in act])
+
+
+def played(steps: Sequence[Step], shards: int = 1) -> int:
+    """Play these in a folder of their own; how many points there were where it might have ended."""
+    folder = Path(tempfile.mkdtemp(dir=MEMORY if MEMORY.is_dir() else None))
+    try:
+        return play(list(steps), folder, shards).disk.points
+    except Ended:
+        raise Wrong("a program ended where none was at work") from None
+    finally:
+        shutil.rmtree(folder)
+
+
+def search(seconds: float, seed: int, words: Sequence[str] = tuple(KINDS), saying: str = "") -> Found:
+    """Play until one goes wrong, and says this (a regular expression), or the time is over."""
+    found = Found()
+    until_s = time.monotonic() + seconds
+    number = 0
+    while time.monotonic() < until_s and found.wrong is None:
+        found.seed = f"{seed}.{number}"
+        _round(found, words, until_s, saying)
+        number += 1
+    if found.wrong is not None:
+        _shorten(found, saying)
+    return found
+
+
+def _round(found: Found, words: Sequence[str], until_s: float, saying: str) -> None:
+    @hypothesis.seed(found.seed)
+    @hypothesis.settings(
+        max_examples=ROUND,
+        deadline=None,
+        database=None,
+        phases=(hypothesis.Phase.generate,),
+        suppress_health_check=list(hypothesis.HealthCheck),
+    )
+    @hypothesis.given(plays(words))
+    def one(steps: list[Step]) -> None:
+        if time.monotonic() > until_s:
+            raise _Enough
+        error = tried(steps, saying, found)
+        found.plays, found.steps = found.plays + 1, found.steps + len(steps)
+        if error is not None:
+            found.wrong, found.error = steps, error
+            raise _Enough
+
+    with contextlib.suppress(_Enough):
+        one()
+
+
+def tried(steps: Sequence[Step], saying: str, found: Found) -> Exception | None:
+    """What went wrong, if it says this."""
+    try:
+        found.points += played(steps)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+        return error if re.search(saying, str(error)) else None
+    return None
+
+
+def _shorten(found: Found, saying: str) -> None:
+    """Leave out parts of it, large ones first, and then make its numbers small."""
+    until_s = time.monotonic() + SHRINK_S
+    steps = list(found.wrong or ())
+    saying = saying or re.escape(str(found.error).partition(":")[0].rstrip("0123456789 "))
+    size = max(1, len(steps) // 2)
+    while size:
+        begin = 0
+        while begin < len(steps) and time.monotonic() < until_s:
+            fewer = steps[:begin] + steps[begin + size :]
+            if (error := tried(fewer, saying, Found())) is not None:
+                steps, found.wrong, found.error = fewer, fewer, error
+            else:
+                begin += size
+        size //= 2
+
+
+def told(error: Exception) -> str:
+    """An error in words, with where it came from."""
+    if isinstance(error, Wrong):
+        return str(error)
+    return "".join(traceback.format_exception(error)[-6:])

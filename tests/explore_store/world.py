@@ -1,0 +1,130 @@
+"""One play: a computer with two servers, robots, and a store; its steps, and what the ledger knows of them."""
+
+import concurrent.futures
+import contextlib
+import random
+import sqlite3
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, Self
+
+from ml.store import Store, durable, writing
+from server_gui.core.recording import recorder
+from tests.explore_store.disk import Disk, Ended, changes, watching
+from tests.explore_store.ledger import Fate, Ledger
+from tests.explore_store.robots import Robot
+from tests.explore_store.server import Server
+from tests.explore_store.times import Names, Times, ours
+
+
+class World:
+    """A context manager, in which the path stands on our time, names and disk."""
+
+    def __init__(self, folder: Path, shards: int = 1) -> None:
+        self.times = Times()
+        self.disk = Disk(folder)
+        self.ledger = Ledger()
+        self.shards = shards
+        self.url = (folder / "store").as_uri()
+        self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
+        self.removed: list[Path] = []
+        both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg")
+        self.robots = [both, mine, other]
+        self.servers = {
+            "A": self._server("A", {"exo-0": both, "exo-1": mine}),
+            "B": self._server("B", {"exo-0": both, "exo-1": other}),  # another one of this name
+        }
+        self._stack = contextlib.ExitStack()
+        self._count = 0
+
+    def _server(self, name: str, robots: dict[str, Robot]) -> Server:
+        return Server(name, self.disk, self.times, self.ledger, robots, self.store)
+
+    def __enter__(self) -> Self:
+        put = self._put
+        names = Names(random.Random(0))
+        for module in ours():
+            for ours_, theirs in ((self.times, time), (names, uuid)):
+                for name, value in list(vars(module).items()):
+                    if value is theirs:
+                        put(module, name, ours_)
+        for module in (durable, writing):
+            put(module, "ThreadPoolExecutor", _AtOnce)
+        put(recorder, "COMMIT_S", 0.0)
+        put(sqlite3, "connect", watching(self.disk))
+        import os
+
+        for name, stand_in in changes(self.disk).items():
+            put(os, name, stand_in)
+        return self
+
+    def _put(self, module: Any, name: str, value: Any) -> None:
+        before = getattr(module, name)
+        setattr(module, name, value)
+        self._stack.callback(setattr, module, name, before)
+
+    def __exit__(self, *exc: object) -> None:
+        for server in self.servers.values():
+            server.abandon()
+        self._stack.close()
+
+    def store(self) -> Store:
+        return Store(self.url, self.shards)
+
+    def number(self, count: int = 1) -> int:
+        """Numbers that nothing has yet; the first of them."""
+        self._count += count
+        return self._count - count + 1
+
+    @contextlib.contextmanager
+    def alive(self, name: str) -> Iterator[Server]:
+        """A server at work; where it ends within the block, the disk is then what is left of it."""
+        server = self.servers[name]
+        self.times.wall_ns = server.wall_ns
+        try:
+            if not server.runs:
+                server.start()
+            yield server
+        except Ended:
+            self.bury(name)
+        if self.disk.left is not None:
+            self.bury(name)
+
+    def bury(self, name: str) -> None:
+        """A server has ended, by a power cut all of them."""
+        gone = self.servers.values() if self.disk.power else [self.servers[name]]
+        for server in gone:
+            server.abandon()
+        self.disk.become(self.servers[name].folder)
+
+    def end(self, name: str, seed: int, *, power: bool) -> None:
+        """End a server now, or cut the power."""
+        if self.servers[name].runs or power:
+            self.disk.end(seed, power=power)
+            self.bury(name)
+
+    def safe(self) -> Iterable[Any]:
+        return (thing for thing in self.ledger.things if thing.fate is Fate.SAFE)
+
+
+class _AtOnce:
+    """Stands for a pool of threads: everything is done by whoever hands it in, in its order."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        pass
+
+    def map(self, work: Callable[..., Any], *values: Iterable[Any]) -> list[Any]:
+        return list(map(work, *values))
+
+    def submit(self, work: Callable[..., Any], *values: Any) -> "concurrent.futures.Future[Any]":
+        done: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        done.set_result(work(*values))
+        return done
