@@ -10,6 +10,7 @@ import errno
 import os
 import random
 import sqlite3
+import weakref
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -52,7 +53,7 @@ class Disk:
         self._names: dict[str, Node | None] = {}  # that last; None: a folder
         self._armed: tuple[int, bool, int] | None = None
         self._failing: list[int] = []  # the next writes' errors
-        self.connections: list[Watched] = []
+        self.connections: weakref.WeakSet[Watched] = weakref.WeakSet()
 
     # --- what is to happen
 
@@ -252,11 +253,14 @@ class Watched(sqlite3.Connection):
         log = self._log
         had = log.exists()
         super().close()
-        if self in self.disk.connections:
-            self.disk.connections.remove(self)
+        self.disk.connections.discard(self)
         if self.disk.left is None and had and not log.exists() and self.file.exists():
             self.disk.point(str(log.relative_to(self.disk.root)))  # SQLite keeps it until the rest lasts
             self.disk.synced(self.file)
+
+    def __del__(self) -> None:
+        if self in self.disk.connections:  # nobody has closed it
+            self.close()
 
     @property
     def _log(self) -> Path:
@@ -289,7 +293,7 @@ def watching(disk: Disk) -> Callable[..., sqlite3.Connection]:
             raise Ended
         opened = real(path, factory=Watched, **options)
         opened.disk, opened.file = disk, path
-        disk.connections.append(opened)
+        disk.connections.add(opened)
         return opened
 
     return connect

@@ -119,7 +119,7 @@ def _shorten(found: Found, saying: str) -> None:
     """Leave out parts of it, large ones first, and then make its numbers small."""
     until_s = time.monotonic() + SHRINK_S
     steps = list(found.wrong or ())
-    saying = saying or re.escape(str(found.error).partition(":")[0].rstrip("0123456789 "))
+    saying = saying or re.escape(re.split("[:/0-9]", str(found.error))[0])
     size = max(1, len(steps) // 2)
     while size:
         begin = 0

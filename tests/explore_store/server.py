@@ -113,7 +113,7 @@ class Server:
         """The process is gone: the system closes its files."""
         for opened in [each for each in self.disk.connections if each.file.parent == self.folder]:
             sqlite3.Connection.close(opened)
-            self.disk.connections.remove(opened)
+            self.disk.connections.discard(opened)
         if self.spool is not None:
             self.spool._lock.close()
         self.spool = None

@@ -8,15 +8,18 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from ml.store import Store, durable, writing
 from server_gui.core.recording import recorder
+from server_gui.core.recording.errors import SpoolUnusable
 from tests.explore_store.disk import Disk, Ended, changes, watching
 from tests.explore_store.ledger import Fate, Ledger
 from tests.explore_store.robots import Robot
 from tests.explore_store.server import Server
 from tests.explore_store.times import Names, Times, ours
+
+AGAIN: Final = 5  # attempts on a disk that refuses; one refuses less often
 
 
 class World:
@@ -85,12 +88,24 @@ class World:
         self.times.wall_ns = server.wall_ns
         try:
             if not server.runs:
-                server.start()
+                self._start(server)
             yield server
         except Ended:
             self.bury(name)
         if self.disk.left is not None:
             self.bury(name)
+
+    @staticmethod
+    def _start(server: Server) -> None:
+        """As whoever looks after it: where the disk refuses, again."""
+        for again in reversed(range(AGAIN)):
+            try:
+                server.start()
+                return
+            except (SpoolUnusable, OSError):
+                server.abandon()
+                if not again:
+                    raise
 
     def bury(self, name: str) -> None:
         """A server has ended, by a power cut all of them."""
