@@ -25,7 +25,10 @@ _OF_THE_LOG: Final = {
     "session": "partition.session",
     "first": "min.utc",
     "last": "max.utc",
+    "first_ns": "min.stamp_ns",
+    "last_ns": "max.stamp_ns",
 }
+_EXTENT: Final = ("first", "last", "first_ns", "last_ns")
 _ROUNDED_OFF: Final = timedelta(milliseconds=1)  # of a time in the log
 _FORMAT: Final = pyarrow.dataset.ParquetFileFormat(
     default_fragment_scan_options=pyarrow.dataset.ParquetFragmentScanOptions(pre_buffer=True)
@@ -39,7 +42,7 @@ class DataFile:
     """A file of a table; `path` is below the table's location.
 
     `robot` and `session` are its partition; all rows are from `first` to before `last`, which the log rounds
-    to milliseconds. None where not known.
+    to milliseconds, and their `stamp_ns` from `first_ns` to `last_ns`. None where not known.
     """
 
     location: str
@@ -50,6 +53,8 @@ class DataFile:
     session: str | None
     first: datetime | None
     last: datetime | None
+    first_ns: int | None
+    last_ns: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +93,13 @@ def as_dataset(delta: DeltaTable, location: str, files: FileSystem) -> pyarrow.d
     names = (log[name].to_pylist() for name in ("path", "robot", "session"))
     fragments = [
         _FORMAT.make_fragment(
-            f"{location}/{unquote(path)}", files, _partition(robot, session) & _between(first, last)
+            f"{location}/{unquote(path)}",
+            files,
+            _partition(robot, session) & _between("utc", first, last) & _between("stamp_ns", *stamps),
         )
-        for path, robot, session, first, last in zip(*names, log["first"], log["last"], strict=True)
+        for path, robot, session, first, last, *stamps in zip(
+            *names, *(log[name] for name in _EXTENT), strict=True
+        )
     ]
     return pyarrow.dataset.FileSystemDataset(fragments, pa.schema(delta.schema().to_arrow()), _FORMAT, files)
 
@@ -107,11 +116,11 @@ def _log(delta: DeltaTable) -> dict[str, pa.ChunkedArray]:
     return found
 
 
-def _between(first: pa.Scalar, last: pa.Scalar) -> pyarrow.dataset.Expression:
+def _between(name: str, first: pa.Scalar, last: pa.Scalar) -> pyarrow.dataset.Expression:
     """As Arrow has the times: made of Python's, an expression takes half a millisecond."""
     if not (first.is_valid and last.is_valid):
         return _ALL
-    return (_column("utc") >= first) & (_column("utc") < last)
+    return (_column(name) >= first) & (_column(name) <= last)
 
 
 @functools.lru_cache(1_000)

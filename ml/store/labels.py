@@ -1,8 +1,8 @@
 """Labels: what robot and wearer did, as somebody or something says; and which of a table's rows hold.
 
 A row says that a label holds, or (`removed`) that the same one holds no more. Of rows that say of the same
-robot, session, time, author and source the same label, the newest (`written`) counts, so that a label is one
-however often it was written.
+robot, session, time, author and source the same label, the last counts (later.py; between several spools by
+`written`), so that a label is one however often it was written.
 """
 
 import itertools
@@ -16,6 +16,7 @@ from msgspec import Struct
 from msgspec.structs import force_setattr
 
 from ml.store.errors import StoreError
+from ml.store.later import last
 
 US_NS: Final = 1_000  # the store's times are microseconds
 
@@ -128,10 +129,8 @@ def _kind(sign: str) -> str:
 
 def holding(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Of rows of the table `labels` those that hold, in time's order; each label once."""
-    newest: dict[tuple[Any, ...], Mapping[str, Any]] = {}
-    for row in sorted(rows, key=_written):
-        newest[_key(row)] = row
-    return sorted((dict(row) for row in newest.values() if not row.get("removed")), key=_order)
+    said = last(rows, _key, _written)
+    return sorted((dict(row) for row in said if not row.get("removed")), key=_order)
 
 
 def utc_ns(time: datetime) -> int:
@@ -146,7 +145,7 @@ def _key(row: Mapping[str, Any]) -> tuple[Any, ...]:
 def _written(row: Mapping[str, Any]) -> tuple[bool, Any]:
     """Rows of stores from before there was such a column come first."""
     written = row.get("written")
-    return (written is not None, written)
+    return (written is not None, written or row["utc"])
 
 
 def _order(row: Mapping[str, Any]) -> tuple[Any, ...]:

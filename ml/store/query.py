@@ -30,9 +30,13 @@ _KIND: Final = re.compile(r"^(\w+ )*Error: ")
 _READING: Final = "reading the Arrow source failed: IOError: "
 _DOTTED: Final = re.compile(r'Referenced table "(\w+)" not found')
 
-# Of rows of `labels`, as ml/store/labels.py has it.
-_HOLDING: Final = """SELECT * FROM every QUALIFY NOT coalesce(removed, false) AND 1 = row_number() OVER (
-    PARTITION BY robot, session, utc, ended, label, author, source ORDER BY written DESC NULLS LAST)"""
+# Of rows of `labels`, as ml/store/labels.py and ml/store/later.py have it.
+_ABOUT: Final = "robot, session, utc, ended, label, author, source"
+_HOLDING: Final = f"""SELECT * FROM (SELECT * FROM every QUALIFY 1 = row_number() OVER (
+    PARTITION BY {_ABOUT}, split_part(coalesce(spool, ''), '/', 1)
+    ORDER BY coalesce(batch, 0) DESC, coalesce(number, 0) DESC, written DESC NULLS LAST))
+    QUALIFY NOT coalesce(removed, false)
+    AND 1 = row_number() OVER (PARTITION BY {_ABOUT} ORDER BY written DESC NULLS LAST)"""
 
 
 class QueryError(StoreError):

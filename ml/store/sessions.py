@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 import pyarrow as pa
@@ -14,20 +14,36 @@ from ml.store import reading
 from ml.store.errors import StoreError, translated
 from ml.store.fragments import DataFile, Extent
 from ml.store.labels import holding
+from ml.store.later import last, recorded_order
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
 
 ROWS_AT_ONCE: Final = 100_000  # of telemetry, about
-SHORTEST: Final = timedelta(seconds=1)  # that is read at once
+SHORTEST_NS: Final = 1_000_000_000  # that is read at once
 KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
-_ORDER: Final = [(name, "ascending") for name in ("utc", "connection", "stream", "seq", "row")]
-_NAMING: Final = pa.schema(
-    [TELEMETRY.schema.field(name) for name in (*(name for name, _ in _ORDER), "stamp_ns")]
-)
+# A session is of one boot of the robot, so its clock goes on in it, whatever was done to others meanwhile.
+ORDER: Final = [(name, "ascending") for name in ("stamp_ns", "connection", "stream", "seq", "row")]
+_NAMING: Final = pa.schema([TELEMETRY.schema.field(name) for name in ("utc", *(name for name, _ in ORDER))])
 _UNKNOWN: Final = datetime(1970, 1, 1, tzinfo=UTC)  # when it began
+_WHOLE: Final = (-(1 << 63), (1 << 63) - 2)  # stamps, where nobody knows which
 _AT_ONCE: Final = 8  # footers that are read at a time
 
-Source = Callable[[datetime, datetime], pyarrow.dataset.Dataset]  # what may have rows of such a time
+
+class Piece(NamedTuple):
+    """A part of a session's telemetry: from when to when, and which stamps, as far as that is known."""
+
+    first: datetime | None
+    last: datetime | None
+    first_ns: int | None
+    last_ns: int | None
+    rows: int
+
+
+class Source(NamedTuple):
+    """A place with telemetry of a session: what is there, and what may have rows with such stamps."""
+
+    pieces: Sequence[Piece]
+    rows: Callable[[int, int], pyarrow.dataset.Dataset]
 
 
 class NoSuchSession(StoreError):
@@ -119,9 +135,8 @@ def among(known: Sequence[Session], name: str, where: str) -> Session:
 
 
 def newest(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Of the rows of each session the one that holds: the newest."""
-    by_time = sorted(rows, key=lambda row: (row["utc"], row.get("batch") or 0, row.get("number") or 0))
-    return list({_name(row): row for row in by_time}.values())
+    """Of the rows of each session the one that holds: the last."""
+    return last(rows, _name, lambda row: row["utc"])
 
 
 def unstored(rows: Iterable[Mapping[str, Any]]) -> list[Session]:
@@ -171,9 +186,9 @@ def footer(store: Store, file: DataFile) -> pq.FileMetaData:
 
 
 def happenings(store: Store, session: Session, table: Table = EVENTS) -> list[dict[str, Any]]:
-    """The session's rows of `events`, or of `labels`, in time's order."""
+    """The session's rows of `events`, or of `labels`, in the order in which they were recorded."""
     named = pyarrow.dataset.field("session") == session.session
-    return sorted(_rows(store, table, session.robot, named), key=lambda row: row["utc"])
+    return recorded_order(_rows(store, table, session.robot, named))
 
 
 def labels(store: Store, session: Session) -> list[dict[str, Any]]:
@@ -188,41 +203,59 @@ def telemetry(
     begin: datetime | None = None,
     end: datetime | None = None,
 ) -> Iterator[pa.Table]:
-    """The rows from `begin` up to before `end`, in time's order, some at a time.
+    """The rows from `begin` up to before `end`, in the order of the robot's clock, some at a time.
 
     The columns are `utc`, `stamp_ns` and these channels; rows in which all of them are null are left out.
     """
     if session.rows and names:
         with translated(f"the telemetry of {session.session} in {store.url} cannot be read"):
-            yield from merged([stored(store, session)], session, names, begin, end)
+            yield from merged([stored(store, session)], names, begin, end)
 
 
 def stored(store: Store, session: Session) -> Source:
     """The session's telemetry in the store, for `merged`."""
+    files = _files(store, session)
     rows = _of_session(store, session)
-    return lambda _begin, _end: rows
+    pieces = [Piece(each.first, each.last, each.first_ns, each.last_ns, each.rows) for each in files]
+    return Source(pieces, lambda _begin, _end: rows)
 
 
 def merged(
     sources: Sequence[Source],
-    session: Session,
     names: Sequence[str],
     begin: datetime | None = None,
     end: datetime | None = None,
 ) -> Iterator[pa.Table]:
-    """As `telemetry`, from several places with no row in common; the session's extent is that of all."""
-    if session.first is None or session.last is None or not session.rows or not names:
+    """As `telemetry`, from several places with no row in common."""
+    wanted = [
+        piece for source in sources for piece in source.pieces if piece.rows and _within(piece, begin, end)
+    ]
+    if not wanted or not names:
         return
-    begin = max(begin or session.first, session.first)
-    end = min(end or session.last, session.last)
-    step = max(session.length * ROWS_AT_ONCE / session.rows, SHORTEST)
+    when, stamp = _between(begin, end), pyarrow.dataset.field("stamp_ns")
     nothing = pa.schema([*_NAMING, *(pa.field(name, pa.float64()) for name in names)]).empty_table()
-    while begin < end:
-        until = min(begin + step, end)
-        found = [_part(source(begin, until), names, _between(begin, until)) for source in sources]
+    for first_ns, until_ns in _steps(wanted):
+        stamps = (stamp >= first_ns) & (stamp < until_ns)
+        found = [_part(source.rows(first_ns, until_ns), names, stamps & when) for source in sources]
         rows = pa.concat_tables([nothing, *found], promote_options="default")
-        yield rows.sort_by(_ORDER).select([*KEYS, *names])
-        begin = until
+        yield rows.sort_by(ORDER).select([*KEYS, *names])
+
+
+def _within(piece: Piece, begin: datetime | None, end: datetime | None) -> bool:
+    before = end is not None and piece.first is not None and piece.first >= end
+    after = begin is not None and piece.last is not None and piece.last <= begin
+    return not (before or after)
+
+
+def _steps(wanted: Sequence[Piece]) -> Iterator[tuple[int, int]]:
+    """Spans of stamps, each with about as many rows as are read at once."""
+    first_ns = min(_WHOLE[0] if piece.first_ns is None else piece.first_ns for piece in wanted)
+    end_ns = 1 + max(_WHOLE[1] if piece.last_ns is None else piece.last_ns for piece in wanted)
+    rows = sum(piece.rows for piece in wanted)
+    step_ns = max((end_ns - first_ns) * ROWS_AT_ONCE // rows, SHORTEST_NS)
+    while first_ns < end_ns:
+        yield first_ns, min(first_ns + step_ns, end_ns)
+        first_ns += step_ns
 
 
 def _part(rows: pyarrow.dataset.Dataset, names: Sequence[str], when: pyarrow.dataset.Expression) -> pa.Table:
@@ -242,9 +275,11 @@ def _of_session(store: Store, session: Session) -> pyarrow.dataset.Dataset:
     return pyarrow.dataset.FileSystemDataset(list(fragments), whole.schema, files)
 
 
-def _between(begin: datetime, end: datetime) -> pyarrow.dataset.Expression:
-    utc = pyarrow.dataset.field("utc")
-    return (utc >= begin) & (utc < end)
+def _between(begin: datetime | None, end: datetime | None) -> pyarrow.dataset.Expression:
+    utc, wanted = pyarrow.dataset.field("utc"), pyarrow.dataset.scalar(True)
+    if begin is not None:
+        wanted = wanted & (utc >= begin)
+    return wanted if end is None else wanted & (utc < end)
 
 
 def _any(names: Sequence[str]) -> pyarrow.dataset.Expression:

@@ -11,11 +11,11 @@ import pyarrow.dataset
 
 from ml.features.windows import Samples
 from ml.store.errors import translated
+from ml.store.sessions import ORDER
 from ml.store.store import Store
 from ml.store.tables import TELEMETRY
 
 Instants = npt.NDArray[np.int64]
-_ORDER = [(name, "ascending") for name in ("stamp_ns", "connection", "stream", "seq", "row")]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,8 +50,8 @@ def recorded(
     there = [name for name in channels if name in known.schema.names]
     named = (pyarrow.dataset.field("robot") == robot) & (pyarrow.dataset.field("session") == session)
     with translated(f"the telemetry of {session} in {store.url} cannot be read"):
-        table = known.to_table(columns=["utc", *(name for name, _ in _ORDER), *there], filter=named).sort_by(
-            _ORDER
+        table = known.to_table(columns=["utc", *(name for name, _ in ORDER), *there], filter=named).sort_by(
+            ORDER
         )
     columns = [_values(table, name) for name in channels]
     values = np.stack(columns, axis=1) if columns else np.empty((table.num_rows, 0))

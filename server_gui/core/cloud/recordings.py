@@ -20,7 +20,8 @@ import pyarrow.dataset
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
 from ml.store.errors import translated
 from ml.store.labels import holding
-from ml.store.sessions import Channel, Session, Source
+from ml.store.later import recorded_order
+from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
 from server_gui.core.cloud import spooled
@@ -85,11 +86,11 @@ class Recordings:
         return sessions.among(known, name, self._url)
 
     def happenings(self, session: Session, table: Table = EVENTS) -> list[Row]:
-        """The session's rows of this table, in time's order."""
+        """The session's rows of this table, in the order in which they were recorded."""
         stored = [] if self._store is None else sessions.happenings(self._store, session, table)
         mine = (session.robot, session.session)
         told = [row for row in self._waiting(table) if (row["robot"], row["session"]) == mine]
-        return sorted([*stored, *told], key=lambda row: row["utc"])
+        return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
         """What somebody says that robot and wearer did, as far as it has not been taken back."""
@@ -108,7 +109,7 @@ class Recordings:
             waiting.added_to(session),
             waiting.channels(known),
             waiting.rows,
-            [*sources, waiting.source] if waiting.rows else sources,
+            [*sources, waiting.source()] if waiting.rows else sources,
             self._url,
         )
 
@@ -142,19 +143,9 @@ class Recorded:
     def telemetry(
         self, names: Sequence[str], begin: datetime | None = None, end: datetime | None = None
     ) -> Iterator[pa.Table]:
-        """The rows from `begin` up to before `end`, in time's order, as `ml.store.sessions.telemetry`."""
+        """The rows from `begin` up to before `end`, as `ml.store.sessions.telemetry`."""
         with translated(f"the telemetry of {self.session.session} in {self._url} cannot be read"):
-            yield from sessions.merged(self._sources, self.session, names, begin, end)
-
-
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """Of a session what one batch has: rows from `first` up to before `last`."""
-
-    batch: int
-    first: datetime
-    last: datetime
-    rows: int
+            yield from sessions.merged(self._sources, names, begin, end)
 
 
 class _Waiting:
@@ -167,12 +158,20 @@ class _Waiting:
         self._session = session
         self._units = units
         self._samples: Counter[str] = Counter()
-        self._parts = [part for batch in batches if (part := self._looked_into(batch))]
-        self.rows = sum(part.rows for part in self._parts)
+        self._pieces = {batch: piece for batch in batches if (piece := self._looked_into(batch))}
+        self.rows = sum(piece.rows for piece in self._pieces.values())
 
-    def source(self, begin: datetime, end: datetime) -> pyarrow.dataset.Dataset:
-        """The batches that have something of this time, for `merged`."""
-        wanted = [part.batch for part in self._parts if part.first < end and part.last > begin]
+    def source(self) -> Source:
+        """All of it, for `merged`."""
+        return Source([*self._pieces.values()], self._between)
+
+    def _between(self, begin_ns: int, end_ns: int) -> pyarrow.dataset.Dataset:
+        """The batches that have something with such stamps."""
+        wanted = [
+            batch
+            for batch, (_, _, first_ns, last_ns, _) in self._pieces.items()
+            if first_ns is not None and last_ns is not None and first_ns < end_ns and last_ns >= begin_ns
+        ]
         found = [self._table(batch) for batch in wanted] or [TELEMETRY.schema.empty_table()]
         return pyarrow.dataset.dataset(pa.concat_tables(found, promote_options="default"))
 
@@ -186,23 +185,22 @@ class _Waiting:
 
     def added_to(self, session: Session) -> Session:
         """The session with the extent of all of its rows."""
+        pieces = self._pieces.values()
         first = min(
-            (time for time in (session.first, *(part.first for part in self._parts)) if time), default=None
+            (time for time in (session.first, *(each.first for each in pieces)) if time), default=None
         )
-        last = max(
-            (time for time in (session.last, *(part.last for part in self._parts)) if time), default=None
-        )
+        last = max((time for time in (session.last, *(each.last for each in pieces)) if time), default=None)
         return msgspec.structs.replace(session, first=first, last=last, rows=session.rows + self.rows)
 
-    def _looked_into(self, batch: int) -> _Part | None:
+    def _looked_into(self, batch: int) -> Piece | None:
         rows = self._table(batch)
         if not rows.num_rows:
             return None
         for name in rows.column_names:
             if name not in OWN and (samples := rows.num_rows - rows[name].null_count):
                 self._samples[name] += samples
-        extent = pc.min_max(rows["utc"]).as_py()
-        return _Part(batch, extent["min"], extent["max"] + _US, rows.num_rows)
+        utc, stamps = (pc.min_max(rows[name]).as_py() for name in sessions.KEYS)
+        return Piece(utc["min"], utc["max"] + _US, stamps["min"], stamps["max"], rows.num_rows)
 
     def _table(self, batch: int) -> pa.Table:
         runs = list(spooled.runs(self._spool, self._session, batch))

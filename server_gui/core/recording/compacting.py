@@ -52,7 +52,8 @@ class Compacting:
 
     def _is_due(self) -> bool:
         try:
-            return time.time() - self._noted.stat().st_mtime >= self._every_s
+            since_s = time.time() - self._noted.stat().st_mtime
+            return abs(since_s) >= self._every_s  # a clock that was set back would put it off for ever
         except FileNotFoundError:  # the first time of all: there is not much yet
             self._noted.touch()
             return False

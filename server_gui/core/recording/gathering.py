@@ -2,7 +2,7 @@
 
 import itertools
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 
 from gateway.client import Batch
 from server_gui.core import arriving
+from server_gui.core.recording.clocks import Clock, Moment, Reading, Step
 from server_gui.core.recording.rows import Floats, Layout, Record, Run
 
 
@@ -27,6 +28,7 @@ class EventKind(Enum):
     JOURNAL_GAP = "journal_gap"  # entries of the robot's journal were never seen
     REFUSED = "refused"  # a robot sent what cannot be kept
     MARKER = "marker"  # somebody marked this instant
+    CLOCK_STEP = "clock_step"  # this server's clock was set, or the robot's moved: by how much, from and to
     RULE = "rule"  # a rule on predictions began or ceased to hold, or what came of the stop that it asked for
 
 
@@ -35,12 +37,14 @@ Name = tuple[str, str, int, int]  # session, connection, stream, and which layou
 
 @dataclass(frozen=True, slots=True)
 class Notification:
-    """A batch of a stream, and how its times relate to UTC."""
+    """A batch of a stream, and how the clocks stood when it came."""
 
     stream: int
     batch: Batch
-    utc_offset_ns: int  # UTC minus the robot's monotonic clock
-    received_utc_ns: int
+    clocks: Reading
+
+
+Timed = tuple[Batch, int]  # and UTC minus the robot's monotonic clock
 
 
 class Gathering:
@@ -55,9 +59,10 @@ class Gathering:
         self.session = ""
         self.connection = uuid.uuid4().hex[:16]
         self.units: dict[str, str] = {}
+        self.clock = Clock()
         self._link: int | None = None
         self._newest: dict[int, tuple[int, int, int]] = {}  # by stream: its newest `seq`, `dropped`, `shed`
-        self._gathered: dict[Name, tuple[Layout, list[Notification]]] = {}
+        self._gathered: dict[Name, tuple[Layout, list[Timed]]] = {}
         self._layouts: dict[tuple[str, ...], Layout] = {}
 
     def describe(self, units: dict[str, str]) -> None:
@@ -78,17 +83,26 @@ class Gathering:
         _check(new)
         before = (batch.seq - 1, batch.dropped, batch.shed)
         follows = batch.link == self._link and self._newest.get(new.stream) == before
-        events = [] if follows else self._missing(new)
+        steps = self.clock.steps(batch.received_ns, new.clocks)
+        why = None if follows else self._why_new(new)
+        if why is not None:
+            self.clock.connection()
+        offset_ns = self.clock.take(new.stream, batch.stamps_ns, new.clocks)
+        events = [] if follows and not steps else self._happened(new, why, steps, offset_ns)
         self._newest[new.stream] = (batch.seq, batch.dropped, batch.shed)
         if batch.stamps_ns:
             name = (self.session, self.connection, new.stream, id(layout))
-            self._gathered.setdefault(name, (layout, []))[1].append(new)
+            self._gathered.setdefault(name, (layout, []))[1].append((batch, offset_ns))
         return events
 
     def runs(self) -> list[Run]:
         """Everything gathered, and begin anew."""
         gathered, self._gathered = self._gathered, {}
         return [self._run(*name[:3], *found) for name, found in gathered.items()]
+
+    def now(self, kind: EventKind, text: str, moment: Moment, **data: Any) -> Record:
+        """As `event`, of an instant of ours."""
+        return self.event(kind, text, self.clock.recorded_ns(moment), **data)
 
     def event(
         self, kind: EventKind, text: str, utc_ns: int, stamp_ns: int | None = None, **data: Any
@@ -106,18 +120,28 @@ class Gathering:
         }
         return Record("events", fields)
 
-    def _missing(self, new: Notification) -> list[Record]:
+    def _why_new(self, new: Notification) -> str | None:
+        """Why a connection begins with this, if one does."""
+        if new.batch.link != self._link:
+            return "the link was made again"
+        if new.batch.seq <= self._newest.get(new.stream, (-1, 0, 1))[0]:
+            return "the stream's numbers began anew"
+        return None
+
+    def _happened(
+        self, new: Notification, why: str | None, steps: Iterable[Step], offset_ns: int
+    ) -> list[Record]:
+        """The events that a notification tells of."""
         batch, events = new.batch, []
         first_ns = batch.stamps_ns[0] if batch.stamps_ns else None
-        utc_ns = new.received_utc_ns if first_ns is None else first_ns + new.utc_offset_ns
+        came = Moment(batch.received_ns + new.clocks.to_utc_ns, new.clocks.to_utc_ns)
+        utc_ns = self.clock.recorded_ns(came) if first_ns is None else first_ns + offset_ns
 
         def happened(kind: EventKind, text: str, **data: Any) -> None:
             events.append(self.event(kind, text, utc_ns, first_ns, stream=new.stream, seq=batch.seq, **data))
 
-        if batch.link != self._link:
-            self._new_connection(batch.link, "the link was made again", happened)
-        elif batch.seq <= self._newest.get(new.stream, (-1, 0, 1))[0]:
-            self._new_connection(batch.link, "the stream's numbers began anew", happened)
+        if why is not None:
+            self._new_connection(batch.link, why, happened)
         # Counted here: what waited too long for us behind the link is missing as well.
         newest, dropped, shed = self._newest.get(new.stream, (batch.seq - batch.missed - 1, 0, 1))
         missed, rows = batch.seq - newest - 1, batch.dropped - dropped
@@ -134,6 +158,9 @@ class Gathering:
                 f"one row of {batch.shed}: it keeps to its max_cpu_percent" if batch.shed > 1 else "every row"
             )
             happened(EventKind.SHED, f"the robot sends {share}", shed=batch.shed)
+        for step in steps:
+            data = {"whose": step.whose, "from": step.from_ns, "to": step.to_ns}
+            happened(EventKind.CLOCK_STEP, str(step), **data)
         return events
 
     def _new_connection(self, link: int, why: str, happened: Callable[[EventKind, str], None]) -> None:
@@ -156,9 +183,9 @@ class Gathering:
         connection: str,
         stream: int,
         layout: Layout,
-        found: list[Notification],
+        found: list[Timed],
     ) -> Run:
-        batches = [new.batch for new in found]
+        batches = [batch for batch, _ in found]
         counts = [len(batch.stamps_ns) for batch in batches]
         stamps_ns = itertools.chain.from_iterable(batch.stamps_ns for batch in batches)
         return Run(
@@ -170,7 +197,7 @@ class Gathering:
             stamps_ns=np.fromiter(stamps_ns, np.int64, sum(counts)),
             seqs=np.repeat(np.array([batch.seq for batch in batches], np.int64), counts),
             rows=np.concatenate([np.arange(count, dtype=np.int64) for count in counts]),
-            utc_offset_ns=np.repeat(np.array([new.utc_offset_ns for new in found], np.int64), counts),
+            utc_offset_ns=np.repeat(np.array([offset_ns for _, offset_ns in found], np.int64), counts),
             values=np.concatenate([_values(batch) for batch in batches], axis=1),
         )
 
@@ -178,7 +205,7 @@ class Gathering:
 def _check(new: Notification) -> None:
     """Refuse what would keep every robot's rows from being written."""
     arriving.batch(new.stream, new.batch)
-    if new.utc_offset_ns not in arriving.NUMBERS:
+    if new.clocks.to_utc_ns - new.clocks.robot_ns not in arriving.NUMBERS:
         raise arriving.Unfit("the robot's clock is larger than 8 bytes hold")
 
 

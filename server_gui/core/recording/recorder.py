@@ -14,6 +14,7 @@ from gateway.client import Batch
 from gateway.messages import Description, ResourceSnapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES
 from server_gui.core.recording import records
+from server_gui.core.recording.clocks import Moment, Reading
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.gathering import EventKind, Notification
 from server_gui.core.recording.journals import Entry
@@ -139,17 +140,17 @@ class Recorder:
 
     def record(self, robot: str, stream: int, batch: Batch, clock_offset_ns: int | None = None) -> int:
         """Keep a notification. `clock_offset_ns` is the robot's monotonic clock minus ours, where known."""
-        to_utc_ns = time.time_ns() - time.monotonic_ns()
-        if clock_offset_ns is None:  # then the newest row is taken to have come without delay
+        robot_ns = clock_offset_ns
+        if robot_ns is None:  # then the newest row is taken to have come without delay
             newest_ns = batch.stamps_ns[-1] if batch.stamps_ns else batch.received_ns
-            clock_offset_ns = newest_ns - batch.received_ns
-        new = Notification(stream, batch, to_utc_ns - clock_offset_ns, batch.received_ns + to_utc_ns)
+            robot_ns = newest_ns - batch.received_ns
+        clocks = Reading(Moment.now().to_utc_ns, robot_ns, known=clock_offset_ns is not None)
+        new = Notification(stream, batch, clocks)
         return self._put(robot, len(batch.stamps_ns), functools.partial(self._robots.take, robot, new))
 
     def describe(self, robot: str, description: Description) -> int:
         """Take the channels' units; a name that differs from `robot`, or is another's too, is an event."""
-        work = functools.partial(self._robots.describe, robot, description, time.time_ns())
-        return self._put(robot, 1, work, control=True)
+        return self._put(robot, 1, functools.partial(self._robots.describe, robot, description, Moment.now()))
 
     def begin(self, robot: str, facts: Facts) -> str:
         """Begin a session, end the one before, and give its name. The first row begins one where none is."""
@@ -163,16 +164,16 @@ class Recorder:
 
     def end(self, robot: str) -> int:
         """End the robot's session."""
-        return self._put(robot, 1, functools.partial(self._robots.end, robot), control=True)
+        return self._put(robot, 1, functools.partial(self._robots.end, robot, Moment.now()), control=True)
 
     def resources(self, robot: str, snapshot: ResourceSnapshot) -> int:
         """Keep a look at the robot's computer."""
-        return self._put(robot, 1, functools.partial(self._robots.resources, robot, time.time_ns(), snapshot))
+        return self._put(robot, 1, functools.partial(self._robots.resources, robot, Moment.now(), snapshot))
 
     def journal(self, robot: str, entries: Sequence[Entry]) -> int:
         """Keep what is new in a tail of the robot's journal."""
         return self._put(
-            robot, len(entries), functools.partial(self._robots.journal, robot, entries, time.time_ns())
+            robot, len(entries), functools.partial(self._robots.journal, robot, entries, Moment.now())
         )
 
     def refused(self, robot: str, what: str, why: str) -> int:
@@ -185,9 +186,9 @@ class Recorder:
 
     def event(self, robot: str, kind: EventKind, text: str, **data: Any) -> int:
         """Keep that something happened to the robot now."""
-        utc_ns = time.time_ns()
+        moment = Moment.now()
         return self._put(
-            robot, 1, lambda: [self._robots.known(robot).event(kind, text, utc_ns, **data)], control=True
+            robot, 1, lambda: [self._robots.known(robot).now(kind, text, moment, **data)], control=True
         )
 
     def add(self, *added: Record) -> int:
@@ -199,7 +200,8 @@ class Recorder:
         """
         _check(added)
         control = {record.table for record in added} <= CONTROL
-        return self._put(added[0].fields.get("robot", ""), len(added), lambda: added, control=control)
+        robot = added[0].fields.get("robot", "")
+        return self._put(robot, len(added), lambda: map(self._robots.timed, added), control=control)
 
     def cut(self, then: Callable[[], None]) -> int:
         """End the batch with what was handed in until now; `then` is called when it waits for upload."""

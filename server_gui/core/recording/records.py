@@ -30,7 +30,7 @@ class Facts(msgspec.Struct, frozen=True):
 
 
 class Session(msgspec.Struct, frozen=True):
-    """A stretch of one robot's recording. Of several rows with one name in the store, the newest holds."""
+    """A stretch of one robot's recording. Of several rows with one name in the store, the last holds."""
 
     robot: str
     name: str
@@ -60,9 +60,9 @@ class Session(msgspec.Struct, frozen=True):
         """The same session, of which more is known now."""
         return msgspec.structs.replace(self, facts=facts)
 
-    def ended(self) -> "Session":
-        """The same session, ended now."""
-        return msgspec.structs.replace(self, ended_utc_ns=time.time_ns())
+    def ended(self, utc_ns: int) -> "Session":
+        """The same session, ended at this time; never before it began."""
+        return msgspec.structs.replace(self, ended_utc_ns=max(self.began_utc_ns, utc_ns))
 
 
 def begin(robot: str, facts: Facts) -> Session:

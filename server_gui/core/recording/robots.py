@@ -1,12 +1,13 @@
 """What is known of every robot while recording: sessions, names, journals. For the recorder's thread."""
 
 import logging
-import time
 from collections.abc import Iterable, Mapping, Sequence
 
 from gateway.messages import Description, ResourceSnapshot
+from ml.store.tables import PREDICTIONS
 from server_gui.core import arriving
 from server_gui.core.recording import records
+from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.gathering import EventKind, Gathering, Notification
 from server_gui.core.recording.journals import Entry, news
 from server_gui.core.recording.records import Facts, Session
@@ -45,8 +46,9 @@ class Robots:
     def begin(self, session: Session) -> list[Record]:
         """Begin a session, and end the one before."""
         begun = session.record()  # may raise: then there is no such session
-        ended = self.end(session.robot)
+        ended = self.end(session.robot, Moment.now())
         self.known(session.robot).session = session.name
+        self.known(session.robot).clock.session()
         self._sessions[session.robot] = session
         return [*ended, begun]
 
@@ -60,11 +62,12 @@ class Robots:
         self._sessions[robot] = amended
         return [record]
 
-    def end(self, robot: str) -> list[Record]:
+    def end(self, robot: str, now: Moment) -> list[Record]:
         """End the robot's session, if there is one."""
-        self.known(robot).session = ""
+        known = self.known(robot)
+        known.session = ""
         session = self._sessions.pop(robot, None)
-        return [] if session is None else [session.ended().record()]
+        return [] if session is None else [session.ended(known.clock.recorded_ns(now)).record()]
 
     def sessions(self) -> list[Record]:
         """Of every session that goes on what is known of it, once more."""
@@ -72,26 +75,37 @@ class Robots:
 
     def end_all(self) -> list[Record]:
         """End every session."""
-        return [record for robot in list(self._sessions) for record in self.end(robot)]
+        now = Moment.now()
+        return [record for robot in list(self._sessions) for record in self.end(robot, now)]
 
-    def describe(self, robot: str, description: Description, utc_ns: int) -> list[Record]:
+    def timed(self, record: Record) -> Record:
+        """A prediction with the UTC that the row has which it is about; any other record as it is."""
+        known = self._robots.get(record.fields.get("robot", ""))
+        stamp_ns = record.fields.get("stamp_ns")
+        if record.table != PREDICTIONS.name or known is None or stamp_ns is None:
+            return record
+        utc_ns = known.clock.utc_ns(stamp_ns)
+        return record if utc_ns is None else Record(record.table, record.fields | {"utc": utc_ns})
+
+    def describe(self, robot: str, description: Description, now: Moment) -> list[Record]:
         """Take the channels' units; a name that differs from `robot`, or is another's too, is an event."""
         self.known(robot).describe({channel.name: channel.unit for channel in description.channels})
         found: list[Record] = []
         if description.robot != robot:
             problem = f"{robot} in the server's file calls itself {description.robot}"
-            found += self._tell(robot, problem, EventKind.NAME, utc_ns)
+            found += self._tell(robot, problem, EventKind.NAME, now)
         other = self._names.setdefault(description.robot, robot)
         if other != robot:
             problem = f"{robot} and {other} both call themselves {description.robot}"
-            found += self._tell(robot, problem, EventKind.NAME, utc_ns)
+            found += self._tell(robot, problem, EventKind.NAME, now)
         return found
 
-    def resources(self, robot: str, utc_ns: int, snapshot: ResourceSnapshot) -> list[Record]:
+    def resources(self, robot: str, now: Moment, snapshot: ResourceSnapshot) -> list[Record]:
         """A look at the robot's computer."""
-        return [records.resources(robot, self.known(robot).session, utc_ns, snapshot)]
+        known = self.known(robot)
+        return [records.resources(robot, known.session, known.clock.recorded_ns(now), snapshot)]
 
-    def journal(self, robot: str, entries: Sequence[Entry], utc_ns: int) -> list[Record]:
+    def journal(self, robot: str, entries: Sequence[Entry], now: Moment) -> list[Record]:
         """What is new in a tail of the robot's journal.
 
         Raises:
@@ -105,7 +119,7 @@ class Robots:
             self.heads[robot] = JournalHead(entries[-1]["n"], entries[-1]["hash"])
         if new.missing:
             text = f"{new.missing} entries of the robot's journal were never seen"
-            found.append(self.known(robot).event(EventKind.JOURNAL_GAP, text, utc_ns, missing=new.missing))
+            found.append(self.known(robot).now(EventKind.JOURNAL_GAP, text, now, missing=new.missing))
         return found
 
     def forget(self, robot: str, kept: Mapping[str, JournalHead]) -> None:
@@ -116,24 +130,24 @@ class Robots:
 
     def lost(self, rows: int, whose: str = "") -> list[Record]:
         """That rows were lost here; of nobody knows whom: told in the recording of every robot there is."""
-        now_ns = time.time_ns()
+        now = Moment.now()
         if whose in self._robots:
             text = f"this server lost {rows} rows of {whose}"
-            return [self._robots[whose].event(EventKind.LOST, text, now_ns, rows=rows)]
+            return [self._robots[whose].now(EventKind.LOST, text, now, rows=rows)]
         text = f"this server lost {rows} rows of all its robots"
-        return [robot.event(EventKind.LOST, text, now_ns, rows=rows) for robot in self._robots.values()]
+        return [robot.now(EventKind.LOST, text, now, rows=rows) for robot in self._robots.values()]
 
     def refused(self, robot: str, what: str, why: str) -> list[Record]:
         """That the robot sent what cannot be kept; of each `what` the first time is enough to know it."""
         text = f"{robot}: {what}: {why}" if what else f"{robot} sent what cannot be kept: {why}"
-        return self._tell(robot, f"refused {what}", EventKind.REFUSED, time.time_ns(), text)
+        return self._tell(robot, f"refused {what}", EventKind.REFUSED, Moment.now(), text)
 
     def _tell(
-        self, robot: str, problem: str, kind: EventKind, utc_ns: int, text: str | None = None
+        self, robot: str, problem: str, kind: EventKind, now: Moment, text: str | None = None
     ) -> list[Record]:
         """An event for what is wrong with a robot, and a line in the log: once."""
         if (robot, problem) in self._told:
             return []
         self._told.add((robot, problem))
         log.warning("%s", text or problem)
-        return [self.known(robot).event(kind, text or problem, utc_ns)]
+        return [self.known(robot).now(kind, text or problem, now)]

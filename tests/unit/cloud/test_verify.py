@@ -1,9 +1,9 @@
 """What is lost, damaged or was never sent is found and named, on a folder and on an S3 server."""
 
+import dataclasses
 from pathlib import Path
 
 from ml.store import Store
-from ml.store.fragments import DataFile
 from server_gui.core.cloud import verify
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
@@ -74,7 +74,7 @@ def test_damage_among_the_values_is_found_by_reading_them(store_url: str, tmp_pa
 def test_rows_that_are_not_in_a_file_are_found(store_url: str, tmp_path: Path) -> None:
     recorded = record(store_url, tmp_path / "spool")
     [file] = [file for file in verify.files(recorded.store) if file.location == "events"]
-    more = DataFile(file.location, file.path, 9, file.size_bytes, None, None, None, None)
+    more = dataclasses.replace(file, rows=9)
     [problem] = verify.damages(recorded.store, [more], lambda _: None, deep=False)
     assert problem.endswith("has 2 rows instead of 9")
 
