@@ -176,6 +176,10 @@ class Store:
             return {}
         return {field.name: field.metadata.get("unit") for field in delta.schema().fields}
 
+    def identity(self, location: str) -> str:
+        """What the table is called for ever, in copies of the store too."""
+        return str((self._open.get(location) or self.table(location)).metadata().id)
+
     # --- inside
 
     def _about(self, wanted: About) -> About:

@@ -49,7 +49,7 @@ class Recordings:
         self._url = url
         self._spool = spool
         self._batches = spooled.waiting(self._spool)
-        self._name = spooled.identity(self._spool)
+        self._writers: dict[int, str] = {}  # of the batches
         self._store: Snapshot | None = None
         self._reach()
 
@@ -127,7 +127,12 @@ class Recordings:
         """The batches of the spool that are not in this table."""
         if self._store is None:
             return self._batches
-        return [each for each in self._batches if not self._store.has(location, self._name, each)]
+        return [each for each in self._batches if not self._store.has(location, self._writer(each), each)]
+
+    def _writer(self, batch: int) -> str:
+        if batch not in self._writers:
+            self._writers[batch] = spooled.writer(self._spool, batch)
+        return self._writers[batch]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
-from server_gui.core.recording.segment import translated
+from server_gui.core.recording.segment import translated, unaltered
 
 _NUMBER: Final = "[0-9]" * 8
 _decoder = msgspec.msgpack.Decoder(Record)
@@ -24,9 +24,9 @@ _layout_decoder = msgspec.msgpack.Decoder(Layout)
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A batch: whose telemetry is in it, and rows of which other tables."""
+    """A batch: who brings it to the store, whose telemetry is in it, and rows of which other tables."""
 
-    spool: str
+    writer: str
     number: int
     robots: frozenset[str]
     tables: frozenset[str]
@@ -49,11 +49,11 @@ def sessions(spool: Path) -> list[Session]:
 
 def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> list[dict[str, Any]]:
     """A table's rows in these batches, or in all that wait, as the store has them."""
-    name = identity(spool)
     found = [
         record.fields | {"spool": name, "batch": batch, "number": number}
         for batch in (waiting(spool) if batches is None else batches)
-        for number, record in enumerate(_records(spool, batch))
+        for name in [writer(spool, batch)]
+        for number, record in _records(spool, batch)
         if record.table == table.name
     ]
     made: list[dict[str, Any]] = table.rows(found).to_pylist()
@@ -73,9 +73,15 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
 
 
 def identity(spool: Path) -> str:
-    """What the spool is called at the store; nothing where there is none."""
+    """What the spool is called; nothing where there is none."""
     file = spool / "id"
     return file.read_text().strip() if file.exists() else ""
+
+
+def writer(spool: Path, number: int) -> str:
+    """Who brings a batch to the store, by name."""
+    found = _read(spool, number, "SELECT value FROM meta WHERE key = 'writer'")
+    return str(found[0][0]) if found else identity(spool)
 
 
 def uploaded(spool: Path) -> list[int]:
@@ -86,13 +92,16 @@ def uploaded(spool: Path) -> list[int]:
 def batch(spool: Path, number: int) -> Batch:
     """What is in a batch."""
     robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))
-    tables = frozenset(record.table for record in _records(spool, number))
-    return Batch(identity(spool), number, robots, tables)
+    tables = frozenset(record.table for _, record in _records(spool, number))
+    return Batch(writer(spool, number), number, robots, tables)
 
 
-def _records(spool: Path, batch: int) -> list[Record]:
-    found = _read(spool, batch, "SELECT content FROM record ORDER BY number")
-    return [_decoder.decode(content) for (content,) in found]
+def _records(spool: Path, batch: int) -> list[tuple[int, Record]]:
+    """With their numbers; without those that are damaged."""
+    found = _read(spool, batch, "SELECT * FROM record ORDER BY number")  # older ones have no checksums
+    return [
+        (number - 1, _decoder.decode(content)) for number, content, *crc in found if unaltered(content, *crc)
+    ]
 
 
 def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ...]]:

@@ -63,7 +63,7 @@ def _decoded(store: Store, file: DataFile) -> int:
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
     """The spool's batches that are marked as uploaded, and are not in every table that they belong to."""
-    known: dict[str, int] = {}
+    known: dict[tuple[str, str], int] = {}
     for number in spooled.uploaded(spool):
         try:
             batch = spooled.batch(spool, number)
@@ -71,9 +71,9 @@ def batches_missing(store: Store, spool: Path) -> Iterator[str]:
             yield str(error)
             continue
         for location in _locations(store, batch):
-            if location not in known:
-                known[location] = _newest(store, location, batch.spool)
-            if known[location] < batch.number:
+            if (location, batch.writer) not in known:
+                known[location, batch.writer] = _newest(store, location, batch.writer)
+            if known[location, batch.writer] < batch.number:
                 yield f"batch {batch.number} of the spool {spool} is not in {store.url}/{location}"
 
 
@@ -82,9 +82,9 @@ def _locations(store: Store, batch: spooled.Batch) -> list[str]:
     return sorted(telemetry | batch.tables)
 
 
-def _newest(store: Store, location: str, spool: str) -> int:
-    """Up to which batch of the spool the table has everything."""
+def _newest(store: Store, location: str, writer: str) -> int:
+    """Up to which of the writer's batches the table has everything."""
     try:
-        return store.table(location).transaction_version(spool) or 0
+        return store.table(location).transaction_version(writer) or 0
     except NoSuchTable:
         return 0

@@ -3,6 +3,7 @@
 RecordingError
 └── SpoolUnusable   the spool's folder or one of its files cannot be used; says what to do
     ├── Damaged     a file of it is no database any more, or not one of ours
+    │   └── Contradicted   the store has something else by the same name
     └── NotKept     what was to be kept is such that no file of it takes it; in parts the rest is taken
 """
 
@@ -17,6 +18,10 @@ class SpoolUnusable(RecordingError):
 
 class Damaged(SpoolUnusable):
     """A file of the spool does not hold what was written to it."""
+
+
+class Contradicted(Damaged):
+    """The store has other rows than a file of the spool by the same name, or one of them twice."""
 
 
 class NotKept(SpoolUnusable):

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import operator
 import sqlite3
+import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -24,8 +25,12 @@ CREATE TABLE IF NOT EXISTS run (
     crc INTEGER, -- as `_crc`; null in segments from before there was one
     PRIMARY KEY (robot, connection, stream, seq, row)
 );
-CREATE TABLE IF NOT EXISTS record (number INTEGER PRIMARY KEY, content BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS record (
+    number INTEGER PRIMARY KEY, content BLOB NOT NULL,
+    crc INTEGER -- of the content; null in segments from before there was one
+);
 CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL);
 """
 ROWS_AT_ONCE: Final = 20_000  # that are in memory as columns
 PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hardly one
@@ -57,6 +62,7 @@ def translated(file: Path) -> Iterator[None]:
 class DamagedRun(NamedTuple):
     """What a run that is not as it was written says of itself, which may be wrong too."""
 
+    number: int  # in its segment
     robot: str
     session: str
     connection: str
@@ -65,8 +71,18 @@ class DamagedRun(NamedTuple):
     rows: int
 
 
+class DamagedRecord(NamedTuple):
+    """A record that is not as it was written; whose it was only where that can still be read."""
+
+    number: int
+    robots: tuple[str, ...]  # any of these
+
+
 class Segment:
-    """A database of the spool, for one thread at a time."""
+    """A database of the spool, for one thread at a time.
+
+    `writer` is who brings it to the store, by name; None in segments from before they said so.
+    """
 
     def __init__(self, path: Path, number: int) -> None:
         self.path = path
@@ -89,12 +105,39 @@ class Segment:
                 self._layouts[robot, _layout_decoder.decode(description)] = number
                 self._sums[number] = _sum(robot, description)
             self.rows = self._count()
+            self.writer = self._told("writer")
 
     def _bring_forward(self) -> None:
         """Give a segment from before there were checksums room for them."""
-        columns = [column[1] for column in self._database.execute("PRAGMA table_info(run)")]
-        if "crc" not in columns:
-            self._database.execute("ALTER TABLE run ADD COLUMN crc INTEGER")
+        for table in ("run", "record"):
+            columns = [column[1] for column in self._database.execute(f"PRAGMA table_info({table})")]
+            if "crc" not in columns:
+                self._database.execute(f"ALTER TABLE {table} ADD COLUMN crc INTEGER")
+
+    def name(self, writer: str) -> None:
+        """Say who brings it to the store; while nothing is in it."""
+        self._tell("began", str(time.time_ns()))
+        self._tell("writer", writer)
+        self.writer = writer
+
+    @property
+    def began_utc_ns(self) -> int:
+        """About when its first row came; the same whenever it is asked."""
+        began = self._told("began")
+        return self.path.stat().st_mtime_ns if began is None else int(began)
+
+    def _tell(self, key: str, value: str) -> None:
+        line = (key, value, zlib.crc32(f"{key}={value}".encode()))
+        self._database.execute("INSERT OR REPLACE INTO meta VALUES (?, ?, ?)", line)
+
+    def _told(self, key: str) -> str | None:
+        found = self._database.execute("SELECT value, crc FROM meta WHERE key = ?", [key]).fetchone()
+        if found is None:
+            return None
+        value, crc = found
+        if crc != zlib.crc32(f"{key}={value}".encode()):
+            raise Damaged(f"the spool's file {self.path} is damaged: its {key} is not as it was written")
+        return str(value)
 
     def _count(self) -> int:
         runs = self._database.execute("SELECT coalesce(sum(rows), 0) FROM run").fetchone()[0]
@@ -115,8 +158,8 @@ class Segment:
                 [self._line(run) for run in runs],
             )
             self._database.executemany(
-                "INSERT INTO record (content) VALUES (?)",
-                [(_encoder.encode(record),) for record in records],
+                "INSERT INTO record (content, crc) VALUES (?, ?)",
+                [(content, zlib.crc32(content)) for content in map(_encoder.encode, records)],
             )
             self._database.executemany(
                 "INSERT OR REPLACE INTO journal_head VALUES (?, ?, ?)",
@@ -176,18 +219,18 @@ class Segment:
         """The runs that are not as they were written: `runs` leaves them out."""
         with translated(self.path):
             return [
-                DamagedRun(str(robot), str(session), str(connection), stream, seq, rows)
-                for robot, connection, stream, seq, _, rows, session, *_ in itertools.filterfalse(
-                    self._sound, self._lines()
-                )
+                DamagedRun(number, str(robot), str(session), str(connection), stream, seq, rows)
+                for number, *line in self._lines("rowid, ")
+                if not self._sound(line)
+                for robot, connection, stream, seq, _, rows, session, *_ in [line]
             ]
 
-    def _lines(self) -> Iterator[tuple[Any, ...]]:
+    def _lines(self, more: str = "") -> Iterator[tuple[Any, ...]]:
         return self._database.execute(
-            f"SELECT {_COLUMNS} FROM run ORDER BY robot, connection, stream, seq, row"
+            f"SELECT {more}{_COLUMNS} FROM run ORDER BY robot, connection, stream, seq, row"
         )
 
-    def _sound(self, line: tuple[Any, ...]) -> bool:
+    def _sound(self, line: Sequence[Any]) -> bool:
         """Whether a run is as it was written, as far as anybody knows."""
         *name, data, crc = line
         if not isinstance(data, bytes):
@@ -195,10 +238,33 @@ class Segment:
         return crc is None or crc == _crc(self._sums.get(name[-1], 0), tuple(name), data)
 
     def records(self) -> Iterator[Record]:
-        """Every record, in the order in which it was recorded."""
+        """Every record, in the order in which it was recorded; without those that are `damaged_records`."""
+        return (record for _, record in self.numbered())
+
+    def numbered(self) -> Iterator[tuple[int, Record]]:
+        """The same, each with its number: 0, 1, 2, …, also of those that are damaged."""
         with translated(self.path):
-            for (content,) in self._database.execute("SELECT content FROM record ORDER BY number"):
-                yield _record_decoder.decode(content)
+            for number, content, crc in self._contents():
+                if unaltered(content, crc):
+                    yield number, _record_decoder.decode(content)
+
+    def damaged_records(self) -> list[DamagedRecord]:
+        """The records that are not as they were written: `records` leaves them out."""
+        with translated(self.path):
+            found = [(n, content) for n, content, crc in self._contents() if not unaltered(content, crc)]
+            return [DamagedRecord(number, self._whose(content)) for number, content in found]
+
+    def _contents(self) -> Iterator[tuple[int, Any, int | None]]:
+        return self._database.execute("SELECT number - 1, content, crc FROM record ORDER BY number")
+
+    def _whose(self, content: Any) -> tuple[str, ...]:
+        """Whose record it may have been: what it says itself, where that is a robot; else any."""
+        known = {robot for robot, _ in self._layouts}
+        known |= {str(record.fields["robot"]) for record in self.records() if "robot" in record.fields}
+        with contextlib.suppress(msgspec.MsgspecError, TypeError):
+            told = _record_decoder.decode(content).fields.get("robot")
+            known = {told} if told in known else known
+        return tuple(sorted(known))
 
     def heads(self) -> dict[str, JournalHead]:
         """The newest journal entry of each robot that is known here."""
@@ -224,6 +290,11 @@ class Segment:
             with contextlib.suppress(FileNotFoundError):  # SQLite removes its log when it is closed
                 size += path.with_name(path.name + suffix).stat().st_size
         return size
+
+
+def unaltered(content: object, crc: int | None = None) -> bool:
+    """Whether a record is as it was written, as far as anybody knows."""
+    return isinstance(content, bytes) and crc in (None, zlib.crc32(content))
 
 
 def _text(raw: bytes) -> str:

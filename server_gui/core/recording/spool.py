@@ -3,7 +3,9 @@
 `00000007.db` is a segment; the highest number is written, all others are frozen, and a segment's number is
 the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in the store and goes when room
 is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are not in the store, and it
-stays for somebody to look at. The highest number is never removed, so that no number is given twice.
+stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
+somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
+`receipts.jsonl` says what of each segment is in the store (receipts.py).
 """
 
 import contextlib
@@ -24,6 +26,7 @@ import msgspec
 
 from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
+from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import SUFFIXES, Segment
 
@@ -59,6 +62,9 @@ def _free_bytes(folder: Path) -> int:
 class Spool:
     """One server's spool; use it as a context manager.
 
+    `writer` is what this opening of it is called at the store: the spool's `id`, a dot, and what no other
+    opening has, because no opening can know that nobody has changed the files since the one before.
+
     `append` and `freeze` belong to one thread, the recorder's. Everything else may be called from others.
 
     Raises:
@@ -80,9 +86,13 @@ class Spool:
         self._lock = _take(folder)
         try:
             self.id = self._identify()
+            self.writer = f"{self.id}.{uuid.uuid4().hex[:12]}"
+            self.receipts = Receipts(folder / RECEIPTS)
+            self._writers = {self.id}
             self._heads = self._known_heads()
             self._began_ns: int | None = None
             self._current = self._resume()
+            self.first = self._current.number  # of what this opening writes
         except BaseException:
             self._lock.close()
             raise
@@ -149,6 +159,11 @@ class Spool:
 
     # --- any thread
 
+    def earlier_writers(self) -> set[str]:
+        """What the openings before this one were called at the store, as far as anybody knows."""
+        newest = self.receipts.newest()
+        return (self._writers | ({newest.writer} if newest else set())) - {self.writer}
+
     def waiting(self) -> list[int]:
         """Segments that are frozen and not uploaded, oldest first."""
         written = self._current.number  # a higher one may be in the making
@@ -159,7 +174,7 @@ class Spool:
         return Segment(self._path(number), number)
 
     def uploaded(self, number: int) -> None:
-        """The segment is in the store, durably: it may go when room is needed."""
+        """The segment is in the store, durably, and has its receipt: it may go when room is needed."""
         self._path(number).rename(self._path(number, Kept.UPLOADED))
         _sync(self.folder)
 
@@ -231,6 +246,7 @@ class Spool:
     def _heads_of(self, number: int, kept: Kept) -> dict[str, JournalHead]:
         try:
             with contextlib.closing(Segment(self._path(number, kept), number)) as segment:
+                self._writers.add(segment.writer or self.id)
                 return segment.heads()
         except Damaged as error:
             if kept is Kept.WAITING:
@@ -240,8 +256,12 @@ class Spool:
     def _resume(self) -> Segment:
         """The segment to write now: a new one, unless the newest is still empty."""
         newest, kept = self._segments()[-1] if self._segments() else (0, Kept.UPLOADED)
-        if kept is not Kept.WAITING:
-            return self._begin(newest + 1)
+        receipt = self.receipts.newest()
+        known = receipt.batch if receipt else 0
+        if known > newest:
+            log.error("files are missing in the spool %s: batch %d was uploaded from it", self.folder, known)
+        if kept is not Kept.WAITING or known > newest:
+            return self._begin(max(newest, known) + 1)
         segment = self._begin(newest)
         if not segment.rows:
             return segment
@@ -251,6 +271,7 @@ class Spool:
     def _begin(self, number: int) -> Segment:
         segment = Segment(self._path(number), number)
         try:
+            segment.name(self.writer)
             segment.append((), (), self._heads)
         except sqlite3.Error as error:
             segment.close()

@@ -2,88 +2,202 @@
 
 import contextlib
 import functools
-import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import pyarrow as pa
 
+from ml.store.errors import NoSuchTable
 from ml.store.store import Store
-from ml.store.tables import TABLES, TELEMETRY
+from ml.store.tables import SESSIONS, TABLES, TELEMETRY, Table
+from server_gui.core.recording import lacking
 from server_gui.core.recording.columns import Columns
-from server_gui.core.recording.errors import Damaged
+from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.receipts import Part, Receipt
 from server_gui.core.recording.rows import Record
-from server_gui.core.recording.segment import DamagedRun, Segment
+from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
 from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.tally import Tally, tallied
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What of a segment is in the store now, by which writer; `lost` tells what its damage has taken."""
+
+    writer: str
+    parts: tuple[Part, ...]
+    lost: tuple[str, ...]
 
 
 def send(spool: Spool, number: int, store: Store) -> None:
     """Bring a frozen segment of the spool into the store, and tell the spool; raises as `upload` does.
 
     One that is damaged is set aside, and raises `Damaged`: those after it may be sent. Of one where only runs
-    are damaged all the rest is in the store then, and that these are lost.
+    or records are damaged all the rest is in the store then, and that these are lost.
     """
     try:
         with contextlib.closing(spool.read(number)) as segment:
-            lost = upload(segment, spool.id, store)
+            sent = upload(segment, spool.id, store)
+    except Contradicted as error:
+        aside = spool.set_aside(number)
+        raise Contradicted(
+            f"{error}; it is kept as {aside.name}, and is not in the store as a whole"
+        ) from error
     except Damaged as error:
         aside = spool.set_aside(number)
         raise Damaged(f"{error}; it is kept as {aside.name}, and its rows are not in the store") from error
-    if lost:
+    spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
+    if sent.lost:
         aside = spool.set_aside(number)
-        raise Damaged(
-            f"{'; '.join(map(_told, lost))}; {aside.name} is kept, and all else of it is in the store"
-        )
+        raise Damaged(f"{'; '.join(sent.lost)}; {aside.name} is kept, and all else of it is in the store")
     spool.uploaded(number)
 
 
-def upload(segment: Segment, spool: str, store: Store) -> list[DamagedRun]:
-    """Append everything in the segment to the store's tables; the runs that are damaged, as events.
+def upload(segment: Segment, spool: str, store: Store) -> Sent:
+    """Append everything in the segment to the store's tables; what is damaged, as events.
 
-    Its number is the transaction's version in each table that it touches, and `spool` the writer's name.
-    Interrupted anywhere, it is simply called again.
+    Its number is the transaction's version in each table that it touches, and its own writer's name, or
+    `spool` where it has none, the transaction's. Where a table knows the number, what it lacks of the segment
+    is added. Interrupted anywhere, it is simply called again.
 
     Raises:
         StoreError: it is not known what of it is in the store.
+        Contradicted: the store has something else by the same name.
 
     """
+    writer = segment.writer or spool
+    parts: list[Part] = []
     for location, robots in _robots(segment, store).items():
-        _telemetry(segment, spool, store, location, robots)
-    found = defaultdict(list)
-    lost = segment.damaged()
-    for number, record in enumerate([*segment.records(), *map(_event, lost)]):
-        origin = {"spool": spool, "batch": segment.number, "number": number}
+        parts += _telemetry(segment, writer, store, location, robots)
+    lost = [*map(_run_lost, segment.damaged()), *map(_record_lost, segment.damaged_records())]
+    found: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    losses = (each for event in lost for each in event.records(segment.began_utc_ns))
+    for number, record in (*segment.numbered(), *losses):
+        origin = {"spool": writer, "batch": segment.number, "number": number}
         found[record.table].append(record.fields | origin)
-    for name, rows in found.items():
-        data = TABLES[name].rows(rows)
-        again = functools.partial(data.to_reader, None)
-        store.append(TABLES[name], name, data.schema, again, spool, segment.number)
-    return lost
+    parts += [
+        _rows(TABLES[name], TABLES[name].rows(rows), writer, segment.number, store)
+        for name, rows in found.items()
+    ]
+    return Sent(writer, tuple(parts), tuple(event.text for event in lost))
 
 
-def _told(lost: DamagedRun) -> str:
-    return (
+def ahead(spool: Spool, store: Store) -> list[str]:
+    """In words, where the store has batches of this spool that the spool itself has never had.
+
+    Then somebody has put an older copy of the spool in its place. What is recorded now is kept apart.
+    """
+    found = []
+    for location in (*TELEMETRY.locations(store.about.shards), SESSIONS.name):
+        with contextlib.suppress(NoSuchTable):
+            table = store.table(location)
+            newest = max(table.transaction_version(each) or 0 for each in spool.earlier_writers())
+            if newest >= spool.first:
+                found.append(
+                    f"{store.url}/{location} has batch {newest} of the spool {spool.folder}, which had only "
+                    f"{spool.first - 1} when it was opened: an older copy of it was put in its place, or "
+                    "files were removed. What was not uploaded of them is lost; what is recorded now is not"
+                )
+    return found
+
+
+def _telemetry(
+    segment: Segment, writer: str, store: Store, location: str, robots: set[str]
+) -> Iterable[Part]:
+    layouts = (layout for robot, layout in segment.layouts() if robot in robots)
+    columns = Columns(layouts, store.units(location))
+    tally = Tally()
+
+    def batches() -> Iterator[pa.RecordBatch]:
+        tally.clear()
+        for run in segment.runs():
+            if run.robot in robots:
+                batch = columns.batch(run)
+                tally.add(batch)
+                yield batch
+
+    if not store.append(TELEMETRY, location, columns.schema, batches, writer, segment.number):
+        look = functools.partial(lacking.of_telemetry, store, location)
+        _complete(store, TELEMETRY, location, writer, segment.number, lambda: look(batches()))
+    return tally.parts(location, store.identity(location))
+
+
+def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -> Part:
+    again = functools.partial(data.to_reader, None)
+    if not store.append(table, table.name, data.schema, again, writer, batch):
+        look = functools.partial(lacking.of_rows, store, table, data)
+        _complete(store, table, table.name, writer, batch, lambda: look().to_batches())
+    return tallied(data, table.name, store.identity(table.name))
+
+
+def _complete(
+    store: Store,
+    table: Table,
+    location: str,
+    writer: str,
+    batch: int,
+    look: Callable[[], list[pa.RecordBatch]],
+) -> None:
+    """Bring what the table lacks of a batch whose number it knows."""
+    rows = look()
+    if not rows:
+        return
+    named = lacking.name(writer, batch, rows)
+    new = store.append(table, location, rows[0].schema, lambda: iter(rows), named, 1)
+    if not new and look():
+        count = sum(each.num_rows for each in rows)
+        raise Contradicted(
+            f"{store.url}/{location} had {count} rows of batch {batch}, which were removed since"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Lost:
+    """Something of a segment that its damage has taken; its events have numbers that no record has."""
+
+    number: int
+    text: str
+    robots: tuple[str, ...]
+    session: str | None
+    connection: str | None
+    data: dict[str, int]
+
+    def records(self, utc_ns: int) -> Iterator[tuple[int, Record]]:
+        """The events that tell it, one a robot."""
+        for place, robot in enumerate(self.robots or ("",)):
+            fields = {
+                "robot": robot,
+                "session": self.session,
+                "utc": utc_ns,
+                "stamp_ns": None,
+                "connection": self.connection,
+                "kind": EventKind.LOST.value,
+                "text": self.text,
+                "data": msgspec.json.encode(self.data).decode(),
+            }
+            yield self.number - (place << 32), Record("events", fields)
+
+
+def _run_lost(lost: DamagedRun) -> _Lost:
+    text = (
         f"{lost.rows} rows of {lost.robot}, stream {lost.stream} from notification {lost.seq} on, "
         "were damaged in the spool and are not in the store"
     )
-
-
-def _event(lost: DamagedRun) -> Record:
-    """That a run is lost, in its robot's recording."""
     data = {"rows": lost.rows, "stream": lost.stream, "seq": lost.seq}
-    fields = {
-        "robot": lost.robot,
-        "session": lost.session,
-        "utc": time.time_ns(),
-        "stamp_ns": None,
-        "connection": lost.connection,
-        "kind": EventKind.LOST.value,
-        "text": _told(lost),
-        "data": msgspec.json.encode(data).decode(),
-    }
-    return Record("events", fields)
+    return _Lost(-2 * lost.number, text, (lost.robot,), lost.session, lost.connection, data)
+
+
+def _record_lost(lost: DamagedRecord) -> _Lost:
+    whose = lost.robots[0] if len(lost.robots) == 1 else f"one of {', '.join(lost.robots) or 'no robot'}"
+    text = (
+        f"row {lost.number} of a batch, of {whose} (a session, label, event or the like), "
+        "was damaged in the spool and is not in the store"
+    )
+    return _Lost(-2 * lost.number - 1, text, lost.robots, None, None, {"rows": 1})
 
 
 def _robots(segment: Segment, store: Store) -> dict[str, set[str]]:
@@ -92,13 +206,3 @@ def _robots(segment: Segment, store: Store) -> dict[str, set[str]]:
     for robot, _ in segment.layouts():
         robots[TELEMETRY.location(robot, store.about.shards)].add(robot)
     return robots
-
-
-def _telemetry(segment: Segment, spool: str, store: Store, location: str, robots: set[str]) -> None:
-    layouts = (layout for robot, layout in segment.layouts() if robot in robots)
-    columns = Columns(layouts, store.units(location))
-
-    def batches() -> Iterator[pa.RecordBatch]:
-        return (columns.batch(run) for run in segment.runs() if run.robot in robots)
-
-    store.append(TELEMETRY, location, columns.schema, batches, spool, segment.number)

@@ -14,7 +14,7 @@ from ml.store.store import Store
 from server_gui.core.recording.compacting import Compacting
 from server_gui.core.recording.errors import Damaged, RecordingError
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import send
+from server_gui.core.recording.upload import ahead, send
 from server_gui.core.watching import Worker
 
 log = logging.getLogger(__name__)
@@ -35,6 +35,7 @@ class UploaderState:
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
+    ahead: tuple[str, ...] = ()  # where the store has what this spool has lost, in words
 
 
 class Uploader:
@@ -58,6 +59,7 @@ class Uploader:
         self._wanted = wanted
         self._compacting = compacting
         self._store: Store | None = None
+        self._compared = False  # whether the store is ahead of the spool
         self._ending = threading.Event()
         self._asked = threading.Event()
         self._turned = threading.Event()  # it has looked at everything that waits
@@ -147,10 +149,20 @@ class Uploader:
 
     def _upload(self, number: int) -> None:
         began_s = time.monotonic()
-        self._store = self._store or self._connect()
+        self._store = self._store or self._reach()
         send(self._spool, number, self._store)
         took_s = time.monotonic() - began_s
         self.state = replace(self.state, uploaded=self.state.uploaded + 1, upload_s=took_s, problem=None)
+
+    def _reach(self) -> Store:
+        store = self._connect()
+        if not self._compared:
+            self._compared = True
+            found = tuple(ahead(self._spool, store))
+            for text in found:
+                log.error("%s", text)
+            self.state = replace(self.state, ahead=found)
+        return store
 
     def _tell(self, waiting: list[int]) -> None:
         backlog = self._spool.backlog_bytes()

@@ -1,0 +1,101 @@
+"""What of a batch the store lacks, where it knows the batch's number already.
+
+Usually nothing: a server was killed after the batch had arrived and before it knew. But a number may have
+been used by other rows, or by the same batch when parts of it were damaged: then what is not there is still
+to be brought, and what is there stays as it is.
+"""
+
+import hashlib
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset
+
+from ml.store import sums
+from ml.store.errors import translated
+from ml.store.store import Store
+from ml.store.tables import Table
+from server_gui.core.recording.errors import Contradicted
+
+TEXTS = ("robot", "session", "connection")  # alike in all rows of a run
+_column = pyarrow.dataset.field
+
+
+def of_telemetry(store: Store, location: str, batches: Iterable[pa.RecordBatch]) -> list[pa.RecordBatch]:
+    """The rows of these runs that the table does not have.
+
+    Raises:
+        Contradicted: it has one of them twice, or with other values.
+
+    """
+    with translated(f"{store.url}/{location} cannot be read"):
+        rows = store.dataset(location)
+        found = [_lacking(rows, batch, f"{store.url}/{location}") for batch in batches]
+    return [batch for batch in found if batch.num_rows]
+
+
+def of_rows(store: Store, table: Table, rows: pa.Table) -> pa.Table:
+    """The same of a batch's rows in another table."""
+    mine = (_column("spool") == rows["spool"][0]) & (_column("batch") == rows["batch"][0])
+    with translated(f"{store.url}/{table.name} cannot be read"):
+        found = store.dataset(table.name).to_table(filter=mine)
+    numbers = rows["number"].to_pylist()
+    known = _once(found["number"].to_pylist(), sums.of_rows(found).tolist(), f"{store.url}/{table.name}")
+    wrong = [
+        number
+        for number, ours in zip(numbers, sums.of_rows(rows).tolist(), strict=True)
+        if number >= 0 and known.get(number, ours) != ours  # below: losses, as they were told the first time
+    ]
+    if wrong:
+        raise Contradicted(
+            f"{store.url}/{table.name} has something else as row {wrong[0]} of this batch; "
+            f"so it has of {len(wrong)} of {len(numbers)} rows"
+        )
+    return rows.filter(pa.array([number not in known for number in numbers]))
+
+
+def name(writer: str, batch: int, rows: Sequence[pa.RecordBatch]) -> str:
+    """Whom to bring these rows as, so that exactly they are brought once."""
+    keys = ("connection", "stream", "seq", "row") if "connection" in rows[0].schema.names else ("number",)
+    told = repr([[each[key].to_pylist() for key in keys if key in each.schema.names] for each in rows])
+    return f"{writer}/{batch}.{hashlib.blake2b(told.encode(), digest_size=8).hexdigest()}"
+
+
+def numbers_alone(batch: pa.RecordBatch) -> tuple[pa.RecordBatch, dict[str, str]]:
+    """A run's columns of numbers, and the texts that its rows have in common."""
+    return batch.drop_columns(list(TEXTS)), {name: batch[name][0].as_py() for name in TEXTS}
+
+
+def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str) -> pa.RecordBatch:
+    mine, same = numbers_alone(batch)
+    extent = pc.min_max(batch["utc"])
+    named = (_column("utc") >= extent["min"]) & (_column("utc") <= extent["max"])
+    for key, value in (same | {"stream": batch["stream"][0]}).items():
+        named &= _column(key) == value
+    found = rows.to_table(columns=mine.schema.names, filter=named).combine_chunks()
+    [theirs] = found.to_batches() or [mine.slice(0, 0)]
+    known = _once(_keys(theirs), sums.of_numbers(theirs, same).tolist(), where)
+    keys = list(_keys(mine))
+    wrong = [
+        key
+        for key, ours in zip(keys, sums.of_numbers(mine, same).tolist(), strict=True)
+        if known.get(key, ours) != ours
+    ]
+    if wrong:
+        raise Contradicted(
+            f"{where} has other values in {len(wrong)} of {len(keys)} rows of {same['robot']}, session "
+            f"{same['session']}, connection {same['connection']}, from notification {wrong[0][0]} on"
+        )
+    return batch.filter(pa.array([key not in known for key in keys]))
+
+
+def _keys(batch: pa.RecordBatch) -> Iterator[tuple[int, int]]:
+    return zip(batch["seq"].to_pylist(), batch["row"].to_pylist(), strict=True)
+
+
+def _once(keys: Iterable[Hashable], found: Sequence[int], where: str) -> dict[Hashable, int]:
+    known = dict(zip(keys, found, strict=True))
+    if len(known) < len(found):
+        raise Contradicted(f"{where} has {len(found) - len(known)} rows of this batch twice")
+    return known

@@ -1,0 +1,164 @@
+"""Receipts: what of each batch was found in the store, kept for ever beside the spool.
+
+A line of JSON a batch, synchronised before the spool lets go of the batch. Each begins with a CRC-32 of all
+that follows in it and of the CRC before it, so a line that was altered, taken out or put in is found.
+"""
+
+import os
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from ml.store.private import opener
+from server_gui.core.recording.errors import SpoolUnusable
+
+RECEIPTS: Final = "receipts.jsonl"
+_HEAD: Final = '{"crc":"%08x",'
+_LENGTH: Final = len(_HEAD % 0)
+_TAIL_BYTES: Final = 1 << 20  # of the file, that are read to find its last line at first
+
+
+class Stream(msgspec.Struct, frozen=True):
+    """Whose rows of telemetry: all of a batch from notification `first` to `last` have this in common."""
+
+    robot: str
+    session: str
+    connection: str
+    stream: int
+    first: int
+    last: int
+
+
+class Part(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Rows of a batch in one table; of telemetry, those of one stream. `sum` is as `ml.store.sums` makes it.
+
+    Their times are from `begin_us` to `end_us`, in µs since 1970; None where they have none.
+    """
+
+    location: str
+    table: str  # its id, which a copy of the store has too
+    rows: int
+    sum: str
+    begin_us: int | None = None
+    end_us: int | None = None
+    stream: Stream | None = None
+
+
+class Receipt(msgspec.Struct, frozen=True):
+    """What of a batch is in the store `url`; `lost` is what its own damage has taken of it, in words."""
+
+    writer: str
+    batch: int
+    url: str
+    parts: tuple[Part, ...]
+    lost: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Altered:
+    """A line that is not as it was written, or does not follow the one before it."""
+
+    line: int
+    text: str
+
+
+_decoder = msgspec.json.Decoder(Receipt)
+
+
+class Receipts:
+    """The file of a spool's receipts; `add` is for the spool's owner, one thread at a time."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def add(self, receipt: Receipt) -> None:
+        """Write it; on the disk when this returns.
+
+        Raises:
+            SpoolUnusable: it could not be written.
+
+        """
+        body = msgspec.json.encode(receipt)[1:]
+        try:
+            known = self.file.exists()
+            with open(self.file, "ab+", opener=opener) as out:
+                whole, last = _tail(out.fileno())
+                out.truncate(whole)  # what follows was being written when the power went
+                crc = zlib.crc32(body, _stated(last))
+                out.write((_HEAD % crc).encode() + body + b"\n")
+                out.flush()
+                os.fsync(out.fileno())
+            if not known:
+                _sync(self.file.parent)
+        except OSError as error:
+            reason = error.strerror or error
+            raise SpoolUnusable(f"the spool's receipts {self.file} cannot be written: {reason}") from error
+
+    def newest(self) -> Receipt | None:
+        """The last one, where it can be read."""
+        try:
+            with self.file.open("rb") as opened:
+                _, last = _tail(opened.fileno())
+        except OSError:
+            return None
+        found = _read(last, None)
+        return found if isinstance(found, Receipt) else None
+
+    def all(self) -> Iterator[Receipt | Altered]:
+        """Each line, oldest first."""
+        before = 0
+        try:
+            with self.file.open("rb") as lines:
+                for number, line in enumerate(lines, 1):
+                    found = _read(line, before)
+                    before = _stated(line)
+                    yield Altered(number, found) if isinstance(found, str) else found
+        except FileNotFoundError:
+            return
+
+
+def _read(line: bytes, before: int | None) -> Receipt | str:
+    """The receipt on a line that follows one with the CRC `before`, or in words what is wrong with it."""
+    body = line[_LENGTH:].removesuffix(b"\n")
+    if not line.endswith(b"\n"):
+        return "is cut off"
+    if before is not None and zlib.crc32(body, before) != _stated(line):
+        return "is not as it was written, or lines before it are missing"
+    try:
+        return _decoder.decode(b"{" + body)
+    except msgspec.MsgspecError:
+        return "is no receipt"
+
+
+def _stated(line: bytes) -> int:
+    """The CRC that a line gives; 0 before the first."""
+    try:
+        return int(line[_LENGTH - 10 : _LENGTH - 2], 16)
+    except ValueError:
+        return 0
+
+
+def _tail(descriptor: int) -> tuple[int, bytes]:
+    """Up to where the file has whole lines, and the last of them."""
+    size = os.fstat(descriptor).st_size
+    begin = size
+    while begin:
+        begin = max(0, size - 2 * (size - begin) - _TAIL_BYTES)
+        data = os.pread(descriptor, size - begin, begin)
+        end = data.rfind(b"\n") + 1
+        start = data.rfind(b"\n", 0, max(end - 1, 0)) + 1
+        if end and (start or not begin):
+            return begin + end, data[start:end]
+    return 0, b""
+
+
+def _sync(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
