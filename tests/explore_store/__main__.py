@@ -48,7 +48,8 @@ def _search(seconds: float, seed: int, words: list[str]) -> int:
 
     found = search(seconds, seed, words or tuple(KINDS))
     print(
-        f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended",
+        f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended"
+        + (f"; {found.known} plays ended in what is known" if found.known else ""),
         flush=True,
     )
     if found.wrong is None:

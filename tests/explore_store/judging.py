@@ -18,6 +18,8 @@ from tests.explore_store.robots import ANGLE, COUNT
 from tests.explore_store.server import Server
 from tests.explore_store.world import World
 
+LENGTH_OF_AN_ID = 36
+ROUNDED_NS = 2_000  # the store's times are microseconds
 TOLD = frozenset({EventKind.LOST.value, EventKind.REFUSED.value})
 
 
@@ -33,7 +35,7 @@ def check(holds: bool, sentence: str, *found: object) -> None:
 def retire(world: World, before: datetime) -> None:
     """These rows may go."""
     for row in world.ledger.rows():
-        if row.utc_ns // 1000 * 1000 < utc_ns(before):
+        if row.true_ns + min(world.servers[row.server].walls_ns) < utc_ns(before):
             row.fate = Fate.OPEN
 
 
@@ -91,7 +93,8 @@ def telemetry(world: World, store: Store) -> None:
         lines = found.get(number, [])
         check(len(lines) <= 1, "a row is there more than once", len(lines), row)
         for line in lines:
-            _is(row, line, units)
+            _is(row, line, units, world.servers[row.server])
+    _times(known, found)
     for number, row in known.items():
         if row.fate is Fate.SAFE and number not in found and not world.servers[row.server].damaged:
             raise Wrong(f"a row was acknowledged and is not there: {row}")
@@ -102,12 +105,12 @@ def telemetry(world: World, store: Store) -> None:
         check(damaged or len(gone) <= loss.rows, "more rows are lost than were counted", len(gone), loss.rows)
 
 
-def _is(row: Row, line: Mapping[str, Any], units: Mapping[str, str | None]) -> None:
+def _is(row: Row, line: Mapping[str, Any], units: Mapping[str, str | None], server: Server) -> None:
     said = {name: line[name] for name in ("robot", "session", "seq", "row", "stamp_ns")}
     meant = dict(zip(said, (row.robot, row.session, row.seq, row.place, row.stamp_ns), strict=True))
     check(said == meant, "a row is misnamed", said, meant)
-    check(line["utc"] is not None and utc_ns(line["utc"]) == row.utc_ns // 1000 * 1000,
-          "a row has another time", row.number, line["utc"], row.utc_ns)  # fmt: skip
+    times = {(row.true_ns + wall_ns) // 1000 * 1000 for wall_ns in server.walls_ns}
+    check(utc_ns(line["utc"]) in times, "a row has a time that no clock ever had", line["utc"], row)
     angles = {name: line[name] for name in line if name.startswith(ANGLE) and line[name] is not None}
     check(list(angles.values()) == ([] if row.angle is None else [row.angle]),
           "a row has another value", row.number, angles, row.angle)  # fmt: skip
@@ -116,15 +119,29 @@ def _is(row: Row, line: Mapping[str, Any], units: Mapping[str, str | None]) -> N
               row.number, name, units[name], row.unit)  # fmt: skip
 
 
+def _times(known: Mapping[int, Row], found: Mapping[int, list[dict[str, Any]]]) -> None:
+    """Whoever sets a clock: in a connection no row moves against another."""
+    offsets: dict[Any, set[int]] = defaultdict(set)
+    for number, lines in found.items():
+        offsets[known[number].link].update(utc_ns(line["utc"]) - line["stamp_ns"] // 1000 * 1000 for line in lines)
+    for link, some in offsets.items():
+        check(max(some) - min(some) <= ROUNDED_NS, "rows of a connection have moved against each other", link, some)
+
+
 def _losses(server: Server, world: World, store: Store) -> None:
     """What was counted as lost is told by an event."""
     told = [
         line for line in rows_of(store, EVENTS)
-        if line["kind"] in TOLD and line["spool"] == _identity(server)
+        if line["kind"] in TOLD and spool_of(line) == _identity(server)
     ]  # fmt: skip
     for loss in world.ledger.losses:
         if loss.server == server.name and loss.told and not server.damaged:
             check(bool(told), "rows were lost, and no event tells of it", loss.rows)
+
+
+def spool_of(line: Mapping[str, Any]) -> str:
+    """Whose row it is: the spool's own name, without that of its opening."""
+    return str(line["spool"])[:LENGTH_OF_AN_ID]
 
 
 def _identity(server: Server) -> str:
@@ -138,7 +155,7 @@ def _records(world: World, store: Store) -> None:
     marks = Counter(line["text"] for line in rows_of(store, EVENTS) if line["kind"] == "marker")
     labels = holding(rows_of(store, LABELS))
     entries = Counter(
-        (line["spool"], line["robot"], line["n"], line["hash"]) for line in rows_of(store, JOURNAL)
+        (spool_of(line), line["robot"], line["n"], line["hash"]) for line in rows_of(store, JOURNAL)
     )
     check(not marks or max(marks.values()) == 1, "a marker is there twice", marks)
     check(not entries or max(entries.values()) == 1, "an entry of a journal is there twice", entries)

@@ -34,7 +34,7 @@ class Row(Thing):
     seq: int = 0
     place: int = 0
     stamp_ns: int = 0
-    utc_ns: int = 0
+    true_ns: int = 0  # when, by a clock that nobody sets
     unit: str | None = None
     angle: float | None = None
 

@@ -21,6 +21,10 @@ from tests.explore_store.steps import KINDS, Step, play
 ROUND: Final = 40  # plays that one seed gives
 SHRINK_S: Final = 60.0
 MEMORY: Final = Path("/dev/shm")  # a disk that costs nothing; ours says itself what a power cut leaves
+# What is not mended yet, and why: what a violation says, as a regular expression.
+KNOWN: Final[dict[str, str]] = {
+    r"cannot upload: .*DeltaError|cannot upload: .*(Invalid JSON|EOF)": "half an entry of a log after a power cut",
+}
 
 
 @dataclass(slots=True)
@@ -30,6 +34,7 @@ class Found:
     plays: int = 0
     steps: int = 0
     points: int = 0
+    known: int = 0  # plays that end in what is known
     wrong: list[Step] | None = None
     error: Exception | None = None
     seed: str = ""
@@ -111,6 +116,9 @@ def tried(steps: Sequence[Step], saying: str, found: Found) -> Exception | None:
     try:
         found.points += played(steps)
     except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+        if any(re.search(pattern, str(error)) for pattern in KNOWN):
+            found.known += 1
+            return None
         return error if re.search(saying, str(error)) else None
     return None
 

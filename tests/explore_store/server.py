@@ -70,7 +70,7 @@ class Server:
         self.ledger = ledger
         self.robots = robots
         self.connect = connect
-        self.wall_ns = times.wall_ns
+        self.walls_ns = [times.wall_ns]  # what its clock has added to the true time; the last one does now
         self.folder = disk.root / f"spool-{name}"
         self.damaged = False  # somebody has flipped a bit in its spool
         self.life = 0
@@ -79,6 +79,10 @@ class Server:
         self._lost = 0
 
     # --- lives
+
+    @property
+    def wall_ns(self) -> int:
+        return self.walls_ns[-1]
 
     @property
     def runs(self) -> bool:
@@ -140,11 +144,11 @@ class Server:
         """A notification; of every third row the angle is missing."""
         link, robot = self.links[name], self.links[name].robot
         counts = list(range(first, first + count))
-        stamps_ns, utcs_ns = [], []
+        stamps_ns, trues_ns = [], []
         for _ in counts:
             self.times.now_ns += EVERY_NS
             stamps_ns.append(self.times.now_ns - robot.began_ns)
-            utcs_ns.append(self.times.time_ns())
+            trues_ns.append(self.times.now_ns)
         angles = [None if each % 3 == 2 else each + IN_UNIT[robot.unit] for each in counts]
         seq = link.seq
         batch = link.batch(counts, angles, stamps_ns, self.times.now_ns)
@@ -155,7 +159,7 @@ class Server:
             self._hand(
                 Row(
                     number, self.name, name, session, link=key, seq=seq, place=place, unit=robot.unit,
-                    stamp_ns=stamps_ns[place], utc_ns=utcs_ns[place], angle=angles[place],
+                    stamp_ns=stamps_ns[place], true_ns=trues_ns[place], angle=angles[place],
                 )
             )  # fmt: skip
 

@@ -85,7 +85,7 @@ def _rename(world: World, s: int, r: int, other: int) -> None:
 
 def _clock(world: World, s: int, step: int, _: int) -> None:
     server = world.servers[SERVERS[s]]
-    server.wall_ns += int(CLOCK_S[step] * 1e9)
+    server.walls_ns.append(server.wall_ns + int(CLOCK_S[step] * 1e9))
 
 
 def _say(world: World, s: int, r: int, what: int) -> None:
