@@ -55,16 +55,18 @@ def _search(seconds: float, seed: int, words: list[str]) -> int:
     if found.wrong is None:
         return 0
     assert found.error is not None
-    print(f"seed {found.seed}: {told(found.error)}\n./dev explore store --replay '{found.text}'", flush=True)
+    print(f"seed {found.seed}: {told(found.error)}\n./dev explore store --replay '{found.wrong}'", flush=True)
     return 1
 
 
 def _replay(text: str) -> int:
+    from tests.explore_store.s3 import S3
     from tests.explore_store.searching import played, told
-    from tests.explore_store.steps import parsed
+    from tests.explore_store.steps import Script
 
     try:
-        points = played(parsed(text))
+        with S3() as s3:
+            points = played(Script.parsed(text), s3)
     except Exception as error:  # noqa: BLE001 - that is what it is for
         print(told(error))
         return 1

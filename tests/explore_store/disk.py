@@ -49,6 +49,7 @@ class Disk:
         self.left: Left | None = None  # since the program has ended
         self.power = False  # it ended by a power cut
         self.points = 0
+        self._quiet = False  # we ourselves are at work
         self._nodes: dict[int, Node] = {}
         self._names: dict[str, Node | None] = {}  # that last; None: a folder
         self._armed: tuple[int, bool, int] | None = None
@@ -71,13 +72,15 @@ class Disk:
 
     def end(self, seed: int, *, power: bool) -> None:
         """End the program now."""
-        self.power = power
+        self.power, self._armed = power, None
         self.left = self._cut(random.Random(seed)) if power else self._kept()
 
     # --- what happens
 
     def point(self, kept: str | None = None) -> None:
         """Something is about to last; here the program may end. `kept`: a name that lasts until then."""
+        if self._quiet:
+            return
         if self.left is not None:
             raise Ended
         self.points += 1
@@ -122,9 +125,14 @@ class Disk:
     def become(self, spool: Path) -> None:
         """Be what was left, once nobody has anything open; of a killed program only its spool had that."""
         left, self.left = self.left, None
-        if left is None:
-            return
-        below = "" if self.power else f"{self._name(spool)}/"
+        if left is not None:
+            self._quiet = True
+            self._become(left, "" if self.power else f"{self._name(spool)}/")
+            self._quiet = False
+
+    # --- inside
+
+    def _become(self, left: Left, below: str) -> None:
         for path in sorted(self.root.rglob("*"), reverse=True):
             name = self._name(path)
             if name.startswith(below) and name not in left.files and name not in left.folders:
@@ -137,8 +145,6 @@ class Disk:
                 self._nodes[(self.root / name).stat().st_ino] = left.nodes.get(name, Node())
         if self.power:
             self._all_lasts()
-
-    # --- inside
 
     def _name(self, path: Path) -> str:
         return "" if path == self.root else str(path.relative_to(self.root))

@@ -197,6 +197,7 @@ def _sessions(world: World, store: Store) -> None:
     }  # fmt: skip
     for key, thing in newest.items():
         if thing.fate is Fate.SAFE and not world.servers[thing.server].damaged:
+            check(key in listed, "a session that was acknowledged is not listed", thing)
             found = listed[key].parameters
             check(found == {"value": thing.value}, "a session says not what was said last", thing, found)
 

@@ -4,14 +4,16 @@ import errno
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 from ml.store import NoSuchTable, Store, StoreError, upkeep
 from ml.store.query import query
 from ml.store.tables import TELEMETRY
 from tests.explore_store import judging
 from tests.explore_store.disk import Ended
+from tests.explore_store.s3 import S3, Fault
 from tests.explore_store.server import flip
 from tests.explore_store.world import World
 
@@ -20,6 +22,15 @@ ROBOTS: Final = ("exo-0", "exo-1")
 UNITS: Final = ("rad", "deg", None)
 CLOCK_S: Final = (-3600.0, -0.05, 0.05, 10.0, -86_400.0, 86_400.0)
 LABELS: Final = ("walk", "wearer P01")
+
+
+class Place(Enum):
+    """Where the store is."""
+
+    FOLDER = "folder"
+    SHARDS = "shards"  # a folder, and the telemetry in two tables
+    S3 = "s3-store"
+
 
 Play = Callable[[World, int, int, int], object]
 
@@ -155,15 +166,20 @@ def _flip(world: World, s: int, file: int, seed: int) -> None:
         server.damaged = True
 
 
+def _s3(world: World, fault: int, writes: int, _: int) -> None:
+    if world.s3 is not None:
+        world.s3.arm(writes + 1, Fault(fault))
+
+
 def _kept_up(work: Callable[[Store], object]) -> Play:
     """Somebody else keeps the store in order; that may end too, and fail."""
 
     def play(world: World, *_: int) -> None:
         try:
             work(Store.existing(world.url))
-        except (StoreError, OSError):
+        except (StoreError, OSError, Ended):
             pass
-        except Ended:
+        if world.disk.left is not None:  # it ended within
             world.bury("A")
 
     return play
@@ -223,6 +239,7 @@ KINDS: Final = {
     "power": Kind(_power, (100,), 2),
     "crash": Kind(_crash, (60, 2, 100), 6),
     "full": Kind(_full, (2,), 2),
+    "s3": Kind(_s3, (3, 12), 3),
     "fails": Kind(_fails, (2, 3), 2),
     "flip": Kind(_flip, (2, 4, 10_000), 1),
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
@@ -249,19 +266,30 @@ class Step:
         KINDS[self.word].play(world, *numbers)
 
 
-def parsed(text: str) -> list[Step]:
-    """The steps as `Step` says them, with `;` between."""
-    words = [step.split() for step in text.split(";") if step.strip()]
-    return [Step(word, tuple(map(int, numbers))) for word, *numbers in words]
+@dataclass(frozen=True, slots=True)
+class Script:
+    """A whole play: `at shards; rows A 1 3; …`."""
+
+    place: Place
+    steps: tuple[Step, ...]
+
+    def __str__(self) -> str:
+        return "; ".join([f"at {self.place.value}", *map(str, self.steps)])
+
+    @classmethod
+    def parsed(cls, text: str) -> Self:
+        """What `str` has made."""
+        first, *words = (step.split() for step in text.split(";") if step.strip())
+        return cls(Place(first[1]), tuple(Step(word, tuple(map(int, numbers))) for word, *numbers in words))
 
 
 BETWEEN_NS: Final = 1_234_567  # two steps
 
 
-def play(steps: list[Step], folder: Path, shards: int = 1) -> World:
+def play(script: Script, folder: Path, s3: S3) -> World:
     """Play these steps, come to rest, and judge; raises `judging.Wrong`."""
-    with World(folder, shards) as world:
-        for step in steps:
+    with World(folder, 2 if script.place is Place.SHARDS else 1, s3 if script.place is Place.S3 else None) as world:
+        for step in script.steps:
             world.times.now_ns += BETWEEN_NS
             step.play(world)
         judging.judge(world)

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import contextlib
+import os
 import random
 import sqlite3
 import time
@@ -10,12 +11,16 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final, Self
 
-from ml.store import Store, durable, writing
+import msgspec
+
+from ml.store import Store, durable, objects, store, writing
+from ml.store.store import About
 from server_gui.core.recording import recorder
 from server_gui.core.recording.errors import SpoolUnusable
 from tests.explore_store.disk import Disk, Ended, changes, watching
 from tests.explore_store.ledger import Fate, Ledger
 from tests.explore_store.robots import Robot
+from tests.explore_store.s3 import BUCKET, S3
 from tests.explore_store.server import Server
 from tests.explore_store.times import Names, Times, ours
 
@@ -25,12 +30,13 @@ AGAIN: Final = 5  # attempts on a disk that refuses; one refuses less often
 class World:
     """A context manager, in which the path stands on our time, names and disk."""
 
-    def __init__(self, folder: Path, shards: int = 1) -> None:
+    def __init__(self, folder: Path, shards: int = 1, s3: S3 | None = None) -> None:
         self.times = Times()
         self.disk = Disk(folder)
         self.ledger = Ledger()
         self.shards = shards
-        self.url = (folder / "store").as_uri()
+        self.s3 = s3
+        self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
         self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
         self.removed: list[Path] = []
         both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg")
@@ -57,11 +63,28 @@ class World:
             put(module, "ThreadPoolExecutor", _AtOnce)
         put(recorder, "COMMIT_S", 0.0)
         put(sqlite3, "connect", watching(self.disk))
-        import os
-
         for name, stand_in in changes(self.disk).items():
             put(os, name, stand_in)
+        if self.s3 is not None:
+            self._reach(self.s3)
         return self
+
+    def _reach(self, s3: S3) -> None:
+        s3.clear()
+        s3.objects["store/store.json"] = msgspec.json.encode(About(shards=self.shards))  # no probe
+        s3.on_write = self._on_write
+        for name, value in s3.environment.items():
+            os.environ[name] = value
+        for module in (objects, store):
+            self._put(module, "RETRIES", 2)
+
+    def _on_write(self) -> None:
+        """Between two requests a program may end, too; then the service hears no more of it."""
+        assert self.s3 is not None
+        try:
+            self.disk.point()
+        except Ended:
+            self.s3.dead = True
 
     def _put(self, module: Any, name: str, value: Any) -> None:
         before = getattr(module, name)
@@ -86,22 +109,23 @@ class World:
         """A server at work; where it ends within the block, the disk is then what is left of it."""
         server = self.servers[name]
         self.times.wall_ns = server.wall_ns
+        while not server.runs:
+            self._start(server)
         try:
-            if not server.runs:
-                self._start(server)
             yield server
         except Ended:
             self.bury(name)
         if self.disk.left is not None:
             self.bury(name)
 
-    @staticmethod
-    def _start(server: Server) -> None:
-        """As whoever looks after it: where the disk refuses, again."""
+    def _start(self, server: Server) -> None:
+        """As whoever looks after it: where it ends, or the disk refuses, again."""
         for again in reversed(range(AGAIN)):
             try:
                 server.start()
                 return
+            except Ended:
+                self.bury(server.name)
             except (SpoolUnusable, OSError):
                 server.abandon()
                 if not again:
@@ -113,6 +137,8 @@ class World:
         for server in gone:
             server.abandon()
         self.disk.become(self.servers[name].folder)
+        if self.s3 is not None:
+            self.s3.dead = False
 
     def end(self, name: str, seed: int, *, power: bool) -> None:
         """End a server now, or cut the power."""
