@@ -5,7 +5,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Final
 from urllib.parse import unquote
 
@@ -26,6 +26,8 @@ GRACE: Final = timedelta(
 )  # a file that nobody needs any more stays so long, for whoever still reads it
 LOOKED_BACK: Final = 20  # versions, from the newest on, for one that can be pinned
 _PINS: Final = "pins"
+_RETAINED: Final = "retained"
+_INSTANT: Final = "%Y%m%dT%H%M%S.%fZ"
 
 
 class Pin(msgspec.Struct, frozen=True):
@@ -116,7 +118,8 @@ def retain(
 ) -> dict[str, int]:
     """Remove rows older than `before` (with a time zone); how many went, or would go, by location.
 
-    They stay readable in old versions until `vacuum`.
+    They stay readable in old versions until `vacuum`. Before they go it is noted that they are meant to
+    (`retained`).
     """
     if before.tzinfo is None:
         raise ValueError("`before` needs a time zone: the store's times are UTC")
@@ -129,10 +132,28 @@ def retain(
                 )
                 continue
             delta = store.table(location)
+            _note(store, location, before)
             found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
             _make_last(store, location, delta)
         went[location] = int(found["num_deleted_rows"] or 0)
     return went
+
+
+def retained(store: Store, location: str) -> datetime | None:
+    """Up to which time rows of the table were removed because they were old; None where none were."""
+    names = [name.rpartition("/")[2].removesuffix(".json") for name in store.objects.names(_noted(location))]
+    return max((datetime.strptime(name, _INSTANT).replace(tzinfo=UTC) for name in names), default=None)
+
+
+def _note(store: Store, location: str, before: datetime) -> None:
+    name = f"{_noted(location)}/{before.astimezone(UTC).strftime(_INSTANT)}.json"
+    store.objects.create(name, msgspec.json.encode({"location": location, "before": before}))
+    if store.folder is not None:
+        durable.synchronise([store.folder / name])
+
+
+def _noted(location: str) -> str:
+    return f"{_RETAINED}/{location.replace('/', '-')}"
 
 
 def vacuum(

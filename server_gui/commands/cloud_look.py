@@ -1,14 +1,28 @@
 """`gwrms cloud ls | du | verify`: what is in the store, and whether all of it is."""
 
+import argparse
+import functools
 from collections.abc import Iterable, Sequence
+from typing import Final
 
-from gateway.cli.text import NONE, say, say_json, size, table
+from gateway.cli.text import NONE, say, say_json, size, table, warn
+from ml.store.errors import NoSuchTable, StoreError
 from ml.store.objects import Object
-from server_gui.commands.cloud_reach import add_url, parser, progress, reach, spool, when
+from server_gui.commands.cloud_reach import add_url, parser, progress, reach, spool, url, when
 from server_gui.core.cloud import usage
 from server_gui.core.cloud import verify as checks
 from server_gui.core.cloud.usage import Usage
+from server_gui.core.recording.errors import SpoolUnusable
 
+VERIFY: Final = (
+    "Check every file of every table, and that every row of every batch which this computer's spool has "
+    "sent is there once and as it was sent."
+)
+VERIFY_EPILOG: Final = """Exit status 0: whole. 1: not whole, and each line names what is missing, doubled
+or altered. 2: it could not be looked: no store there, or not reached. What was sent is known from the spool's
+receipts; where there are none, files alone are checked, and it says so. It reads all that has a receipt."""
+NOT_WHOLE: Final = 1
+NOT_LOOKED: Final = 2
 COLUMNS = ("FILES", "ROWS", "SIZE", "FROM (UTC)", "TO")
 
 
@@ -47,25 +61,45 @@ def du(argv: list[str]) -> int:
 
 def verify(argv: list[str]) -> int:
     """Run `gwrms cloud verify`."""
-    made = parser(
-        "cloud verify",
-        "Check every file of every table, and every batch that the spool has sent. Exit status 0: whole.",
-    )
+    made = parser("cloud verify", VERIFY, VERIFY_EPILOG)
     add_url(made, "url")
-    made.add_argument("--deep", action="store_true", help="read every value, not just each file's footer")
+    how = made.add_mutually_exclusive_group()
+    how.add_argument("--quick", action="store_true", help="count the rows, and compare no values")
+    how.add_argument("--deep", action="store_true", help="read every value, also of what has no receipt here")
     arguments = made.parse_args(argv)
-    store = reach(arguments)
-    files = checks.files(store)
-    with progress("files", len(files)) as advance:
-        problems = list(checks.damages(store, files, advance, deep=arguments.deep))
-    problems += checks.batches_missing(store, spool(arguments))
+    try:
+        return _verify(arguments)
+    except (StoreError, SpoolUnusable) as error:
+        if arguments.json:
+            say_json({"files": 0, "problems": [str(error)], "looked": False})
+        warn("cloud", str(error))
+        return NOT_LOOKED
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    mine = spool(arguments)
+    try:
+        store = reach(arguments)
+    except NoSuchTable as error:
+        if not (sent := checks.sent_to(url(arguments), mine)):
+            raise
+        return _verdict(arguments, 0, [f"{error}, but {sent} batches of the spool {mine} went there"], "")
+    found = checks.whole(
+        store,
+        mine,
+        functools.partial(progress, "steps"),
+        values=not arguments.quick,
+        deep=arguments.deep,
+    )
+    return _verdict(arguments, len(found.files), found.problems, f"{store.url} is whole: {found.text}\n")
+
+
+def _verdict(arguments: argparse.Namespace, files: int, problems: Sequence[str], whole: str) -> int:
     if arguments.json:
-        say_json({"files": len(files), "problems": problems})
+        say_json({"files": files, "problems": problems, "looked": True})
     else:
-        rows = sum(file.rows for file in files)
-        whole = f"{len(files)} files with {rows} rows, {size(sum(file.size_bytes for file in files))}"
-        say("".join(f"{problem}\n" for problem in problems) or f"{store.url} is whole: {whole}\n")
-    return 1 if problems else 0
+        say("".join(f"{problem}\n" for problem in problems) or whole)
+    return NOT_WHOLE if problems else 0
 
 
 def _show(

@@ -89,6 +89,11 @@ def uploaded(spool: Path) -> list[int]:
     return sorted(set(kept(spool)) - set(waiting(spool)))
 
 
+def damaged(spool: Path) -> list[tuple[int, Path]]:
+    """The batches that were set aside, with their files."""
+    return sorted((int(file.name[:8]), file) for file in spool.glob(f"{_NUMBER}.damaged.db"))
+
+
 def batch(spool: Path, number: int) -> Batch:
     """What is in a batch."""
     robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))

@@ -1,23 +1,102 @@
-"""Whether everything is there: every file of every table, and every batch that the spool has sent."""
+"""Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import pyarrow.parquet as pq
 
+from gateway.cli.text import size
 from ml.store import reading
-from ml.store.errors import NoSuchTable, StoreError, translated
+from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
 from ml.store.fragments import DataFile
 from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from server_gui.core.cloud import spooled
+from server_gui.core.cloud.proving import Advance, Proof, prove
 from server_gui.core.recording.errors import Damaged
+from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 
-Advance = Callable[[int], object]
 AT_ONCE: Final = 4  # files
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What was looked at, and in words what is wrong with it."""
+
+    files: Sequence[DataFile]
+    proof: Proof
+    problems: Sequence[str]
+
+    @property
+    def text(self) -> str:
+        """What is whole, and how far that is proven."""
+        rows = sum(file.rows for file in self.files)
+        size_bytes = sum(file.size_bytes for file in self.files)
+        told = [f"{len(self.files)} files with {rows} rows, {size(size_bytes)}"]
+        if self.proof.batches:
+            told.append(f"all {self.proof.rows} rows of {self.proof.batches} batches by their receipts")
+        else:
+            told.append("no receipts of it here, so nobody can say whether rows are missing")
+        if self.proof.retained:
+            told.append(f"{self.proof.retained} rows removed by retention")
+        if self.proof.elsewhere:
+            told.append(f"{self.proof.elsewhere} batches of this spool went to other stores")
+        return "; ".join(told)
+
+
+def whole(
+    store: Store,
+    spool: Path,
+    expect: Callable[[int], AbstractContextManager[Advance]],
+    *,
+    values: bool = True,
+    deep: bool = False,
+) -> Verdict:
+    """Look at every file and every batch; `expect` hears how many steps that are.
+
+    Without `values` rows are counted, and not compared with what was sent. With `deep` every value is read
+    besides, also of rows that have no receipt.
+
+    Raises:
+        StoreUnreachable, StoreRefused: it could not be looked.
+
+    """
+    receipts = list(
+        Receipts(spool / RECEIPTS).all()
+    )  # before the files: what is sent meanwhile is not missed
+    found, problems = _look(store)
+    with expect(2 * len(found)) as advance:
+        problems += damages(store, found, advance, deep=deep)
+        proof = prove(store, receipts, found, advance, values=values)
+    problems += proof.problems
+    if proof.here or not proof.elsewhere:
+        problems += batches_missing(store, spool)
+    return Verdict(found, proof, list(dict.fromkeys(problems)))
+
+
+def sent_to(url: str, spool: Path) -> int:
+    """How many batches of the spool went to the store of this URL."""
+    known = (each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt))
+    return len({(each.writer, each.batch) for each in known if each.url == url})
+
+
+def _look(store: Store) -> tuple[list[DataFile], list[str]]:
+    """Every file of the newest versions, and which tables' logs cannot be read."""
+    found: list[DataFile] = []
+    problems = []
+    for table in TABLES.values():
+        try:
+            found += reading.files(store, table)
+        except (StoreUnreachable, StoreRefused):
+            raise
+        except StoreError as error:
+            problems.append(str(error))
+    return found, problems
 
 
 def files(store: Store) -> list[DataFile]:
@@ -62,13 +141,41 @@ def _decoded(store: Store, file: DataFile) -> int:
 
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
-    """The spool's batches that are marked as uploaded, and are not in every table that they belong to."""
+    """The spool's batches that were set aside, are nowhere, or are marked as uploaded and not in the store.
+
+    Of those with a receipt `prove` knows more.
+    """
+    receipts = [each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt)]
+    yield from _set_aside(spool, receipts)
+    yield from _nowhere(spool, receipts)
+    yield from _unknown(store, spool, {(each.writer, each.batch) for each in receipts})
+
+
+def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
+    for number, file in spooled.damaged(spool):
+        lost = [each.lost for each in receipts if each.batch == number]
+        told = "; ".join(lost[-1]) if lost else f"what batch {number} held is not in the store as a whole"
+        yield f"{file} was set aside: {told}"
+
+
+def _nowhere(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
+    """Numbers are given one after another: one that is skipped was a batch."""
+    there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
+    known = there | {each.batch for each in receipts}
+    first = min((each.batch for each in receipts), default=0)
+    for number in sorted(set(range(first, max(known, default=0))) - known):
+        yield f"batch {number} of the spool {spool} is nowhere: no receipt says that it was uploaded"
+
+
+def _unknown(store: Store, spool: Path, known_batches: Set[tuple[str, int]]) -> Iterator[str]:
     known: dict[tuple[str, str], int] = {}
     for number in spooled.uploaded(spool):
         try:
             batch = spooled.batch(spool, number)
         except Damaged as error:
             yield str(error)
+            continue
+        if (batch.writer, batch.number) in known_batches:
             continue
         for location in _locations(store, batch):
             if (location, batch.writer) not in known:

@@ -1,5 +1,6 @@
 """What the window lets do with recordings: exported, uploaded, copied to another place, verified."""
 
+import contextlib
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -84,14 +85,17 @@ def check(settings: ServerSettings, *, deep: bool) -> Work:
 
     def work(job: Job) -> str:
         store = Store.existing(settings.store.url)
-        files = verify.files(store)
-        job.expect(len(files), "files")
-        problems = list(verify.damages(store, files, job.advance, deep=deep))
-        problems += verify.batches_missing(store, settings.recorder.spool)
-        if problems:
-            told = "; ".join(problems[:PROBLEMS_TOLD])
-            raise StoreError(f"{len(problems)} problems: {told} (gwrms cloud verify lists them)")
-        return f"{store.url} is whole: {len(files)} files with {sum(file.rows for file in files)} rows"
+
+        @contextlib.contextmanager
+        def expect(steps: int) -> Iterator[Callable[[int], object]]:
+            job.expect(steps, "steps")
+            yield job.advance
+
+        found = verify.whole(store, settings.recorder.spool, expect, deep=deep)
+        if found.problems:
+            told = "; ".join(found.problems[:PROBLEMS_TOLD])
+            raise StoreError(f"{len(found.problems)} problems: {told} (gwrms cloud verify lists them)")
+        return f"{store.url} is whole: {found.text}"
 
     return work
 

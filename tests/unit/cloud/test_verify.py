@@ -34,7 +34,7 @@ def test_a_second_copy_that_is_damaged_is_named_and_the_others_are_looked_into(
 ) -> None:
     recorded = record(folder_url, tmp_path / "spool")
     (recorded.spool / "00000001.uploaded.db").write_bytes(b"x" * 10_000)
-    (recorded.spool / "00000009.uploaded.db").write_bytes(b"")
+    (recorded.spool / "00000003.uploaded.db").write_bytes(b"")
     [problem] = verify.batches_missing(recorded.store, recorded.spool)
     assert problem.endswith("is damaged: file is not a database; it is a second copy: remove it")
 

@@ -1,0 +1,251 @@
+"""Whatever is done to a store or to a spool's receipts, `gwrms cloud verify` finds it and names it."""
+
+import contextlib
+import json
+import shutil
+import sqlite3
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+import pytest
+
+from gateway.main import main
+from ml.store import Store
+from ml.store.tables import RESOURCES, TABLES, TELEMETRY
+from ml.store.upkeep import compact, retain, vacuum
+from server_gui.core.recording.errors import Damaged
+from server_gui.core.recording.receipts import RECEIPTS
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import send
+from tests.unit.cloud.recordings import record
+from tests.unit.recording.robots import batch
+
+KNEE = "left_knee.position"
+
+
+class Place:
+    """A store in a folder, the spool that filled it in three batches, and the command that looks."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.store, self.spool = folder / "store", folder / "spool"
+        self._config = folder / "server.toml"
+        self._config.write_text(
+            f'[store]\nurl = "{self.store.as_uri()}"\n[recorder]\nspool = "{self.spool}"\n'
+        )
+        self._capsys = capsys
+        for robot in ("exo-01", "exo-01", "exo-02"):
+            record(self.url, self.spool, robot)
+
+    @property
+    def url(self) -> str:
+        return self.store.as_uri()
+
+    def verify(self, *words: str) -> tuple[int, str]:
+        """The exit status, and all that was said of problems."""
+        status = main(["cloud", "verify", "--json", *words, "--config", str(self._config)])
+        return status, "\n".join(json.loads(self._capsys.readouterr().out)["problems"])
+
+    def files(self, location: str = "telemetry/000") -> list[Path]:
+        return sorted((self.store / location).rglob("*.parquet"))
+
+    def log(self, location: str = "telemetry/000") -> list[Path]:
+        return sorted((self.store / location / "_delta_log").glob("*.json"))
+
+
+@pytest.fixture
+def place(store_libraries: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Place:
+    return Place(tmp_path, capsys)
+
+
+def rewrite(file: Path, change: Callable[[pa.Table], pa.Table]) -> None:
+    """Other rows in a file, of which the log then says the right size and number: only values tell."""
+    known = file.stat().st_size
+    pq.write_table(change(pq.read_table(file, partitioning=None)), file)
+    new = file.stat().st_size
+    for entry in (file.parents[2] if "session=" in str(file) else file.parent).glob("_delta_log/*.json"):
+        entry.write_text(entry.read_text().replace(f'"size":{known}', f'"size":{new}'))
+
+
+def replaced(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:
+    return rows.set_column(rows.column_names.index(name), rows.schema.field(name), values)
+
+
+def altered(rows: pa.Table) -> pa.Table:
+    values = rows[KNEE].to_pylist()
+    return replaced(rows, KNEE, pa.array([*values[:50], values[50] + 1e-9, *values[51:]]))
+
+
+def swapped(rows: pa.Table) -> pa.Table:
+    other = rows["left_knee.velocity"]
+    return replaced(replaced(rows, "left_knee.velocity", rows[KNEE]), KNEE, other)
+
+
+def misplaced(rows: pa.Table) -> pa.Table:
+    return replaced(rows, KNEE, rows[KNEE].take(pa.array([1, 0, *range(2, len(rows))])))
+
+
+def nulled(rows: pa.Table) -> pa.Table:
+    return replaced(rows, KNEE, pc.if_else(pc.equal(rows[KNEE], rows[KNEE][0]), None, rows[KNEE]))
+
+
+def of_file(change: Callable[[pa.Table], pa.Table]) -> Callable[[Place], None]:
+    return lambda place: rewrite(place.files()[0], change)
+
+
+def file_deleted(place: Place) -> None:
+    place.files()[0].unlink()
+
+
+def file_cut_off(place: Place) -> None:
+    content = place.files()[0].read_bytes()
+    place.files()[0].write_bytes(content[:-100])
+
+
+def file_doubled(place: Place) -> None:
+    file = place.files()[0]
+    twin = file.with_name("part-1.zstd.parquet")
+    shutil.copy(file, twin)
+    [entry] = [each for each in place.log() if file.name in each.read_text()]
+    newest = place.log()[-1]
+    adds = [line for line in entry.read_text().splitlines() if file.name in line]
+    after = newest.with_name(f"{int(newest.stem) + 1:020}.json")
+    after.write_text("\n".join(adds).replace(file.name, twin.name) + "\n")
+
+
+def row_removed(place: Place) -> None:
+    Store(place.url).table("telemetry/000").delete("seq = 3 AND row = 1 AND robot = 'exo-02'")
+
+
+def event_altered(place: Place) -> None:
+    rewrite(place.files("events")[0], lambda rows: replaced(rows, "kind", pa.array(["marker"] * len(rows))))
+
+
+def log_rolled_back(place: Place) -> None:
+    place.log()[-1].unlink()
+
+
+def log_entry_missing(place: Place) -> None:
+    place.log()[1].unlink()
+
+
+def table_missing(place: Place) -> None:
+    shutil.rmtree(place.store / "labels")
+
+
+def table_begun_anew(place: Place) -> None:
+    shutil.rmtree(place.store / "telemetry")
+    record(place.url, place.spool)
+
+
+def store_missing(place: Place) -> None:
+    shutil.rmtree(place.store)
+
+
+def receipt_altered(place: Place) -> None:
+    file = place.spool / RECEIPTS
+    file.write_text(file.read_text().replace('"rows":100', '"rows":101', 1))
+
+
+def receipt_removed(place: Place) -> None:
+    file = place.spool / RECEIPTS
+    lines = file.read_text().splitlines(keepends=True)
+    file.write_text("".join(lines[:1] + lines[2:]))
+
+
+def segment_damaged(place: Place) -> None:
+    with Spool(place.spool, reserve_bytes=0) as spool:
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(7, 5))
+        [number] = spool.waiting()
+        with contextlib.closing(sqlite3.connect(spool.folder / f"{number:08}.db")) as database, database:
+            database.execute("UPDATE run SET data = zeroblob(length(data))")
+        with pytest.raises(Damaged):
+            send(spool, number, Store(place.url))
+
+
+def segment_unreadable(place: Place) -> None:
+    (place.spool / "00000004.damaged.db").write_bytes(b"x" * 10_000)
+
+
+def segment_removed(place: Place) -> None:
+    for seq in (0, 1):
+        with Spool(place.spool, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(seq))
+    (place.spool / "00000004.db").unlink()
+
+
+DAMAGES: list[tuple[Callable[[Place], None], str]] = [
+    (file_deleted, "is not there: 100 rows are lost"),
+    (file_cut_off, "bytes instead of"),
+    (file_doubled, "100 rows more than the 100 that were sent: doubled (batch"),
+    (row_removed, "1 of 100 rows are missing (batch 3 of "),
+    (of_file(altered), "the 100 rows are not as they were sent: altered (batch"),
+    (of_file(swapped), "altered (batch"),
+    (of_file(misplaced), "altered (batch"),
+    (of_file(nulled), "altered (batch"),
+    (event_altered, "/events: the 2 rows are not as they were sent: altered (batch"),
+    (log_rolled_back, "/telemetry/000: 100 of 100 rows are missing (batch 3 of "),
+    (log_entry_missing, "/telemetry/000"),
+    (table_missing, "/labels: 1 of 1 rows are missing (batch 1 of "),
+    (table_begun_anew, "/telemetry/000: 100 of 100 rows are missing (batch 2 of "),
+    (store_missing, "3 batches of the spool"),
+    (receipt_altered, f"line 1 of the spool's {RECEIPTS} is not as it was written"),
+    (receipt_removed, f"line 2 of the spool's {RECEIPTS} is not as it was written"),
+    (segment_damaged, "00000004.damaged.db was set aside: 5 rows of exo-01, stream 1 from notification 7 on"),
+    (segment_unreadable, "00000004.damaged.db was set aside: what batch 4 held is not in the store"),
+    (segment_removed, "batch 4 of the spool"),
+]
+
+
+@pytest.mark.parametrize(("damage", "told"), DAMAGES)
+def test_each_damage_is_found_and_named(place: Place, damage: Callable[[Place], None], told: str) -> None:
+    damage(place)
+    status, problems = place.verify()
+    assert status == 1
+    assert told in problems
+
+
+def test_a_store_is_whole_however_its_files_were_put_together(place: Place) -> None:
+    assert place.verify() == (0, "")
+    store = Store(place.url)
+    compact(store)
+    vacuum(store, grace=timedelta(0))
+    record(place.url, place.spool)
+    assert place.verify() == place.verify("--quick") == place.verify("--deep") == (0, "")
+
+
+def test_counting_alone_finds_what_is_missing_and_not_what_is_altered(place: Place) -> None:
+    of_file(altered)(place)
+    assert place.verify("--quick") == (0, "")
+    row_removed(place)
+    assert "1 of 100 rows are missing" in place.verify("--quick")[1]
+
+
+def test_what_went_because_it_was_old_is_not_missed(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
+    store = Store(place.url)
+    [middle] = pc.quantile(store.dataset("telemetry/000").to_table()["utc"].cast(pa.int64()), 0.5).to_pylist()
+    retain(store, [TELEMETRY, RESOURCES], datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=middle))
+    assert 0 < store.dataset("telemetry/000").count_rows() < 300
+    assert place.verify() == (0, "")
+    retain(store, [TABLES["labels"]], datetime.now(UTC) + timedelta(days=1))
+    assert place.verify() == (0, "")
+    row_removed(place)
+    Store(place.url).table("events").delete()
+    assert "/events: 2 of 2 rows are missing" in place.verify()[1]
+
+
+def test_what_went_to_another_store_is_not_missed_here(place: Place, tmp_path: Path) -> None:
+    record((tmp_path / "other").as_uri(), place.spool)
+    assert place.verify() == (0, "")
+    assert place.verify((tmp_path / "other").as_uri()) == (0, "")
+
+
+def test_where_nobody_can_look_the_exit_status_says_so(place: Place, tmp_path: Path) -> None:
+    assert place.verify((tmp_path / "nothing").as_uri())[0] == 2
+    (place.store / "store.json").write_text("{")
+    assert place.verify()[0] == 2
