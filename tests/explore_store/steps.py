@@ -12,6 +12,7 @@ from ml.store import NoSuchTable, Store, StoreError, upkeep
 from ml.store.query import query
 from ml.store.tables import TELEMETRY
 from tests.explore_store import judging
+from tests.explore_store.damages import DAMAGES
 from tests.explore_store.disk import Ended
 from tests.explore_store.s3 import S3, Fault
 from tests.explore_store.server import flip
@@ -166,6 +167,34 @@ def _flip(world: World, s: int, file: int, seed: int) -> None:
         server.damaged = True
 
 
+def _copy(world: World, s: int, *_: int) -> None:
+    """Somebody copies the spool's folder, while nobody records."""
+    server = world.servers[SERVERS[s]]
+    world.end(SERVERS[s], 0, power=False)
+    if server.folder.is_dir():
+        server.copied = {path.name: path.read_bytes() for path in server.folder.iterdir()}
+
+
+def _roll_back(world: World, s: int, *_: int) -> None:
+    """And puts that back later; or, without one, removes the databases."""
+    server = world.servers[SERVERS[s]]
+    world.end(SERVERS[s], 0, power=False)
+    if not server.folder.is_dir():
+        return
+    server.rolled_back = True
+    judging.roll_back(world, server)
+    for path in server.folder.iterdir():
+        if server.copied or path.name.startswith("0"):
+            path.unlink()
+    for name, data in server.copied.items():
+        (server.folder / name).write_bytes(data)
+    world.disk.sync()
+
+
+def _damage(world: World, which: int, *_: int) -> None:
+    world.damage = which
+
+
 def _s3(world: World, fault: int, writes: int, _: int) -> None:
     if world.s3 is not None:
         world.s3.arm(writes + 1, Fault(fault))
@@ -242,6 +271,9 @@ KINDS: Final = {
     "s3": Kind(_s3, (3, 12), 3),
     "fails": Kind(_fails, (2, 3), 2),
     "flip": Kind(_flip, (2, 4, 10_000), 1),
+    "copy": Kind(_copy, (2,), 1),
+    "roll-back": Kind(_roll_back, (2,), 1),
+    "damage": Kind(_damage, (len(DAMAGES),), 2),
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
     "vacuum": Kind(_kept_up(lambda store: upkeep.vacuum(store, grace=timedelta(0))), (), 1),
     "retain": Kind(_retain, (6,), 1),

@@ -38,7 +38,7 @@ class World:
         self.s3 = s3
         self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
         self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
-        self.removed: list[Path] = []
+        self.damage: int | None = None  # what is done to the store at the end
         both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg")
         self.robots = [both, mine, other]
         self.servers = {
