@@ -1,5 +1,10 @@
-"""Commits in a folder, made to last: the table format's library never synchronises what it writes."""
+"""Commits in a folder, made to last: the table format's library never synchronises what it writes.
 
+An entry of the log that was synchronised has an attribute that says so. Nothing makes that attribute last:
+after a power cut it may be missing from an entry that did last, but it is on none that did not.
+"""
+
+import contextlib
 import json
 import os
 from collections.abc import Iterable
@@ -9,6 +14,7 @@ from typing import Final
 from urllib.parse import unquote
 
 LOG: Final = "_delta_log"
+_MARK: Final = "user.gwrms.lasts"
 _LEVELS: Final = 5  # of folders, from a file in a partition up to the store's own
 _AT_ONCE: Final = 8  # so that the disk can take several in one go
 
@@ -31,6 +37,18 @@ def synchronise(files: Iterable[Path]) -> None:
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         list(pool.map(_sync, found))
         list(pool.map(_sync, folders))
+    for file in found:
+        if file.parent.name == LOG and file.suffix == ".json":
+            with contextlib.suppress(OSError):  # not every file system has attributes
+                os.setxattr(file, _MARK, b"1")
+
+
+def is_marked(entry: Path) -> bool:
+    """Whether this entry is known to have been synchronised, and so may have been acknowledged."""
+    try:
+        return os.getxattr(entry, _MARK) == b"1"
+    except OSError:
+        return False
 
 
 def _commit(table: Path, writer: str, sequence: int) -> Path | None:

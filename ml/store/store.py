@@ -24,7 +24,7 @@ from deltalake.exceptions import CommitFailedError
 from deltalake.transaction import AddAction
 from pyarrow.fs import FileSystem
 
-from ml.store import durable, writing
+from ml.store import durable, torn, writing
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
 from ml.store.files import filesystem
 from ml.store.fragments import as_dataset
@@ -159,8 +159,25 @@ class Store:
             NoSuchTable: nothing has been written there, or not that version.
 
         """
-        with translated(f"{self.url}/{location}"):
-            return DeltaTable(self._uri(location), version=version, storage_options=self._options())
+        try:
+            with translated(f"{self.url}/{location}"):
+                return DeltaTable(self._uri(location), version=version, storage_options=self._options())
+        except StoreError:
+            found = None if self.folder is None else torn.find(self.folder / location)
+            if found is None:
+                raise
+            raise StoreError(str(found)) from None
+
+    def mend(self, location: str) -> None:
+        """Set aside what a power cut has torn off in the table's log, where it is in a folder.
+
+        Raises:
+            StoreError: something else has damaged it, or it may just be written.
+
+        """
+        if self.folder is not None:
+            with translated(f"{self.url}/{location} cannot be mended"):
+                torn.set_aside(self.folder / location)
 
     def dataset(self, location: str, version: int | None = None) -> pyarrow.dataset.Dataset:
         """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
@@ -209,6 +226,7 @@ class Store:
         delta = self._open.get(location)
         if delta is not None:
             return delta
+        self.mend(location)
         try:
             return self.table(location)
         except NoSuchTable:

@@ -110,6 +110,7 @@ def compact(
     """
     if dry_run:
         return [found for table in tables for found in _compactable(store, table)]
+    _mend(store, tables)
     return [_compact(store, location) for location in _locations(store, tables)]
 
 
@@ -123,6 +124,8 @@ def retain(
     """
     if before.tzinfo is None:
         raise ValueError("`before` needs a time zone: the store's times are UTC")
+    if not dry_run:
+        _mend(store, tables)
     went: dict[str, int] = {}
     for location in _locations(store, tables):
         with translated(f"{store.url}/{location} cannot be changed"):
@@ -164,6 +167,8 @@ def vacuum(
     dry_run: bool = False,
 ) -> list[str]:
     """Delete files that no version newer than `grace` needs, nor one that is pinned; their names."""
+    if not dry_run:
+        _mend(store, tables)
     kept: dict[str, list[int]] = {}
     for named in pins(store):
         kept.setdefault(named.location, []).append(named.version)
@@ -220,6 +225,11 @@ def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
             table / unquote(path) for path in delta.get_add_actions(flatten=True).column("path").to_pylist()
         ]
         durable.synchronise([*files, *(table / durable.LOG).iterdir()])
+
+
+def _mend(store: Store, tables: Sequence[Table]) -> None:
+    for location in (location for table in tables for location in table.locations(store.about.shards)):
+        store.mend(location)
 
 
 def _locations(store: Store, tables: Sequence[Table]) -> list[str]:
