@@ -90,8 +90,9 @@ def uploaded(spool: Path) -> list[int]:
 
 
 def damaged(spool: Path) -> list[tuple[int, Path]]:
-    """The batches that were set aside, with their files."""
-    return sorted((int(file.name[:8]), file) for file in spool.glob(f"{_NUMBER}.damaged.db"))
+    """The batches that were set aside or have lost commits, with their files."""
+    files = (file for kind in ("damaged", "cut") for file in spool.glob(f"{_NUMBER}.{kind}.db"))
+    return sorted((int(file.name[:8]), file) for file in files)
 
 
 def batch(spool: Path, number: int) -> Batch:

@@ -121,6 +121,15 @@ class Segment:
         self.writer = writer
 
     @property
+    def cut_commits(self) -> int:
+        """How many commits may be missing at its end, because its log was damaged."""
+        return int(self._told("cut") or 0)
+
+    def cut(self, commits: int) -> None:
+        """Say that so many are missing."""
+        self._tell("cut", str(commits))
+
+    @property
     def began_utc_ns(self) -> int:
         """About when its first row came; the same whenever it is asked."""
         began = self._told("began")
@@ -257,10 +266,14 @@ class Segment:
     def _contents(self) -> Iterator[tuple[int, Any, int | None]]:
         return self._database.execute("SELECT number - 1, content, crc FROM record ORDER BY number")
 
+    def robots(self) -> set[str]:
+        """Every robot that something is of, or was before."""
+        told = {str(record.fields["robot"]) for record in self.records() if record.fields.get("robot")}
+        return {robot for robot, _ in self._layouts} | told | self.heads().keys()
+
     def _whose(self, content: Any) -> tuple[str, ...]:
         """Whose record it may have been: what it says itself, where that is a robot; else any."""
-        known = {robot for robot, _ in self._layouts}
-        known |= {str(record.fields["robot"]) for record in self.records() if "robot" in record.fields}
+        known = self.robots()
         with contextlib.suppress(msgspec.MsgspecError, TypeError):
             told = _record_decoder.decode(content).fields.get("robot")
             known = {told} if told in known else known

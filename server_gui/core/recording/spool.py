@@ -5,6 +5,7 @@ the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in
 is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are not in the store, and it
 stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
 somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
+`00000004.cut.db` is a copy of a segment whose log was damaged, as it was found: commits at its end are lost.
 `receipts.jsonl` says what of each segment is in the store (receipts.py).
 """
 
@@ -28,7 +29,8 @@ from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
-from server_gui.core.recording.segment import SUFFIXES, Segment
+from server_gui.core.recording.segment import PAGE_BYTES, SUFFIXES, Segment
+from server_gui.core.recording.wal import lost_commits
 
 log = logging.getLogger(__name__)
 
@@ -44,7 +46,7 @@ UNFIT: Final = (  # what a segment raises because of the rows themselves
     TypeError,
     ValueError,
 )
-_NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged)?\.db")
+_NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
 class Kept(Enum):
@@ -53,6 +55,7 @@ class Kept(Enum):
     WAITING = ""
     UPLOADED = ".uploaded"
     DAMAGED = ".damaged"
+    CUT = ".cut"  # not the segment itself, but a copy for somebody to look at
 
 
 def _free_bytes(folder: Path) -> int:
@@ -89,6 +92,7 @@ class Spool:
             self.writer = f"{self.id}.{uuid.uuid4().hex[:12]}"
             self.receipts = Receipts(folder / RECEIPTS)
             self._writers = {self.id}
+            self._look_at_logs()
             self._heads = self._known_heads()
             self._began_ns: int | None = None
             self._current = self._resume()
@@ -189,7 +193,8 @@ class Spool:
 
     def damaged(self) -> list[Path]:
         """Files that were set aside and are still there."""
-        return [self._path(number, Kept.DAMAGED) for number in self._all(Kept.DAMAGED)]
+        wanted = (Kept.DAMAGED, Kept.CUT)
+        return [self._path(number, kept) for number, kept in self._segments() if kept in wanted]
 
     def backlog_bytes(self) -> int:
         """What waits for upload, with what is being written."""
@@ -217,7 +222,11 @@ class Spool:
     def _segments(self) -> list[tuple[int, Kept]]:
         names = (_NAME.fullmatch(path.name) for path in self.folder.iterdir())
         found = [(int(name[1]), Kept(name[2] or "")) for name in names if name]
-        return sorted(found, key=lambda each: each[0])
+        return sorted(found, key=lambda each: (each[0], each[1].value))
+
+    def _own(self) -> list[tuple[int, Kept]]:
+        """The segments themselves, without copies."""
+        return [(number, kept) for number, kept in self._segments() if kept is not Kept.CUT]
 
     def _all(self, wanted: Kept) -> list[int]:
         return [number for number, kept in self._segments() if kept is wanted]
@@ -235,10 +244,47 @@ class Spool:
             _sync(self.folder)
         return file.read_text().strip()
 
+    def _look_at_logs(self) -> None:
+        """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
+        for number in self._all(Kept.WAITING):
+            log_ = self._path(number).with_name(f"{self._path(number).name}-wal")
+            if lost_commits(log_, PAGE_BYTES) and number not in self._all(Kept.CUT):
+                self._copy(number)
+        for number in sorted(set(self._all(Kept.CUT)) & set(self._all(Kept.WAITING))):
+            self._cut(number)
+
+    def _copy(self, number: int) -> None:
+        """The database last: where that is there, all of the copy is."""
+        for suffix in ("-wal", ""):
+            source = self._path(number).with_name(self._path(number).name + suffix)
+            target = self._path(number, Kept.CUT).with_name(self._path(number, Kept.CUT).name + suffix)
+            draft = target.with_name(f"{target.name}.draft")
+            with source.open("rb") as content, open(draft, "wb", opener=opener) as out:
+                shutil.copyfileobj(content, out)
+                out.flush()
+                os.fsync(out.fileno())
+            draft.rename(target)
+        _sync(self.folder)
+
+    def _cut(self, number: int) -> None:
+        """Let the segment itself tell what it has lost, when it goes to the store."""
+        copy = self._path(number, Kept.CUT)
+        lost = lost_commits(copy.with_name(f"{copy.name}-wal"), PAGE_BYTES)
+        with (
+            contextlib.suppress(Damaged),  # then it is set aside as a whole
+            contextlib.closing(Segment(self._path(number), number)) as segment,
+        ):
+            if not segment.cut_commits:
+                segment.cut(lost)
+                log.error(
+                    "the log of batch %d was damaged: up to %d commits are lost; %s is a copy of both",
+                    number, lost, copy,
+                )  # fmt: skip
+
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}
         # Each begins with what the ones before it knew; the newest may have been cut off at its making.
-        for number, kept in self._segments()[-2:]:
+        for number, kept in self._own()[-2:]:
             if kept is not Kept.DAMAGED:
                 heads |= self._heads_of(number, kept)
         return heads
@@ -255,7 +301,7 @@ class Spool:
 
     def _resume(self) -> Segment:
         """The segment to write now: a new one, unless the newest is still empty."""
-        newest, kept = self._segments()[-1] if self._segments() else (0, Kept.UPLOADED)
+        newest, kept = self._own()[-1] if self._own() else (0, Kept.UPLOADED)
         receipt = self.receipts.newest()
         known = receipt.batch if receipt else 0
         if known > newest:
@@ -263,7 +309,7 @@ class Spool:
         if kept is not Kept.WAITING or known > newest:
             return self._begin(max(newest, known) + 1)
         segment = self._begin(newest)
-        if not segment.rows:
+        if not (segment.rows or segment.cut_commits):
             return segment
         segment.close()
         return self._begin(newest + 1)
@@ -271,7 +317,8 @@ class Spool:
     def _begin(self, number: int) -> Segment:
         segment = Segment(self._path(number), number)
         try:
-            segment.name(self.writer)
+            if not segment.rows:
+                segment.name(self.writer)
             segment.append((), (), self._heads)
         except sqlite3.Error as error:
             segment.close()

@@ -5,7 +5,7 @@ import functools
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 import pyarrow as pa
@@ -23,6 +23,8 @@ from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.tally import Tally, tallied
 
+_CUT: Final = -(1 << 62)  # the number of its event
+
 
 @dataclass(frozen=True, slots=True)
 class Sent:
@@ -31,6 +33,7 @@ class Sent:
     writer: str
     parts: tuple[Part, ...]
     lost: tuple[str, ...]
+    is_damaged: bool  # itself; what its log has lost is no longer in it
 
 
 def send(spool: Spool, number: int, store: Store) -> None:
@@ -51,7 +54,7 @@ def send(spool: Spool, number: int, store: Store) -> None:
         aside = spool.set_aside(number)
         raise Damaged(f"{error}; it is kept as {aside.name}, and its rows are not in the store") from error
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
-    if sent.lost:
+    if sent.is_damaged:
         aside = spool.set_aside(number)
         raise Damaged(f"{'; '.join(sent.lost)}; {aside.name} is kept, and all else of it is in the store")
     spool.uploaded(number)
@@ -74,6 +77,8 @@ def upload(segment: Segment, spool: str, store: Store) -> Sent:
     for location, robots in _robots(segment, store).items():
         parts += _telemetry(segment, writer, store, location, robots)
     lost = [*map(_run_lost, segment.damaged()), *map(_record_lost, segment.damaged_records())]
+    is_damaged = bool(lost)
+    lost += _commits_lost(segment)
     found: dict[str, list[dict[str, Any]]] = defaultdict(list)
     losses = (each for event in lost for each in event.records(segment.began_utc_ns))
     for number, record in (*segment.numbered(), *losses):
@@ -83,7 +88,7 @@ def upload(segment: Segment, spool: str, store: Store) -> Sent:
         _rows(TABLES[name], TABLES[name].rows(rows), writer, segment.number, store)
         for name, rows in found.items()
     ]
-    return Sent(writer, tuple(parts), tuple(event.text for event in lost))
+    return Sent(writer, tuple(parts), tuple(event.text for event in lost), is_damaged)
 
 
 def ahead(spool: Spool, store: Store) -> list[str]:
@@ -198,6 +203,17 @@ def _record_lost(lost: DamagedRecord) -> _Lost:
         "was damaged in the spool and is not in the store"
     )
     return _Lost(-2 * lost.number - 1, text, lost.robots, None, None, {"rows": 1})
+
+
+def _commits_lost(segment: Segment) -> list[_Lost]:
+    commits = segment.cut_commits
+    if not commits:
+        return []
+    text = (
+        f"up to {commits} commits at the end of batch {segment.number} (rows of all robots, some 50 ms a "
+        "commit) are lost: the log of the spool's file was damaged"
+    )
+    return [_Lost(_CUT, text, tuple(sorted(segment.robots())), None, None, {"commits": commits})]
 
 
 def _robots(segment: Segment, store: Store) -> dict[str, set[str]]:

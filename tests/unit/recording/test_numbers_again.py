@@ -16,6 +16,7 @@ from ml.store.upkeep import retain
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, send, upload
 from tests.unit.recording.robots import batch
@@ -205,6 +206,16 @@ def test_a_segment_from_before_writers_had_names_goes_under_that_of_its_spool(
         database.execute("DROP TABLE meta")
     assert send_all(tmp_path, store) == []
     assert {spool for spool, _, _ in names(store)} == {(tmp_path / "id").read_text().strip()}
+
+
+def test_what_an_opening_left_unfinished_keeps_its_writer(tmp_path: Path) -> None:
+    left = Spool(tmp_path, reserve_bytes=0)
+    left.append([], [Record("events", {"robot": "exo-01"})])
+    left.close()  # as if it had been killed: nothing is frozen
+    with Spool(tmp_path) as spool:
+        assert spool.writer != left.writer
+        with contextlib.closing(spool.read(1)) as segment:
+            assert segment.writer == left.writer
 
 
 def receipt(number: int) -> Receipt:
