@@ -62,7 +62,10 @@ def _commit(table: Path, writer: str, sequence: int) -> Path | None:
 
 
 def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except FileNotFoundError:  # it has gone since: what needs it no more was made to last before
+        return
     try:
         os.fsync(descriptor)
     finally:

@@ -1,12 +1,14 @@
 """Keeping a store in order: small files become few, old rows go, what a model names stays."""
 
+import contextlib
+import functools
 import hashlib
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Final
+from typing import Final, TypeVar
 from urllib.parse import unquote
 
 import msgspec
@@ -24,10 +26,12 @@ TARGET_BYTES: Final = 256 << 20  # of a file that compaction makes
 GRACE: Final = timedelta(
     days=7
 )  # a file that nobody needs any more stays so long, for whoever still reads it
+ATTEMPTS: Final = 10  # to compact a table, or remove rows of it, while others do
 LOOKED_BACK: Final = 20  # versions, from the newest on, for one that can be pinned
 _PINS: Final = "pins"
 _RETAINED: Final = "retained"
 _INSTANT: Final = "%Y%m%dT%H%M%S.%fZ"
+Done = TypeVar("Done")
 
 
 class Pin(msgspec.Struct, frozen=True):
@@ -54,15 +58,18 @@ def pin(store: Store, location: str, version: int, by: str) -> None:
         NoSuchTable: it is not there, or files of it are gone; the message says which versions are whole.
 
     """
+    named = Pin(location, version, by)
+    delta, path = store.table(location, version), _path(named)
+    new = store.objects.create(path, msgspec.json.encode(named))  # a vacuum that begins now knows of it
     there = set(store.objects.names(location))
-    gone = _gone(location, store.table(location, version), there)
+    gone = _gone(location, delta, there)
     if gone:
+        if new:
+            store.objects.remove(path)
         raise NoSuchTable(
             f"{store.url}/{location} has {gone} of the files of version {version} no more: old ones were "
             f"removed (gwrms cloud vacuum): {_can_be_pinned(store, location, there)}"
         )
-    named = Pin(location, version, by)
-    store.objects.create(_path(named), msgspec.json.encode(named))
 
 
 def _gone(location: str, delta: DeltaTable, there: Set[str]) -> int:
@@ -134,12 +141,24 @@ def retain(
                     filter=pyarrow.dataset.field("utc") < before
                 )
                 continue
-            delta = store.table(location)
-            _note(store, location, before)
-            found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
-            _make_last(store, location, delta)
-        went[location] = int(found["num_deleted_rows"] or 0)
+            went[location] = _again(store, location, functools.partial(_retain, store, location, before))
     return went
+
+
+def _retain(store: Store, location: str, before: datetime) -> int:
+    delta = store.table(location)
+    _note(store, location, before)
+    found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
+    _make_last(store, location, delta)
+    return int(found["num_deleted_rows"] or 0)
+
+
+def _again(store: Store, location: str, work: Callable[[], Done]) -> Done:
+    """Do it, and again where others have changed the table meanwhile, which undoes it."""
+    for _ in range(ATTEMPTS):
+        with contextlib.suppress(CommitFailedError):
+            return work()
+    raise StoreError(f"{store.url}/{location} was changed meanwhile, {ATTEMPTS} times; try again later")
 
 
 def retained(store: Store, location: str) -> datetime | None:
@@ -202,18 +221,19 @@ def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
 
 def _compact(store: Store, location: str) -> Compacted:
     with translated(f"{store.url}/{location} cannot be compacted"):
-        delta = store.table(location)
-        before = len(delta.file_uris())
-        try:
-            delta.optimize.compact(
-                target_size=TARGET_BYTES,
-                writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
-                post_commithook_properties=NO_HOOKS,
-            )
-        except CommitFailedError as error:  # rows were removed meanwhile
-            raise StoreError(f"{store.url}/{location} was changed meanwhile; compact it again") from error
-        _make_last(store, location, delta)
-        return Compacted(location, before, len(delta.file_uris()))
+        return _again(store, location, functools.partial(_put_together, store, location))
+
+
+def _put_together(store: Store, location: str) -> Compacted:
+    delta = store.table(location)
+    before = len(delta.file_uris())
+    delta.optimize.compact(
+        target_size=TARGET_BYTES,
+        writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
+        post_commithook_properties=NO_HOOKS,
+    )
+    _make_last(store, location, delta)
+    return Compacted(location, before, len(delta.file_uris()))
 
 
 def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
@@ -224,7 +244,9 @@ def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
         files = [
             table / unquote(path) for path in delta.get_add_actions(flatten=True).column("path").to_pylist()
         ]
-        durable.synchronise([*files, *(table / durable.LOG).iterdir()])
+        log = table / durable.LOG  # where others may be writing: their drafts come and go
+        entries = (entry for entry in log.glob("*.json") if not durable.is_marked(entry))
+        durable.synchronise([*files, *entries, *log.glob("*.checkpoint.parquet"), log / "_last_checkpoint"])
 
 
 def _mend(store: Store, tables: Sequence[Table]) -> None:

@@ -20,6 +20,7 @@ from tests.explore_store.robots import ANGLE, COUNT
 from tests.explore_store.server import Server
 from tests.explore_store.world import World
 
+ATTEMPTS = 3  # at an upload, of a server that is well
 LENGTH_OF_AN_ID = 36
 ROUNDED_NS = 2_000  # the store's times are microseconds
 TOLD = frozenset({EventKind.LOST.value, EventKind.REFUSED.value})
@@ -93,7 +94,10 @@ def rest(world: World) -> None:
     for name, server in world.servers.items():
         world.times.sleep(2.0)
         with world.alive(name):
-            server.turn()
+            server.cut()
+            for _ in range(ATTEMPTS):
+                if server.upload():
+                    break
             server.stop()
             problem = server.uploader.state.problem
             check(problem is None, f"server {name} cannot upload", problem)

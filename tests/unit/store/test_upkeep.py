@@ -1,11 +1,14 @@
 """Compaction, retention and vacuum: fewer files, the same rows; what a model names stays readable."""
 
 import threading
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
+from deltalake import DeltaTable
 
-from ml.store import NoSuchTable, Store
+from ml.store import NoSuchTable, Store, StoreError, durable
 from ml.store.tables import TELEMETRY
 from ml.store.upkeep import Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
 from tests.unit.store.test_store import HERE, numbers, telemetry
@@ -77,6 +80,81 @@ def test_a_version_whose_files_are_gone_cannot_be_pinned(store_url: str) -> None
     assert pins(store) == []
     pin(store, HERE, newest, "gait-3")
     assert store.dataset(HERE, newest).to_table().num_rows == 18
+
+
+def test_a_version_that_is_emptied_while_it_is_pinned_is_not_pinned(
+    folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = filled(folder_url)
+    old = store.table(HERE).version()
+    compact(store)
+    create = store.objects.create
+
+    def late(path: str, data: bytes) -> bool:
+        vacuum(Store(folder_url), grace=NOW)
+        return create(path, data)
+
+    monkeypatch.setattr(store.objects, "create", late)
+    with pytest.raises(NoSuchTable, match="6 of the files"):
+        pin(store, HERE, old, "gait-3")
+    assert pins(store) == []
+
+
+class Overtaken(Store):
+    """A store in which others are always faster, some times."""
+
+    def __init__(self, url: str, times: int, others: Callable[[int], object]) -> None:
+        super().__init__(url)
+        self._left = times
+        self._others = others
+
+    def table(self, location: str, version: int | None = None) -> DeltaTable:
+        found = super().table(location, version)
+        if location == HERE and self._left:
+            self._left -= 1
+            self._others(self._left)
+        return found
+
+
+def test_old_rows_go_also_while_others_write(folder_url: str) -> None:
+    filled(folder_url)
+
+    def write(left: int) -> None:
+        Store(folder_url).append(TELEMETRY, HERE, *telemetry(1, 100 + left), "spool-b", 10 - left)
+
+    before = datetime.fromtimestamp(0, UTC) + timedelta(microseconds=7)
+    retain(Overtaken(folder_url, 4, write), [TELEMETRY], before)
+    assert numbers(Store(folder_url)) == [*range(7, 18), 100, 101, 102, 103]
+
+
+def test_small_files_are_put_together_also_while_old_rows_go(folder_url: str) -> None:
+    filled(folder_url)
+
+    def remove(left: int) -> None:
+        before = datetime.fromtimestamp(0, UTC) + timedelta(microseconds=10 - left)
+        retain(Store(folder_url), [TELEMETRY], before)
+
+    compact(Overtaken(folder_url, 4, remove))
+    assert numbers(Store(folder_url)) == list(range(10, 18))
+
+
+def test_who_is_always_overtaken_says_so(folder_url: str) -> None:
+    filled(folder_url)
+    after = datetime.fromtimestamp(0, UTC) + timedelta(microseconds=7)
+
+    def write(left: int) -> None:
+        Store(folder_url).append(TELEMETRY, HERE, *telemetry(1, 100 + left), "spool-b", 100 - left)
+
+    with pytest.raises(StoreError, match="was changed meanwhile, 10 times; try again later"):
+        retain(Overtaken(folder_url, 99, write), [TELEMETRY], after)
+
+
+def test_what_goes_while_it_is_synchronised_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A draft of another writer's, as it is in a log for a moment."""
+    monkeypatch.setattr(Path, "exists", lambda _: True)
+    durable.synchronise([tmp_path / "00000000000000000007.json#1"])
 
 
 def test_compaction_disturbs_nobody_who_writes(store_url: str) -> None:
