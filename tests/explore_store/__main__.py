@@ -26,7 +26,7 @@ def main() -> int:
         return _replay(options.replay)
     if options.workers > 1:
         return _side_by_side(options)
-    return _search(options.seconds, options.seed, options.words)
+    return _search(options.seconds, options.seed, options.words, options.saying)
 
 
 def _options() -> argparse.Namespace:
@@ -36,17 +36,18 @@ def _options() -> argparse.Namespace:
     add("--seed", type=int, default=1, help="another one plays something else")
     add("--workers", type=int, default=1, help="so many side by side, each with a seed of its own")
     add("--words", nargs="+", default=[], metavar="WORD", help="only these steps")
+    add("--saying", default="", metavar="PATTERN", help="only violations that say this count")
     add("--replay", metavar="STEPS", help="play these again, as a violation printed them")
     add("--with-defect", metavar="DEFECT", help="put this defect back before")
     add("--defects", nargs="*", metavar="DEFECT", help="look for each of these, or of all, put back")
     return parser.parse_args()
 
 
-def _search(seconds: float, seed: int, words: list[str]) -> int:
+def _search(seconds: float, seed: int, words: list[str], saying: str) -> int:
     from tests.explore_store.searching import search, told
     from tests.explore_store.steps import KINDS
 
-    found = search(seconds, seed, words or tuple(KINDS))
+    found = search(seconds, seed, words or tuple(KINDS), saying)
     print(
         f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended"
         + (f"; {found.known} plays ended in what is known" if found.known else ""),

@@ -1,0 +1,139 @@
+"""The defects that were proved once, each with how it is put back and by what it is found.
+
+`parts` are the texts that put it back; `words` are the steps among which it is looked for; nothing says in
+which order. A defect that no play can show names the test that fails with it put back (`test`).
+"""
+
+import re
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from tests.explore.mutating import Part
+
+ROOT: Final = Path(__file__).parents[2]
+BASE: Final = ("rows", "turn", "cut", "send")
+
+
+@dataclass(frozen=True, slots=True)
+class Defect:
+    """One defect: in words, the steps among which it shows, and what a violation must say of it."""
+
+    words: str
+    steps: tuple[str, ...]
+    saying: str
+    test: str = ""
+    parts: tuple[Part, ...] = ()
+
+
+_DEFECTS: Final[dict[str, Defect]] = {
+    "number-again": Defect(
+        "a batch number that is used again is discarded, and marked as uploaded",
+        ("roll-back", "copy", "stop"),
+        "verify|not there|cannot upload",
+    ),
+    "units-mixed": Defect(
+        "values in different units share a column, whoever added it first",
+        ("unit", "link"),
+        "another unit",
+    ),
+    "order-by-utc": Defect(
+        "an export goes by UTC: a clock that is set back changes the order of rows",
+        ("clock", "export", "link"),
+        "another order|moved against",
+    ),
+    "offset-not-held": Defect(
+        "each notification has the clock's offset of its own moment",
+        ("clock", "link"),
+        "moved against|another order",
+    ),
+    "last-word-by-utc": Defect(
+        "of what is said of a label the newest by the clock holds: one that was removed still does",
+        ("clock", "label"),
+        "a label holds",
+    ),
+    "amended-by-utc": Defect(
+        "amended parameters are ignored when the clock was set back",
+        ("clock", "amend"),
+        "a session says not",
+    ),
+    "control-dropped": Defect(
+        "a full queue drops sessions, labels and events",
+        ("reboot", "mark", "label", "rows"),
+        "misnamed|not there|not listed|counted|a label holds|a session says",
+    ),
+    "description-dropped": Defect(
+        "a full queue drops what a robot says of its units",
+        ("unit", "rows", "rows"),
+        "another unit",
+    ),
+    "crc-ignored": Defect(
+        "checksums of a damaged spool are not looked at",
+        ("flip", "kill"),
+        "another value|misnamed|nobody|nobody tells|no clock",
+    ),
+    "sessions-once": Defect(
+        "after a loss the sessions that go on are not written again",
+        ("full", "reboot", "amend"),
+        "not listed|a session says",
+    ),
+    "emptied-pin": Defect(
+        "a version whose files vacuum has removed can be pinned",
+        ("pin", "vacuum", "compact"),
+        "pinned",
+        "unit/store/test_upkeep.py",
+    ),
+    "not-synchronised": Defect(
+        "an append in a folder is not synchronised before the spool forgets",
+        ("power", "crash"),
+        "",
+    ),
+    "looked-up-never": Defect(
+        "an append does not look whether its transaction is there already",
+        ("crash", "kill"),
+        "more than once|verify",
+    ),
+    "bad-journal": Defect(
+        "a journal's entry with a hash that is none stops recording",
+        ("bad-journal",),
+        "",
+        "unit/recording/test_recorder.py",
+    ),
+}
+
+
+def _with_parts() -> dict[str, Defect]:
+    told = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    parts = {name: tuple(Part(**part) for part in some) for name, some in told.items()}
+    return {name: replace(one, parts=parts.get(name, ())) for name, one in _DEFECTS.items()}
+
+
+DEFECTS = _with_parts()
+
+
+def judge(names: list[str], seconds: float) -> int:
+    """Look for each defect, put back alone in a process of its own; how many were not found."""
+    missed = 0
+    for name in names or DEFECTS:
+        found = _looked_for(name, seconds)
+        defect = DEFECTS[name]
+        missed += not (found or defect.test)
+        print(f"{name}: {found or defect.test or 'NOT FOUND'}", flush=True)
+    return min(missed, 1)
+
+
+def _looked_for(name: str, seconds: float) -> str:
+    """The play that shows it; nothing where none was found."""
+    defect = DEFECTS[name]
+    command = [
+        sys.executable, "-m", "tests.explore_store", "--with-defect", name, "--seconds", str(seconds),
+        "--words", *BASE, *defect.steps, "--saying", defect.saying,
+    ]  # fmt: skip
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    found = re.search(r"--replay '(.*)'", done.stdout)
+    if done.returncode not in (0, 1):
+        return f"cannot be put back: {done.stderr[-300:]}"
+    return found[1] if found else ""
