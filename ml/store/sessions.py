@@ -24,6 +24,7 @@ KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
 # A session is of one boot of the robot, so its clock goes on in it, whatever was done to others meanwhile.
 ORDER: Final = [(name, "ascending") for name in ("stamp_ns", "connection", "stream", "seq", "row")]
 _NAMING: Final = pa.schema([TELEMETRY.schema.field(name) for name in ("utc", *(name for name, _ in ORDER))])
+UNTOLD: Final = "what was known of this session is lost; its rows are here"  # notes of one
 _UNKNOWN: Final = datetime(1970, 1, 1, tzinfo=UTC)  # when it began
 _WHOLE: Final = (-(1 << 63), (1 << 63) - 2)  # stamps, where nobody knows which
 _AT_ONCE: Final = 8  # footers that are read at a time
@@ -94,13 +95,24 @@ def sessions(
     extents: dict[tuple[str, str], list[DataFile]] = {}
     for file in reading.files(store, TELEMETRY, robot):
         extents.setdefault((file.robot or "", file.session or ""), []).append(file)
-    stored = _rows(store, SESSIONS, robot)
+    stored, waiting = _rows(store, SESSIONS, robot), list(waiting)
     uploaded = {_name(fields) for fields in stored}
     found = [
         made(fields, Extent(extents.get(_name(fields), ())), _name(fields) in uploaded)
         for fields in newest([*stored, *waiting])
     ]
+    told = {_name(fields) for fields in (*stored, *waiting)}
+    found += [
+        untold(*name, Extent(files))
+        for name, files in extents.items()
+        if name not in told and robot in (None, name[0])
+    ]
     return in_order(found)
+
+
+def untold(robot: str, session: str, extent: Extent, uploaded: bool = True) -> Session:
+    """A session of which there is telemetry, and no row that says anything of it."""
+    return made({"robot": robot, "session": session, "notes": UNTOLD}, extent, uploaded)
 
 
 def _name(fields: Mapping[str, Any]) -> tuple[str, str]:

@@ -13,7 +13,7 @@ USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
 
   ls          tables, or with --path the files below one
   du          who takes how much: tables and robots
-  verify      is every file there and whole, and every batch that the spool has sent
+  verify      is every file there and whole, and every row that the spool has sent
   upload      what waits in the spool, now; or with --from a whole store
   download    a store, or some robots or sessions of it, into a folder
   compact     put small files together

@@ -13,6 +13,7 @@ from server_gui.core.cloud import usage
 from server_gui.core.cloud import verify as checks
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.settings import SettingsError
 
 VERIFY: Final = (
     "Check every file of every table, and that every row of every batch which this computer's spool has "
@@ -69,7 +70,7 @@ def verify(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     try:
         return _verify(arguments)
-    except (StoreError, SpoolUnusable) as error:
+    except (StoreError, SpoolUnusable, SettingsError, OSError) as error:
         if arguments.json:
             say_json({"files": 0, "problems": [str(error)], "looked": False})
         warn("cloud", str(error))

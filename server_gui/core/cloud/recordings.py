@@ -57,20 +57,22 @@ class Recordings:
         try:
             self._store = Snapshot.existing(self._url)
         except NoSuchTable:
-            if not self._waiting(SESSIONS):
+            if not self.sessions():
                 raise
         except (StoreRefused, StoreUnreachable) as error:
             self._batches = spooled.kept(self._spool)
-            if not self._waiting(SESSIONS):
+            if not self.sessions():
                 raise
             self.problem = error
 
     def sessions(self) -> list[Session]:
         """Every session, oldest first; rows that wait for upload are not counted."""
         told = self._waiting(SESSIONS)
-        if self._store is None:
-            return sessions.in_order(sessions.unstored(told))
-        return sessions.sessions(self._store, waiting=told)
+        found = (
+            sessions.unstored(told) if self._store is None else sessions.sessions(self._store, waiting=told)
+        )
+        known = ((each.robot, each.session) for each in found)
+        return sessions.in_order([*found, *spooled.untold(self._spool, self._batches, known)])
 
     def find(self, name: str, robot: str | None = None) -> Session:
         """The session whose name is this, or alone begins so.

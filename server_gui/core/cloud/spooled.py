@@ -11,6 +11,8 @@ from typing import Any, Final
 import msgspec
 
 from ml.store import Table
+from ml.store import sessions as sessions_
+from ml.store.fragments import Extent
 from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
@@ -43,8 +45,17 @@ def kept(spool: Path) -> list[int]:
 
 
 def sessions(spool: Path) -> list[Session]:
-    """Those that are told of in what waits for upload; their telemetry is not counted."""
-    return unstored(rows(spool, SESSIONS))
+    """Those of which something waits for upload; their telemetry is not counted."""
+    batches = waiting(spool)
+    told = unstored(rows(spool, SESSIONS, batches))
+    return [*told, *untold(spool, batches, ((each.robot, each.session) for each in told))]
+
+
+def untold(spool: Path, batches: Iterable[int], known: Iterable[tuple[str, str]]) -> list[Session]:
+    """Those of which these batches have telemetry, and that are none of the known ones."""
+    sql = "SELECT DISTINCT robot, session FROM run"
+    found = {name for batch in batches for name in _read(spool, batch, sql)} - set(known)
+    return [sessions_.untold(robot, name, Extent(()), uploaded=False) for robot, name in sorted(found)]
 
 
 def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> list[dict[str, Any]]:

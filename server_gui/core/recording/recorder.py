@@ -18,9 +18,10 @@ from server_gui.core.recording.clocks import Moment, Reading
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.gathering import EventKind, Notification
 from server_gui.core.recording.journals import Entry
+from server_gui.core.recording.lost import Part, told
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.robots import Robots
-from server_gui.core.recording.rows import JournalHead, Record, Run
+from server_gui.core.recording.rows import Record, Run
 from server_gui.core.recording.spool import Spool
 from server_gui.core.watching import BEAT_S, Worker
 
@@ -31,9 +32,9 @@ SHARES: Final = 2  # of several robots, one may have this part of what waits: it
 COMMIT_S: Final = 0.05  # rows of so long go to the disk together
 HELD_S: Final = 60.0  # that a mistake of ours stays an alarm, so that it is seen
 AGAIN_S: Final = 1.0  # between attempts on a disk that refuses, and looks at how full it is
+LAST_S: Final = 10.0  # at the end, that a disk which refuses is tried again; then what waits is lost
 
 Work = Callable[[], Iterable[Record]]
-Part = Run | Record | tuple[str, JournalHead]  # what is committed: rows, or up to where a journal is recorded
 
 
 class Item(NamedTuple):
@@ -109,6 +110,7 @@ class Recorder:
         self._waiting: Counter[str] = Counter()  # rows that wait, of each robot
         self._senders: set[str] = set()  # robots that have sent something
         self._ending = threading.Event()
+        self._until_s = 0.0  # how long a disk is tried at the end
         # The recorder's thread.
         self._robots = Robots(spool.heads)
         self._alarms: dict[AlarmKind, Alarm] = {}
@@ -130,8 +132,13 @@ class Recorder:
         self.close()
 
     def close(self) -> None:
-        """End every session, put what waits into the spool, freeze it, and join the thread. Idempotent."""
+        """End every session, put what waits into the spool, freeze it, and join the thread. Idempotent.
+
+        A disk that refuses is tried again for `LAST_S`; what is lost then is named in the log.
+        """
         with self._changed:
+            if not self._ending.is_set():
+                self._until_s = time.monotonic() + LAST_S
             self._ending.set()
             self._changed.notify_all()
         self.worker.join()
@@ -318,7 +325,10 @@ class Recorder:
         runs = self._robots.runs()
         rows = sum(map(len, runs)) + len(found)
         if not self._has_room():
-            self._lose(rows)
+            if self._ending.is_set():
+                self._give_up([*runs, *found], f"the disk of {self._spool.folder} is nearly full")
+            else:
+                self._lose(rows)
             return
         for robot, count in self._untold.items():
             found += self._robots.lost(count, robot)
@@ -341,16 +351,27 @@ class Recorder:
             except SpoolUnusable as error:
                 self._alarm(AlarmKind.SPOOL_FAILED, str(error))
                 left.append(now)
-                if self._ends_within(AGAIN_S):
-                    self._lose(sum(_rows(part) for parts in left for part in parts))
+                if self._gives_up_within(AGAIN_S):
+                    self._give_up([part for parts in left for part in parts], str(error))
                     return
 
-    def _ends_within(self, wait_s: float) -> bool:
-        """Wait so long, and say that this is no standing still; True as soon as it is to end."""
+    def _gives_up_within(self, wait_s: float) -> bool:
+        """Wait so long, and say that this is no standing still; True where the end has come and is over."""
         until_s = time.monotonic() + wait_s
-        while (left_s := until_s - time.monotonic()) > 0 and not self._ending.wait(min(left_s, BEAT_S)):
+        while not self._ending.is_set() and (left_s := until_s - time.monotonic()) > 0:
+            self._ending.wait(min(left_s, BEAT_S))
             self.worker.beat()
-        return self._ending.is_set()
+        if not self._ending.is_set():
+            return False
+        time.sleep(min(wait_s, BEAT_S))  # between attempts on a disk: nobody else can say when it is well
+        self.worker.beat()
+        return time.monotonic() >= self._until_s
+
+    def _give_up(self, parts: Sequence[Part], why: str) -> None:
+        """What is lost at the end has no event any more, so the log says by name what that is."""
+        self._lose(sum(map(_rows, parts)))
+        for text in told(parts):
+            log.error("%s; lost: %s", why, text)
 
     def _append(self, parts: Sequence[Part]) -> None:
         """Commit these together; raises as `Spool.append` does, and nothing of them is kept then."""

@@ -65,7 +65,7 @@ def _free_bytes(folder: Path) -> int:
 class Spool:
     """One server's spool; use it as a context manager.
 
-    `writer` is what this opening of it is called at the store: the spool's `id`, a dot, and what no other
+    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, and what no other
     opening has, because no opening can know that nobody has changed the files since the one before.
 
     `append` and `freeze` belong to one thread, the recorder's. Everything else may be called from others.
@@ -89,7 +89,7 @@ class Spool:
         self._lock = _take(folder)
         try:
             self.id = self._identify()
-            self.writer = f"{self.id}.{uuid.uuid4().hex[:12]}"
+            self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
             self.receipts = Receipts(folder / RECEIPTS)
             self._writers = {self.id}
             self._look_at_logs()

@@ -247,5 +247,6 @@ def test_what_went_to_another_store_is_not_missed_here(place: Place, tmp_path: P
 
 def test_where_nobody_can_look_the_exit_status_says_so(place: Place, tmp_path: Path) -> None:
     assert place.verify((tmp_path / "nothing").as_uri())[0] == 2
+    assert main(["cloud", "verify", "--config", str(tmp_path / "nothing.toml")]) == 2
     (place.store / "store.json").write_text("{")
     assert place.verify()[0] == 2

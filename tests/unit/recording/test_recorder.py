@@ -254,6 +254,37 @@ def test_what_the_disk_refused_is_tried_again(tmp_path: Path) -> None:
         assert len(rows(kept(spool)[0])) == 1
 
 
+def test_at_the_end_a_disk_that_refuses_is_tried_again(tmp_path: Path) -> None:
+    with StuckSpool(tmp_path) as spool:
+        with Recorder(spool) as recorder:
+            assert recorder.flush(WAIT_S)
+            recorder.record("exo-01", 1, batch(0, 7))
+            assert spool.reached.wait(WAIT_S)
+            recorder.record("exo-01", 1, batch(1, 8))
+            spool.refusals = 3
+            spool.let_go.set()
+        assert recorder.state.lost == 0
+        assert len(rows(kept(spool)[0])) == 15
+
+
+def test_what_is_lost_at_the_end_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("server_gui.core.recording.recorder.LAST_S", 0.5)
+    with StuckSpool(tmp_path) as spool:
+        with Recorder(spool) as recorder:
+            session = recorder.begin("exo-01", Facts())
+            recorder.record("exo-01", 1, batch(0, 7))
+            assert spool.reached.wait(WAIT_S)
+            spool.refusals = 1_000
+            spool.let_go.set()
+        assert recorder.state.lost > 7
+        assert kept(spool) == ([], [])
+    said = [text for text in caplog.messages if text.startswith("the disk refuses; lost: exo-01: ")]
+    assert any(f"7 rows of telemetry, session {session}, 20" in text for text in said)
+    assert any("rows of sessions, 20" in text for text in said)
+
+
 def test_a_nearly_full_disk_stops_recording_with_an_alarm_and_it_goes_on_when_there_is_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,11 +2,12 @@
 
 import itertools
 from collections.abc import Iterator
+from typing import Any
 
 import pyarrow as pa
 import pytest
 
-from ml.store import NoSuchTable, Store, StoreError
+from ml.store import NoSuchTable, Store, StoreError, StoreUnreachable
 from ml.store.objects import Objects
 from ml.store.store import CHECKPOINT_EVERY, Batches
 from ml.store.tables import EVENTS, TELEMETRY, field
@@ -65,6 +66,23 @@ def test_two_that_append_the_same_with_an_old_view_do_it_once(store_url: str) ->
     appended = [store.append(TELEMETRY, HERE, *telemetry(3, 1), "spool-a", 2) for store in stores]
     assert appended == [True, False]
     assert numbers(stores[0]) == [0, 1, 2, 3]
+
+
+def test_an_append_whose_answer_is_lost_is_there_once(
+    store_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commit = Store._commit
+
+    def lost(*given: Any) -> None:
+        commit(*given)
+        raise OSError("timed out")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(Store, "_commit", lost)
+        with pytest.raises(StoreUnreachable, match="timed out"):
+            Store(store_url).append(TELEMETRY, HERE, *telemetry(3), "spool-a", 1)
+    assert not Store(store_url).append(TELEMETRY, HERE, *telemetry(3), "spool-a", 1)
+    assert numbers(Store(store_url)) == [0, 1, 2]
 
 
 @pytest.mark.parametrize("unit", ["°", None])

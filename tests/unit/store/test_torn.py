@@ -143,7 +143,11 @@ def test_an_entry_that_may_just_be_written_is_left_alone(url: str) -> None:
     assert entry(url, 3).read_bytes() == data
 
 
-def test_an_entry_that_was_acknowledged_is_never_set_aside(url: str) -> None:
+def test_an_entry_that_was_acknowledged_is_never_set_aside(url: str, tmp_path: Path) -> None:
+    try:
+        os.setxattr(tmp_path, "user.gwrms.test", b"1")
+    except OSError:
+        pytest.skip("this file system has no extended attributes")
     with entry(url, 3).open("r+b") as file:  # it keeps its mark
         file.truncate(50)
     os.utime(entry(url, 3), (0, 0))

@@ -1,0 +1,114 @@
+"""Telemetry whose session's own row was lost is listed, exported and learned from like any other."""
+
+import collections
+import contextlib
+import csv
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from gateway.main import main
+from ml.store import Store
+from ml.store import sessions as stored
+from ml.store.sessions import UNTOLD, Session
+from ml.training.recorded import recorded
+from server_gui.core.cloud import spooled
+from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.recording.errors import Damaged
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.records import Facts
+from server_gui.core.recording.rows import Record
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import send
+from tests.unit.recording.robots import CHANNELS, batch, description
+
+ROWS, WAIT_S = 50, 30.0
+
+
+def record(folder: Path) -> str:
+    """A session whose rows are damaged in the spool, but for its telemetry; its name."""
+    with Spool(folder, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        recorder.describe("exo-01", description("exo-01"))
+        session = recorder.begin("exo-01", Facts(parameters={"gain": 2.0}))
+        recorder.record("exo-01", 1, batch(0, ROWS))
+    with contextlib.closing(sqlite3.connect(folder / "00000001.db")) as database, database:
+        database.execute("UPDATE record SET content = zeroblob(length(content))")
+    return session
+
+
+def upload(folder: Path, url: str) -> None:
+    with Spool(folder, reserve_bytes=0) as spool:
+        for number in spool.waiting():
+            with contextlib.suppress(Damaged):
+                send(spool, number, Store(url))
+
+
+def test_while_it_waits_it_is_listed_and_can_be_exported(tmp_path: Path, folder_url: str) -> None:
+    name = record(tmp_path)
+    known = Recordings(folder_url, tmp_path)  # there is no store yet
+    [session] = known.sessions()
+    assert (session.session, session.notes, session.uploaded) == (name, UNTOLD, False)
+    assert [each.session for each in spooled.sessions(tmp_path)] == [name]
+    [rows] = known.open(session).telemetry(CHANNELS)
+    assert rows.num_rows == ROWS
+
+
+def test_in_the_store_it_is_listed_exported_and_learned_from(
+    tmp_path: Path, folder_url: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = record(tmp_path)
+    upload(tmp_path, folder_url)
+    store = Store(folder_url)
+    [session] = stored.sessions(store)
+    assert (session.session, session.rows, session.notes) == (name, ROWS, UNTOLD)
+    assert len(recorded(store, "exo-01", name, CHANNELS).stamps_ns) == ROWS
+    assert main(["sessions", "ls", "--url", folder_url]) == 0
+    assert name in capsys.readouterr().out
+    out = tmp_path / "out.csv"
+    assert main(["sessions", "export", name, "--url", folder_url, "--out", str(out)]) == 0
+    with out.open() as lines:
+        assert len(list(csv.reader(lines))) == 1 + ROWS
+
+
+def test_a_session_that_is_told_of_in_the_spool_is_listed_once(tmp_path: Path, folder_url: str) -> None:
+    record(tmp_path)
+    upload(tmp_path, folder_url)
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+        [untold] = stored.sessions(Store(folder_url))
+        spool.append((), [_row(untold)])
+        spool.freeze()
+    [session] = Recordings(folder_url, tmp_path).sessions()
+    assert (session.rows, session.notes) == (ROWS, "")
+
+
+def _row(session: Session) -> Record:
+    fields = {"robot": session.robot, "session": session.session, "utc": 1_000, "began": 1_000}
+    return Record("sessions", fields)
+
+
+def test_rows_of_a_boot_that_began_while_the_disk_was_full_are_in_its_session(
+    tmp_path: Path, folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.core.recording.recorder.AGAIN_S", 0.0)
+    free = collections.deque([10])
+    with (
+        Spool(tmp_path, reserve_bytes=10, free_bytes=lambda folder: free[0]) as spool,
+        Recorder(spool) as recorder,
+    ):
+        old = recorder.begin("exo-01", Facts(parameters={"gain": 1.0}))
+        recorder.record("exo-01", 1, batch(0, 10))
+        assert recorder.flush(WAIT_S)
+        free[0] = 0
+        new = recorder.begin("exo-01", Facts(parameters={"gain": 2.0}))
+        recorder.record("exo-01", 1, batch(0, 7, link=2))
+        assert recorder.flush(WAIT_S)
+        free[0] = 10
+        recorder.record("exo-01", 1, batch(1, 15, link=2))
+        recorder.amend("exo-01", Facts(parameters={"gain": 3.0}))
+    upload(tmp_path, folder_url)
+    found = {each.session: each for each in stored.sessions(Store(folder_url))}
+    assert {name: (each.rows, each.parameters["gain"]) for name, each in found.items()} == {
+        old: (10, 1.0),
+        new: (15, 3.0),
+    }
