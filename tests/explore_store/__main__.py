@@ -21,7 +21,7 @@ def main() -> int:
     if options.defects is not None:
         from tests.explore_store.defects import judge
 
-        return judge(options.defects, options.seconds)
+        return judge(options.defects, options.seconds, _say)
     if options.replay is not None:
         return _replay(options.replay)
     if options.workers > 1:
@@ -48,15 +48,14 @@ def _search(seconds: float, seed: int, words: list[str], saying: str) -> int:
     from tests.explore_store.steps import KINDS
 
     found = search(seconds, seed, words or tuple(KINDS), saying)
-    print(
+    _say(
         f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended"
-        + (f"; {found.known} plays ended in what is known" if found.known else ""),
-        flush=True,
+        + (f"; {found.known} plays ended in what is known" if found.known else "")
     )
     if found.wrong is None:
         return 0
     assert found.error is not None
-    print(f"seed {found.seed}: {told(found.error)}\n./dev explore store --replay '{found.wrong}'", flush=True)
+    _say(f"seed {found.seed}: {told(found.error)}\n./dev explore store --replay '{found.wrong}'")
     return 1
 
 
@@ -69,10 +68,15 @@ def _replay(text: str) -> int:
         with S3() as s3:
             points = played(Script.parsed(text), s3)
     except Exception as error:  # noqa: BLE001 - that is what it is for
-        print(told(error))
+        _say(told(error))
         return 1
-    print(f"nothing is wrong: {points} points")
+    _say(f"nothing is wrong: {points} points")
     return 0
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 def _side_by_side(options: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -96,6 +97,11 @@ _DEFECTS: Final[dict[str, Defect]] = {
         ("crash", "kill"),
         "more than once|verify",
     ),
+    "torn-log": Defect(
+        "an entry of a log that a power cut has torn off keeps every upload from its table",
+        ("power", "crash"),
+        "cannot upload",
+    ),
     "bad-journal": Defect(
         "a journal's entry with a hash that is none stops recording",
         ("bad-journal",),
@@ -112,16 +118,25 @@ def _with_parts() -> dict[str, Defect]:
 
 
 DEFECTS = _with_parts()
+# What no play shows: what keeps it from coming back is tried by these.
+BESIDE: Final = {
+    "model pointers are skipped or overwritten by size alone": "unit/cloud/test_transfer.py",
+    "one wearer, spelled in two ways, is on both sides of what is held out": "unit/training/test_judging.py",
+    "a promotion race lets a model serve over another than it was to": "unit/registry/test_registry.py",
+    "a download by robot replaces what its folder has of another store": "unit/cloud/test_transfer.py",
+}
 
 
-def judge(names: list[str], seconds: float) -> int:
+def judge(names: list[str], seconds: float, say: Callable[[str], None]) -> int:
     """Look for each defect, put back alone in a process of its own; how many were not found."""
     missed = 0
     for name in names or DEFECTS:
         found = _looked_for(name, seconds)
         defect = DEFECTS[name]
         missed += not (found or defect.test)
-        print(f"{name}: {found or defect.test or 'NOT FOUND'}", flush=True)
+        say(f"{name}: {found or defect.test or 'NOT FOUND'}")
+    for words, test in () if names else BESIDE.items():
+        say(f"{words}: {test}")
     return min(missed, 1)
 
 

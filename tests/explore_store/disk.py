@@ -1,9 +1,9 @@
 """A disk that says what a power cut leaves: what was synchronised, and of the rest anything.
 
 A node is a file's contents, as an inode; a name in a folder leads to it. Both last only once they are
-synchronised, each for itself. Of contents that are not, a power cut leaves the old ones, the new ones, a beginning
-of them, nothing, or some sectors of each. SQLite's own synchronising cannot be seen from Python: its
-statements stand for it (`Watched`).
+synchronised, each for itself. Of contents that are not, a power cut leaves the old ones, the new ones, a
+beginning of them, nothing, or some sectors of each. SQLite's own synchronising cannot be seen from Python:
+its statements stand for it (`Watched`).
 """
 
 import errno
@@ -229,8 +229,7 @@ def _mixed(old: bytes, new: bytes, chance: random.Random) -> bytes:
     length = chance.choice((len(old), len(new)))
     padded = [each.ljust(length, b"\0") for each in (old, new)]
     return b"".join(
-        padded[chance.randrange(2)][begin : min(begin + SECTOR, length)]
-        for begin in range(0, length, SECTOR)
+        padded[chance.randrange(2)][begin : min(begin + SECTOR, length)] for begin in range(0, length, SECTOR)
     )
 
 
@@ -297,7 +296,7 @@ def watching(disk: Disk) -> Callable[..., sqlite3.Connection]:
             return real(path, **options)
         if disk.left is not None:
             raise Ended
-        opened = real(path, factory=Watched, **options)
+        opened: Watched = real(path, factory=Watched, **options)
         opened.disk, opened.file = disk, path
         disk.connections.add(opened)
         return opened

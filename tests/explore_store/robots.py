@@ -66,7 +66,9 @@ class Link:
     def again(self) -> None:
         self.number, self.seq = self.number + 1, 0
 
-    def batch(self, counts: list[int], angles: list[float | None], stamps_ns: list[int], now_ns: int) -> Batch:
+    def batch(
+        self, counts: list[int], angles: list[float | None], stamps_ns: list[int], now_ns: int
+    ) -> Batch:
         found = Batch(
             stamps_ns, {COUNT: [*map(float, counts)], ANGLE: angles}, self.seq, 0, 0, self.number, now_ns
         )

@@ -1,4 +1,4 @@
-"""As much of S3 as the store asks for, in memory, written from its API reference; it may fail as real ones do.
+"""As much of S3 as the store asks for, in memory, from its API reference; it may fail as real ones do.
 
 Amazon S3 API Reference: PutObject (with `If-None-Match: *`), GetObject, HeadObject, DeleteObject,
 DeleteObjects, ListObjectsV2. Any key opens it.
@@ -9,7 +9,7 @@ import http.server
 import re
 import threading
 import urllib.parse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from email.utils import formatdate
 from enum import Enum
 from typing import Any, Final, Self
@@ -117,12 +117,17 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
             query = dict(urllib.parse.parse_qsl(parts.query, keep_blank_values=True))
             return path.partition("/")[2], query
 
-        def _answer(self, status: int, body: bytes = b"", head: bool = False, **headers: str) -> None:
+        def _answer(
+            self,
+            status: int,
+            body: bytes = b"",
+            *,
+            head: bool = False,
+            headers: Mapping[str, str] | None = None,
+        ) -> None:
             self.send_response(status)
-            if "Content_Length" not in headers:
-                headers["Content_Length"] = str(len(body))
-            for name, value in headers.items():
-                self.send_header(name.replace("_", "-"), value)
+            for name, value in {"Content-Length": str(len(body)), **(headers or {})}.items():
+                self.send_header(name, value)
             self.end_headers()
             if not head:
                 self.wfile.write(body)
@@ -133,7 +138,7 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
                 raise NotImplementedError("chunks with signatures")
             return data
 
-        def _write(self, key: str | None, work: Callable[[], tuple[int, bytes]], **headers: str) -> None:
+        def _write(self, key: str | None, work: Callable[[], tuple[int, bytes]], tag: str = "") -> None:
             """Do it, or what goes wrong with it."""
             with service.lock:
                 if not service.dead:
@@ -148,7 +153,7 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
                 if fault is Fault.UNANSWERED:
                     self.close_connection = True
                     return
-            self._answer(status, body, **headers)
+            self._answer(status, body, headers={"ETag": tag} if tag else None)
 
         def do_PUT(self) -> None:
             key, _ = self._asked()
@@ -160,7 +165,7 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
                 service.objects[key] = data
                 return 200, b""
 
-            self._write(key, put, ETag=_tag(data))
+            self._write(key, put, _tag(data))
 
         def do_DELETE(self) -> None:
             key, _ = self._asked()
@@ -177,7 +182,9 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
             if "delete" not in query:
                 self._answer(501, _error("NotImplemented"))
                 return
-            keys = [each.text or "" for each in ElementTree.fromstring(data).iter() if each.tag.endswith("Key")]
+            keys = [
+                each.text or "" for each in ElementTree.fromstring(data).iter() if each.tag.endswith("Key")
+            ]
 
             def delete() -> tuple[int, bytes]:
                 for key in keys:
@@ -195,7 +202,7 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
             if key:
                 self._read(head=False)
             else:
-                self._answer(200, _listing(service, query), Content_Type="application/xml")
+                self._answer(200, _listing(service, query), headers={"Content-Type": "application/xml"})
 
         def _read(self, *, head: bool) -> None:
             key, _ = self._asked()
@@ -205,17 +212,17 @@ def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
                 self.close_connection = True
                 return
             if data is None:
-                self._answer(404, _error("NoSuchKey"), head)
+                self._answer(404, _error("NoSuchKey"), head=head)
                 return
-            headers = {"ETag": _tag(data), "Last_Modified": formatdate(1_795_000_000, usegmt=True)}
+            headers = {"ETag": _tag(data), "Last-Modified": formatdate(1_795_000_000, usegmt=True)}
             found = re.fullmatch(r"bytes=(\d*)-(\d*)", self.headers.get("Range", ""))
             if found is None:
-                self._answer(200, data, head, Content_Length=str(len(data)), **headers)
+                self._answer(200, data, head=head, headers=headers)
                 return
             first = int(found[1]) if found[1] else max(0, len(data) - int(found[2]))
             last = min(int(found[2]), len(data) - 1) if found[1] and found[2] else len(data) - 1
-            headers["Content_Range"] = f"bytes {first}-{last}/{len(data)}"
-            self._answer(206, data[first : last + 1], head, **headers)
+            headers["Content-Range"] = f"bytes {first}-{last}/{len(data)}"
+            self._answer(206, data[first : last + 1], head=head, headers=headers)
 
     return Handler
 

@@ -25,7 +25,7 @@ SHRINK_S: Final = 60.0
 MEMORY: Final = Path("/dev/shm")  # a disk that costs nothing; ours says itself what a power cut leaves
 # What is not mended yet, and why: what a violation says, as a regular expression.
 KNOWN: Final[dict[str, str]] = {
-    r"part-[-0-9a-f]*(-c000)?\.zstd\.parquet is not there": "vacuum after a compaction that was not synchronised",
+    r"part-[-0-9a-f]*(-c000)?\.zstd\.parquet is not there": "a vacuum after a compaction that did not last",
     r"Invalid table version": "a checkpoint without its entry after a power cut",
 }
 

@@ -1,5 +1,6 @@
 """What may happen, each in a word with numbers: `rows A 1 3` is that robot 1 sends server A three rows."""
 
+import contextlib
 import errno
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -204,10 +205,8 @@ def _kept_up(work: Callable[[Store], object]) -> Play:
     """Somebody else keeps the store in order; that may end too, and fail."""
 
     def play(world: World, *_: int) -> None:
-        try:
+        with contextlib.suppress(StoreError, OSError, Ended):
             work(Store.existing(world.url))
-        except (StoreError, OSError, Ended):
-            pass
         if world.disk.left is not None:  # it ended within
             world.bury("A")
 
@@ -218,16 +217,18 @@ def _retain(world: World, age: int, *_: int) -> None:
     before_ns = world.times.time_ns() - age * 50_000_000
     before = datetime.fromtimestamp(before_ns / 1e9, UTC)
     judging.retire(world, before)
+    world.retained = True
     _kept_up(lambda store: upkeep.retain(store, [TELEMETRY], before))(world, 0, 0, 0)
 
 
-def _pin(world: World, *_: int) -> None:
+def _pin(world: World, back: int, *_: int) -> None:
+    """Of this or an earlier version; what is pinned can be read from then on."""
+
     def pin(store: Store) -> None:
         location = TELEMETRY.locations(store.about.shards)[0]
-        delta = store.table(location)
-        rows = store.dataset(location, delta.version()).count_rows()
-        upkeep.pin(store, location, delta.version(), "model")
-        world.pinned.append((location, delta.version(), rows))
+        version = max(0, store.table(location).version() - back)
+        upkeep.pin(store, location, version, "model")
+        world.pinned.append((location, version, judging.rows_of_version(store, location, version)))
 
     _kept_up(pin)(world, 0, 0, 0)
 
@@ -277,7 +278,7 @@ KINDS: Final = {
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
     "vacuum": Kind(_kept_up(lambda store: upkeep.vacuum(store, grace=timedelta(0))), (), 1),
     "retain": Kind(_retain, (6,), 1),
-    "pin": Kind(_pin, (), 1),
+    "pin": Kind(_pin, (3,), 2),
     "query": Kind(_query, (), 1),
     "export": Kind(_export, (2,), 1),
 }
@@ -320,11 +321,11 @@ BETWEEN_NS: Final = 1_234_567  # two steps
 
 def play(script: Script, folder: Path, s3: S3) -> World:
     """Play these steps, come to rest, and judge; raises `judging.Wrong`."""
-    with World(folder, 2 if script.place is Place.SHARDS else 1, s3 if script.place is Place.S3 else None) as world:
+    with World(
+        folder, 2 if script.place is Place.SHARDS else 1, s3 if script.place is Place.S3 else None
+    ) as world:
         for step in script.steps:
             world.times.now_ns += BETWEEN_NS
             step.play(world)
         judging.judge(world)
     return world
-
-

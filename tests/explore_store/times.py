@@ -1,4 +1,4 @@
-"""Time and names for one play: nothing of the path asks the computer for either, so a play is always the same."""
+"""Time and names for one play: the path asks the computer for neither, so a play is always the same."""
 
 import random
 import sys
@@ -73,4 +73,4 @@ class Moment:
 
 def ours() -> list[ModuleType]:
     """The modules of the path, as far as they are imported."""
-    return [module for name, module in sorted(sys.modules.items()) if name.startswith(OURS) and module]
+    return [module for name, module in sorted(sys.modules.items()) if name.startswith(OURS)]

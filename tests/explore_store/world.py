@@ -1,4 +1,4 @@
-"""One play: a computer with two servers, robots, and a store; its steps, and what the ledger knows of them."""
+"""Where a play takes place: a computer with two servers, their robots, and a store."""
 
 import concurrent.futures
 import contextlib
@@ -38,6 +38,7 @@ class World:
         self.s3 = s3
         self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
         self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
+        self.retained = False  # rows may be gone because they were old: then nobody can tell them from others
         self.damage: int | None = None  # what is done to the store at the end
         both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg")
         self.robots = [both, mine, other]
