@@ -132,7 +132,7 @@ def _extent(session: Session, waiting: Rows) -> tuple[int, int]:
 
 def _newest(parts: Iterable[Rows]) -> list[Rows]:
     """The newest `MOST_WAITING` rows of these."""
-    found = sorted((part for part in parts if len(part)), key=lambda part: int(part.utc_ns[0]))
+    found = sorted((part for part in parts if len(part)), key=lambda part: int(part.stamps_ns[0]))
     rows = 0
     kept: list[Rows] = []
     for part in reversed(found):

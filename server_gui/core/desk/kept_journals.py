@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import msgspec
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
@@ -25,7 +24,7 @@ from server_gui.core.desk.chains import Entry
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.settings import ServerSettings
 
-KEPT: Final = 2000  # entries of each robot, the newest
+KEPT: Final = 2000  # entries of each robot by each spool, the newest
 LOOK_S: Final = 60.0  # between looks, while somebody looks
 AGAIN_S: Final = 5.0  # before a store that was away is tried again
 
@@ -123,7 +122,8 @@ def _stored(url: str) -> list[dict[str, Any]]:
         return []
     with translated(f"{url}/{JOURNAL.name} cannot be read"):
         table = reading.dataset(store, JOURNAL)
-        wanted = [_newest(part) for part in _by_robot(table.to_table(columns=["robot", "utc"]))]
+        known = table.to_table(columns=["robot", "spool", "batch", "number"])
+        wanted = [_newest(part) for part in _parts(known)]
         if not wanted:
             return []
         newest = functools.reduce(operator.or_, wanted)
@@ -131,17 +131,24 @@ def _stored(url: str) -> list[dict[str, Any]]:
     return found
 
 
-def _by_robot(rows: pa.Table) -> list[pa.Table]:
-    robots = pc.unique(rows["robot"])
-    return [rows.filter(pc.equal(rows["robot"], robot)) for robot in robots]
+def _parts(rows: pa.Table) -> list[pa.Table]:
+    """Those of each robot that came by one spool, however often that was begun anew."""
+    whose = pc.replace_substring_regex(rows["spool"], "/.*", "")
+    rows = rows.append_column("whose", whose)
+    keys = rows.group_by(["robot", "whose"]).aggregate([]).to_pylist()
+    column = pyarrow.dataset.field
+    return [
+        rows.filter((column("robot") == key["robot"]) & (column("whose") == key["whose"])) for key in keys
+    ]
 
 
 def _newest(rows: pa.Table) -> pyarrow.dataset.Expression:
-    """Which rows of this robot are read."""
-    times, column = rows["utc"].drop_null(), pyarrow.dataset.field
-    wanted = column("robot") == rows["robot"][0]
-    if len(times) > KEPT:
-        in_us = times.cast(pa.int64()).to_numpy()
-        since = pa.scalar(int(np.partition(in_us, -KEPT)[-KEPT]), pa.int64()).cast(times.type)
-        wanted &= column("utc") >= since
+    """Which of these are read: those that came last, whatever the robot's clock said."""
+    column = pyarrow.dataset.field
+    wanted = (column("robot") == rows["robot"][0]) & column("spool").isin(rows["spool"].unique())
+    if len(rows) > KEPT:
+        by_place = rows.sort_by([("batch", "descending"), ("number", "descending")])
+        batch, number = (by_place[name][KEPT - 1] for name in ("batch", "number"))
+        later = (column("batch") == batch) & (column("number") >= number)
+        wanted &= (column("batch") > batch) | later
     return wanted

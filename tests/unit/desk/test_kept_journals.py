@@ -127,6 +127,18 @@ def test_of_a_long_journal_the_newest_are_read(
     assert numbers(list(look(settings).by_robot["exo-01"].stretches)) == [[5, 6]]
 
 
+def test_the_newest_are_those_that_came_last_whatever_the_robots_clock_says(
+    settings: ServerSettings, journal: RobotsJournal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "KEPT", 2)
+    found = entries(journal)
+    collect(settings, "exo-01", found[:4])
+    for entry in found[4:]:  # not told from an altered one here: only which are read counts
+        entry["utc_ns"] -= 3_600 * 10**9
+    collect(settings, "exo-01", found[4:])
+    assert numbers(list(look(settings).by_robot["exo-01"].stretches)) == [[5, 6]]
+
+
 def test_a_store_that_is_away_is_told_and_what_was_read_stays(
     settings: ServerSettings, journal: RobotsJournal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
