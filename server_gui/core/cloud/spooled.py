@@ -17,7 +17,7 @@ from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
-from server_gui.core.recording.segment import translated, unaltered
+from server_gui.core.recording.segment import DATA, is_sound, translated, unaltered
 
 _NUMBER: Final = "[0-9]" * 8
 _decoder = msgspec.msgpack.Decoder(Record)
@@ -72,14 +72,15 @@ def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> lis
 
 
 def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
-    """A session's telemetry in this batch, a run a stream and layout."""
+    """A session's telemetry in this batch, a run a stream and layout; without what is damaged."""
     sql = (
-        "SELECT connection, stream, description, data FROM run JOIN layout ON layout = layout.id "
+        "SELECT connection, stream, description, run.* FROM run JOIN layout ON layout = layout.id "
         "WHERE run.robot = ? AND session = ? ORDER BY connection, stream, layout, seq, row"
     )
-    found = _read(spool, batch, sql, session.robot, session.session)
+    lines = _read(spool, batch, sql, session.robot, session.session)
+    found = (line for line in lines if is_sound(session.robot, *line[2:]))
     for (connection, stream, description), alike in itertools.groupby(found, lambda line: line[:3]):
-        layout, data = _layout_decoder.decode(description), b"".join(line[3] for line in alike)
+        layout, data = _layout_decoder.decode(description), b"".join(line[3 + DATA] for line in alike)
         yield unpack(session.robot, session.session, connection, stream, layout, data)
 
 

@@ -1,5 +1,6 @@
 """One file of the spool: a SQLite database that is written, then frozen, then only read."""
 
+import collections
 import contextlib
 import itertools
 import operator
@@ -37,6 +38,7 @@ PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hard
 MAPPED_BYTES: Final = 1 << 28
 _ALIKE: Final = operator.itemgetter(0, 6, 1, 2, 7)
 _COLUMNS: Final = "robot, connection, stream, seq, row, rows, session, layout, data, crc"
+DATA: Final = 8  # which of them is its rows
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -88,6 +90,7 @@ class Segment:
         self.path = path
         self.number = number
         self.rows = 0
+        self._damaged: list[DamagedRun] | None = None  # as far as anybody has looked
         with translated(path):
             path.touch(FILE)  # what SQLite puts beside it is as private as this is
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
@@ -161,6 +164,7 @@ class Segment:
             sqlite3.Error: nothing was added.
 
         """
+        self._damaged = None
         with self._transaction():
             self._database.executemany(
                 f"INSERT INTO run ({_COLUMNS}) VALUES ({', '.join('?' * 10)})",
@@ -219,32 +223,38 @@ class Segment:
         """
         layouts = {number: layout for (_, layout), number in self._layouts.items()}
         with translated(self.path):
-            found = filter(self._sound, self._lines())
-            for (robot, session, connection, stream, layout), alike in itertools.groupby(found, _ALIKE):
+            groups = itertools.groupby(self._lines(), _ALIKE)
+            for (robot, session, connection, stream, layout), alike in groups:
                 for data in _portions(alike):
                     yield unpack(robot, session, connection, stream, layouts[layout], data)
 
     def damaged(self) -> list[DamagedRun]:
         """The runs that are not as they were written: `runs` leaves them out."""
         with translated(self.path):
-            return [
-                DamagedRun(number, str(robot), str(session), str(connection), stream, seq, rows)
-                for number, *line in self._lines("rowid, ")
-                if not self._sound(line)
-                for robot, connection, stream, seq, _, rows, session, *_ in [line]
-            ]
+            if self._damaged is None:  # else somebody has read all of them already
+                collections.deque(self._lines(), maxlen=0)
+            return list(self._damaged or ())
 
-    def _lines(self, more: str = "") -> Iterator[tuple[Any, ...]]:
-        return self._database.execute(
-            f"SELECT {more}{_COLUMNS} FROM run ORDER BY robot, connection, stream, seq, row"
-        )
+    def _lines(self) -> Iterator[tuple[Any, ...]]:
+        """The runs that are sound; after the last one it is known which are not."""
+        damaged = []
+        sql = f"SELECT {_COLUMNS}, rowid FROM run ORDER BY robot, connection, stream, seq, row"
+        for line in self._database.execute(sql):
+            if self._sound(line):
+                yield line
+            else:
+                robot, connection, stream, seq, _, rows, session, *_, number = line
+                damaged.append(
+                    DamagedRun(number, str(robot), str(session), str(connection), stream, seq, rows)
+                )
+        self._damaged = damaged
 
-    def _sound(self, line: Sequence[Any]) -> bool:
+    def _sound(self, line: tuple[Any, ...]) -> bool:
         """Whether a run is as it was written, as far as anybody knows."""
-        *name, data, crc = line
+        data, crc = line[DATA], line[DATA + 1]
         if not isinstance(data, bytes):
             return False
-        return crc is None or crc == _crc(self._sums.get(name[-1], 0), tuple(name), data)
+        return crc is None or crc == _crc(self._sums.get(line[DATA - 1], 0), line[:DATA], data)
 
     def records(self) -> Iterator[Record]:
         """Every record, in the order in which it was recorded; without those that are `damaged_records`."""
@@ -310,6 +320,12 @@ def unaltered(content: object, crc: int | None = None) -> bool:
     return isinstance(content, bytes) and crc in (None, zlib.crc32(content))
 
 
+def is_sound(robot: str, description: bytes, *line: Any) -> bool:
+    """Whether a run is as it was written, by its layout's description and all of its columns."""
+    data, crc = line[DATA], line[DATA + 1] if len(line) > DATA + 1 else None
+    return isinstance(data, bytes) and crc in (None, _crc(_sum(robot, description), line[:DATA], data))
+
+
 def _text(raw: bytes) -> str:
     """Also what is no text any more: its checksum tells."""
     return raw.decode(errors="replace")
@@ -329,7 +345,7 @@ def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:
     portion: list[bytes] = []
     rows = 0
     for line in lines:
-        portion.append(line[8])
+        portion.append(line[DATA])
         rows += line[5]
         if rows >= ROWS_AT_ONCE:
             yield b"".join(portion)

@@ -45,14 +45,11 @@ def send(spool: Spool, number: int, store: Store) -> None:
     try:
         with contextlib.closing(spool.read(number)) as segment:
             sent = upload(segment, spool.id, store)
-    except Contradicted as error:
-        aside = spool.set_aside(number)
-        raise Contradicted(
-            f"{error}; it is kept as {aside.name}, and is not in the store as a whole"
-        ) from error
     except Damaged as error:
         aside = spool.set_aside(number)
-        raise Damaged(f"{error}; it is kept as {aside.name}, and its rows are not in the store") from error
+        text = f"{error}; it is kept as {aside.name}, and is not in the store as a whole"
+        spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
+        raise Damaged(text) from error
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
     if sent.is_damaged:
         aside = spool.set_aside(number)

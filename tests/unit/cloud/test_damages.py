@@ -239,6 +239,20 @@ def test_what_went_because_it_was_old_is_not_missed(place: Place, capsys: pytest
     assert "/events: 2 of 2 rows are missing" in place.verify()[1]
 
 
+def test_a_batch_that_could_not_be_read_is_told_until_somebody_has_removed_it(place: Place) -> None:
+    with Spool(place.spool, reserve_bytes=0) as spool:
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(7, 5))
+        (place.spool / "00000004.db").write_bytes(b"x" * 10_000)
+        with pytest.raises(Damaged):
+            send(spool, 4, Store(place.url))
+    status, problems = place.verify()
+    assert status == 1
+    assert "00000004.damaged.db was set aside: the spool's file" in problems
+    (place.spool / "00000004.damaged.db").unlink()
+    assert place.verify() == (0, "")
+
+
 def test_what_went_to_another_store_is_not_missed_here(place: Place, tmp_path: Path) -> None:
     record((tmp_path / "other").as_uri(), place.spool)
     assert place.verify() == (0, "")

@@ -105,10 +105,24 @@ def test_rows_of_a_boot_that_began_while_the_disk_was_full_are_in_its_session(
         assert recorder.flush(WAIT_S)
         free[0] = 10
         recorder.record("exo-01", 1, batch(1, 15, link=2))
-        recorder.amend("exo-01", Facts(parameters={"gain": 3.0}))
-    upload(tmp_path, folder_url)
+        recorder.cut(lambda: None)
+        assert recorder.flush(WAIT_S)
+        for number in spool.waiting():  # before its end tells of the session once more
+            send(spool, number, Store(folder_url))
     found = {each.session: each for each in stored.sessions(Store(folder_url))}
     assert {name: (each.rows, each.parameters["gain"]) for name, each in found.items()} == {
         old: (10, 1.0),
-        new: (15, 3.0),
+        new: (15, 2.0),
     }
+
+
+def test_rows_that_are_damaged_where_they_wait_are_not_shown(tmp_path: Path, folder_url: str) -> None:
+    with Spool(tmp_path, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0, 5))
+        recorder.flush(WAIT_S)
+        recorder.record("exo-01", 1, batch(1, 5))
+    with contextlib.closing(sqlite3.connect(tmp_path / "00000001.db")) as database, database:
+        database.execute("UPDATE run SET data = zeroblob(length(data)) WHERE seq = 1")
+    known = Recordings(folder_url, tmp_path)
+    [session] = known.sessions()
+    assert known.open(session).waiting == 5
