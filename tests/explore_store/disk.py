@@ -14,9 +14,10 @@ import weakref
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 SECTOR: Final = 512
+WRITING: Final = ("INSERT", "UPDATE", "DELETE", "CREATE", "ALTER")
 UNKEPT: Final = "-shm"  # SQLite makes it anew
 
 
@@ -241,15 +242,17 @@ class Watched(sqlite3.Connection):
     _named = False
 
     def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
-        if sql == "COMMIT":
+        commits = sql == "COMMIT" or (sql.startswith(WRITING) and not self.in_transaction)
+        if commits:
             self.disk.check(_refusal)
         found = super().execute(sql, *values)
-        if sql == "COMMIT":
+        if commits:
             self._lasts()
         return found
 
     def executescript(self, sql: str) -> sqlite3.Cursor:
         self.disk.check(_refusal)
+        self.disk.synced(self.file)  # the first page, which had a journal beside it until it lasted
         found = super().executescript(sql)
         self._lasts()
         return found
@@ -296,7 +299,7 @@ def watching(disk: Disk) -> Callable[..., sqlite3.Connection]:
             return real(path, **options)
         if disk.left is not None:
             raise Ended
-        opened: Watched = real(path, factory=Watched, **options)
+        opened: Watched = cast(Watched, real(path, factory=Watched, **options))
         opened.disk, opened.file = disk, path
         disk.connections.add(opened)
         return opened

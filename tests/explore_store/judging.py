@@ -42,7 +42,7 @@ def retire(world: World, before: datetime) -> None:
 
 
 def roll_back(world: World, server: Server) -> None:
-    """A server's spool is an older one: of what it has acknowledged only what is in the store must be there."""
+    """A server's spool is an older one: of what was acknowledged only what is in the store must be there."""
     try:
         lines = rows_of(Store.existing(world.url), TELEMETRY)
     except StoreError:

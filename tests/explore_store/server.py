@@ -23,7 +23,7 @@ from tests.explore_store.ledger import Amended, Entry, Fate, Ledger, Loss, Mark,
 from tests.explore_store.robots import EVERY_NS, STREAM, TAIL, Link, Robot
 from tests.explore_store.times import Moment, Times
 
-CAPACITY = 24  # rows that may wait: few, so that a queue is soon full
+CAPACITY = 12  # rows that may wait: few, so that a queue is soon full
 LONG = 10**9  # batches end when a step says so
 IN_UNIT = {"rad": 0.0, "deg": 0.25, None: 0.5}  # what an angle's fraction says of the unit it was given in
 
@@ -229,10 +229,11 @@ class Server:
 
 
 def flip(path: Path, seed: int) -> None:
-    """One bit of a file."""
+    """One bit of a file, where it holds something."""
     chance = random.Random(seed)
     data = bytearray(path.read_bytes())
-    if data:
-        data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+    places = [place for place, byte in enumerate(data) if byte]
+    if places:
+        data[chance.choice(places)] ^= 1 << chance.randrange(8)
         with path.open("r+b") as out:
             out.write(data)

@@ -1,4 +1,4 @@
-"""Whatever happens on its way, each acknowledged row is in the store once, in its right name, or told as lost."""
+"""Whatever happens on its way, what was acknowledged is in the store once, rightly named, or told as lost."""
 
 import os
 import re
