@@ -79,6 +79,7 @@ _DEFECTS: Final[dict[str, Defect]] = {
         "after a loss the sessions that go on are not written again",
         "rows turn turn full full full reboot",
         "not listed|a session says",
+        "unit/recording/test_recorder.py",
     ),
     "emptied-pin": Defect(
         "a version whose files vacuum has removed can be pinned",

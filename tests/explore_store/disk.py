@@ -14,7 +14,7 @@ import weakref
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 SECTOR: Final = 512
 WRITING: Final = ("INSERT", "UPDATE", "DELETE", "CREATE", "ALTER")
@@ -216,17 +216,21 @@ class Disk:
 
 
 def _mixed(old: bytes, new: bytes, chance: random.Random) -> bytes:
+    """What is left of contents that were to become others; where both are the same they stay."""
     if old == new:
         return old
+    same = next((at for at in range(0, len(old), SECTOR) if not new.startswith(old[at : at + SECTOR], at)), 0)
+    if new.startswith(old):
+        same = len(old)
     match chance.randrange(5):
         case 0:
             return old
         case 1:
             return new
         case 2:
-            return new[: chance.randrange(len(new) + 1)]
+            return new[: chance.randrange(same, len(new) + 1)]
         case 3:
-            return bytes(len(new))
+            return new[:same] + bytes(len(new) - same)
     length = chance.choice((len(old), len(new)))
     padded = [each.ljust(length, b"\0") for each in (old, new)]
     return b"".join(
@@ -296,10 +300,11 @@ def watching(disk: Disk) -> Callable[..., sqlite3.Connection]:
 
     def connect(path: Any, **options: Any) -> sqlite3.Connection:
         if not isinstance(path, Path) or not path.is_relative_to(disk.root):
-            return real(path, **options)
+            plain: sqlite3.Connection = real(path, **options)
+            return plain
         if disk.left is not None:
             raise Ended
-        opened: Watched = cast(Watched, real(path, factory=Watched, **options))
+        opened: Watched = real(path, factory=Watched, **options)
         opened.disk, opened.file = disk, path
         disk.connections.add(opened)
         return opened
