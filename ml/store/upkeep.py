@@ -18,6 +18,7 @@ from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError
 
 from ml.store import durable, reading
+from ml.store.alone import alone
 from ml.store.errors import NoSuchTable, StoreError, translated
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table
@@ -148,7 +149,10 @@ def retain(
 def _retain(store: Store, location: str, before: datetime) -> int:
     delta = store.table(location)
     _note(store, location, before)
-    found = delta.delete(f"utc < '{before.isoformat()}'", post_commithook_properties=NO_HOOKS)
+    found = delta.delete(
+        f"utc < '{before.isoformat()}'",
+        post_commithook_properties=NO_HOOKS,
+    )
     _make_last(store, location, delta)
     return int(found["num_deleted_rows"] or 0)
 
@@ -194,15 +198,22 @@ def vacuum(
     gone: list[str] = []
     for location in _locations(store, tables):
         with translated(f"{store.url}/{location} cannot be cleaned"):
-            found = store.table(location).vacuum(
-                retention_hours=int(grace / timedelta(hours=1)),
-                enforce_retention_duration=False,
-                dry_run=dry_run,
-                keep_versions=sorted(kept.get(location, [])) or None,
-                post_commithook_properties=NO_HOOKS,
-            )
-            gone += [f"{location}/{unquote(name)}" for name in found]
+            versions = sorted(kept.get(location, []))
+            work = functools.partial(_vacuum, store, location, grace, versions, dry_run=dry_run)
+            gone += [f"{location}/{unquote(name)}" for name in _again(store, location, work)]
     return gone
+
+
+def _vacuum(
+    store: Store, location: str, grace: timedelta, versions: list[int], *, dry_run: bool
+) -> list[str]:
+    return store.table(location).vacuum(
+        retention_hours=int(grace / timedelta(hours=1)),
+        enforce_retention_duration=False,
+        dry_run=dry_run,
+        keep_versions=versions or None,
+        post_commithook_properties=NO_HOOKS,
+    )
 
 
 def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
@@ -220,7 +231,7 @@ def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
 
 
 def _compact(store: Store, location: str) -> Compacted:
-    with translated(f"{store.url}/{location} cannot be compacted"):
+    with translated(f"{store.url}/{location} cannot be compacted"), alone(store, location):
         return _again(store, location, functools.partial(_put_together, store, location))
 
 

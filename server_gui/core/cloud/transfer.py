@@ -13,6 +13,7 @@ from typing import Final
 from urllib.parse import unquote, urlsplit
 
 from ml.store import durable
+from ml.store.alone import PLACE
 from ml.store.errors import StoreError, translated
 from ml.store.objects import PIECE_BYTES, Object, Objects
 from ml.store.private import opener, private_folder
@@ -24,7 +25,7 @@ Advance = Callable[[int], object]
 PART: Final = ".part"
 _LOG: Final = f"/{durable.LOG}/"
 # What is no part of a store, and the one object that changes: a hint, which the next checkpoint makes anew.
-_NOT_COPIED: Final = re.compile(rf"_probe/.*|.*{re.escape(PART)}|.*{_LOG}_last_checkpoint")
+_NOT_COPIED: Final = re.compile(rf"_probe/.*|{PLACE}/.*|.*{re.escape(PART)}|.*{_LOG}_last_checkpoint")
 _ENTRY: Final = re.compile(rf"(.*){_LOG}(\d{{20}})\.json")
 _NAMED: Final = ("models/", "pins/")  # what has a name that says nothing of its contents
 _NO_NAMES: Final = ("", ".", "..")

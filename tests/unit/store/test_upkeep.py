@@ -5,10 +5,12 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import msgspec
 import pytest
 from deltalake import DeltaTable
 
 from ml.store import NoSuchTable, Store, StoreError, durable
+from ml.store.alone import COUNTS, PLACE, Claim
 from ml.store.tables import TELEMETRY
 from ml.store.upkeep import Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
 from tests.unit.store.test_store import HERE, numbers, telemetry
@@ -136,6 +138,50 @@ def test_small_files_are_put_together_also_while_old_rows_go(folder_url: str) ->
 
     compact(Overtaken(folder_url, 4, remove))
     assert numbers(Store(folder_url)) == list(range(10, 18))
+
+
+def test_two_that_put_files_together_at_once_double_no_row(store_url: str) -> None:
+    filled(store_url)
+    refused: list[str] = []
+
+    def other(left: int) -> None:
+        if not left:  # the table is open for the compaction now
+            with pytest.raises(StoreError, match="is being compacted by another") as error:
+                compact(Store(store_url))
+            refused.append(str(error.value))
+
+    compact(Overtaken(store_url, 2, other))
+    assert len(refused) == 1
+    assert numbers(Store(store_url)) == list(range(18))
+    assert compact(Store(store_url)) == [Compacted(HERE, 1, 1)]
+
+
+def test_what_a_killed_compaction_has_left_is_in_nobodys_way_for_ever(store_url: str) -> None:
+    store = filled(store_url)
+    path = f"{PLACE}/{HERE.replace('/', '-')}.json"
+    left = Claim("somebody", datetime.now(UTC) + timedelta(hours=1))
+    store.objects.create(path, msgspec.json.encode(left))
+    if store.folder is None:
+        with pytest.raises(StoreError, match=f"remove the object {path}"):
+            compact(store)
+        store.objects.remove(path)
+        store.objects.create(path, msgspec.json.encode(Claim("somebody", left.until - COUNTS)))
+    assert compact(store) == [Compacted(HERE, 6, 1)]
+
+
+def test_two_that_remove_old_rows_at_once_double_no_row(folder_url: str) -> None:
+    filled(folder_url)
+
+    def other(left: int) -> None:
+        if not left:
+            retain(Store(folder_url), [TELEMETRY], datetime.fromtimestamp(0, UTC) + timedelta(microseconds=8))
+
+    retain(
+        Overtaken(folder_url, 2, other),
+        [TELEMETRY],
+        datetime.fromtimestamp(0, UTC) + timedelta(microseconds=7),
+    )
+    assert numbers(Store(folder_url)) == list(range(8, 18))
 
 
 def test_who_is_always_overtaken_says_so(folder_url: str) -> None:
