@@ -96,7 +96,7 @@ def sessions(
     for file in reading.files(store, TELEMETRY, robot):
         extents.setdefault((file.robot or "", file.session or ""), []).append(file)
     stored, waiting = _rows(store, SESSIONS, robot), list(waiting)
-    uploaded = {_name(fields) for fields in stored}
+    uploaded = {_name(fields) for fields in stored} | extents.keys()
     found = [
         made(fields, Extent(extents.get(_name(fields), ())), _name(fields) in uploaded)
         for fields in newest([*stored, *waiting])

@@ -1,13 +1,16 @@
 """What store and spool hold, looked at now and then in a thread; a store that is away is tried again."""
 
 import time
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Final
 
+import msgspec
+
 from ml.store import NoSuchTable, Store, StoreError
 from ml.store.objects import Object
-from ml.store.sessions import Session, in_order, sessions
+from ml.store.sessions import UNTOLD, Session, in_order, sessions
 from server_gui.core.background import Background
 from server_gui.core.cloud import spooled, usage
 from server_gui.core.cloud.usage import Usage
@@ -107,8 +110,17 @@ def _waiting(settings: ServerSettings) -> list[Session]:
         return []
 
 
+def _completed(stored: Session, told: Mapping[tuple[str, str], Session]) -> Session:
+    """Of a session of which the store has only the rows, what the spool says."""
+    found = told.get((stored.robot, stored.session))
+    if found is None or stored.notes != UNTOLD:
+        return stored
+    held = {name: getattr(stored, name) for name in ("first", "last", "rows", "size_bytes", "uploaded")}
+    return msgspec.structs.replace(found, **held)
+
+
 def _joined(stored: list[Session], waiting: list[Session]) -> tuple[Session, ...]:
     """The store knows more of what it has, and the spool whether it has ended; newest first."""
-    known = {(each.robot, each.session): each for each in waiting}
-    known |= {(each.robot, each.session): each for each in stored}
+    told = {(each.robot, each.session): each for each in waiting}
+    known = told | {(each.robot, each.session): _completed(each, told) for each in stored}
     return tuple(reversed(in_order(known.values())))

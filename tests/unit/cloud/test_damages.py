@@ -68,7 +68,11 @@ def rewrite(file: Path, change: Callable[[pa.Table], pa.Table]) -> None:
     pq.write_table(change(pq.read_table(file, partitioning=None)), file)
     new = file.stat().st_size
     for entry in (file.parents[2] if "session=" in str(file) else file.parent).glob("_delta_log/*.json"):
-        entry.write_text(entry.read_text().replace(f'"size":{known}', f'"size":{new}'))
+        lines = entry.read_text().splitlines(keepends=True)
+        changed = (
+            line.replace(f'"size":{known}', f'"size":{new}') if file.name in line else line for line in lines
+        )
+        entry.write_text("".join(changed))
 
 
 def replaced(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:

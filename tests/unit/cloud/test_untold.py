@@ -15,12 +15,14 @@ from ml.store.sessions import UNTOLD, Session
 from ml.training.recorded import recorded
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.desk.library import look
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
+from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.recording.robots import CHANNELS, batch, description
 
 ROWS, WAIT_S = 50, 30.0
@@ -79,7 +81,9 @@ def test_a_session_that_is_told_of_in_the_spool_is_listed_once(tmp_path: Path, f
         spool.append((), [_row(untold)])
         spool.freeze()
     [session] = Recordings(folder_url, tmp_path).sessions()
-    assert (session.rows, session.notes) == (ROWS, "")
+    assert (session.rows, session.notes, session.uploaded) == (ROWS, "", True)
+    [shown] = look(ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path))).sessions
+    assert (shown.rows, shown.notes, shown.uploaded) == (ROWS, "", True)
 
 
 def _row(session: Session) -> Record:
