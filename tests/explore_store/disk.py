@@ -255,8 +255,8 @@ class Watched(sqlite3.Connection):
         return found
 
     def executescript(self, sql: str) -> sqlite3.Cursor:
-        self.disk.check(_refusal)
         self.disk.synced(self.file)  # the first page, which had a journal beside it until it lasted
+        self.disk.check(_refusal)
         found = super().executescript(sql)
         self._lasts()
         return found
