@@ -6,6 +6,7 @@ beginning of them, nothing, or some sectors of each. SQLite's own synchronising 
 its statements stand for it (`Watched`).
 """
 
+import contextlib
 import errno
 import os
 import random
@@ -127,8 +128,16 @@ class Disk:
         """Be what was left, once nobody has anything open; of a killed program only its spool had that."""
         left, self.left = self.left, None
         if left is not None:
-            self._quiet = True
-            self._become(left, "" if self.power else f"{self._name(spool)}/")
+            with self.unseen():
+                self._become(left, "" if self.power else f"{self._name(spool)}/")
+
+    @contextlib.contextmanager
+    def unseen(self) -> Iterator[None]:
+        """What is done within the block is no program's doing that might end."""
+        self._quiet = True
+        try:
+            yield
+        finally:
             self._quiet = False
 
     # --- inside

@@ -184,12 +184,13 @@ def _roll_back(world: World, s: int, *_: int) -> None:
         return
     server.rolled_back = True
     judging.roll_back(world, server)
-    for path in server.folder.iterdir():
-        if server.copied or path.name.startswith("0"):
-            path.unlink()
-    for name, data in server.copied.items():
-        (server.folder / name).write_bytes(data)
-    world.disk.sync()
+    with world.disk.unseen():
+        for path in server.folder.iterdir():
+            if server.copied or path.name.startswith("0"):
+                path.unlink()
+        for name, data in server.copied.items():
+            (server.folder / name).write_bytes(data)
+        world.disk.sync()
 
 
 def _damage(world: World, which: int, *_: int) -> None:
