@@ -28,6 +28,9 @@ KNOWN: Final[dict[str, str]] = {
     r"part-[-0-9a-f]*(-c000)?\.zstd\.parquet is not there": "a vacuum after a compaction that did not last",
     r"Invalid table version": "a checkpoint without its entry after a power cut",
     r"Invalid Checkpoint": "entries or checkpoints that were not synchronised, after a power cut",
+    r"a version is pinned and cannot be read": "a pin that was not synchronised, after a power cut",
+    r"deserialize thrift": "a torn checkpoint that is not known for one",
+    r"uploaded\.db cannot be used": "a segment that could not be opened stays open, and its log behind",
     r"json is damaged, and was whole once": "two entries of a vacuum that were not synchronised, likewise",
     r"store\.json is damaged": "who made it was killed before it was synchronised; later the power failed",
 }
