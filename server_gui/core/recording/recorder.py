@@ -157,7 +157,8 @@ class Recorder:
 
     def describe(self, robot: str, description: Description) -> int:
         """Take the channels' units; a name that differs from `robot`, or is another's too, is an event."""
-        return self._put(robot, 1, functools.partial(self._robots.describe, robot, description, Moment.now()))
+        work = functools.partial(self._robots.describe, robot, description, Moment.now())
+        return self._put(robot, 1, work, control=True)
 
     def begin(self, robot: str, facts: Facts) -> str:
         """Begin a session, end the one before, and give its name. The first row begins one where none is."""

@@ -1,0 +1,99 @@
+"""Plays what may happen on the way of a row: python -m tests.explore_store."""
+
+import argparse
+import logging
+import os
+import subprocess
+import sys
+
+DEFAULT_S = 60.0
+
+
+def main() -> int:
+    options = _options()
+    logging.disable(logging.CRITICAL)
+    if options.with_defect is not None:
+        from tests.explore.mutating import put_back
+        from tests.explore_store.defects import DEFECTS
+
+        put_back(DEFECTS[options.with_defect].parts)
+    # Only now: with the first import of anything of the path it is too late for a defect.
+    if options.defects is not None:
+        from tests.explore_store.defects import judge
+
+        return judge(options.defects, options.seconds, _say)
+    if options.replay is not None:
+        return _replay(options.replay)
+    if options.workers > 1:
+        return _side_by_side(options)
+    return _search(options.seconds, options.seed, options.words, options.saying)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="./dev explore store", description=__doc__)
+    add = parser.add_argument
+    add("--seconds", type=float, default=DEFAULT_S, help="how long")
+    add("--seed", type=int, default=1, help="another one plays something else")
+    add("--workers", type=int, default=1, help="so many side by side, each with a seed of its own")
+    add("--words", nargs="+", default=[], metavar="WORD", help="only these steps")
+    add("--saying", default="", metavar="PATTERN", help="only violations that say this count")
+    add("--replay", metavar="STEPS", help="play these again, as a violation printed them")
+    add("--with-defect", metavar="DEFECT", help="put this defect back before")
+    add("--defects", nargs="*", metavar="DEFECT", help="look for each of these, or of all, put back")
+    return parser.parse_args()
+
+
+def _search(seconds: float, seed: int, words: list[str], saying: str) -> int:
+    from tests.explore_store.searching import search, told
+    from tests.explore_store.steps import KINDS
+
+    found = search(seconds, seed, words or tuple(KINDS), saying)
+    _say(
+        f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended"
+        + (f"; {found.known} plays ended in what is known" if found.known else "")
+    )
+    if found.wrong is None:
+        return 0
+    assert found.error is not None
+    _say(f"seed {found.seed}: {told(found.error)}\n./dev explore store --replay '{found.wrong}'")
+    return 1
+
+
+def _replay(text: str) -> int:
+    from tests.explore_store.s3 import S3
+    from tests.explore_store.searching import played, told
+    from tests.explore_store.steps import Script
+
+    try:
+        with S3() as s3:
+            points = played(Script.parsed(text), s3)
+    except Exception as error:  # noqa: BLE001 - that is what it is for
+        _say(told(error))
+        return 1
+    _say(f"nothing is wrong: {points} points")
+    return 0
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def _side_by_side(options: argparse.Namespace) -> int:
+    more = ["--words", *options.words] if options.words else []
+    more += ["--with-defect", options.with_defect] if options.with_defect else []
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-m", "tests.explore_store", "--seconds", str(options.seconds),
+             "--seed", str(options.seed * 1_000 + number), *more]
+        )
+        for number in range(options.workers)
+    ]  # fmt: skip
+    return max([run.wait() for run in runs])
+
+
+if __name__ == "__main__":
+    if os.environ.get("PYTHONHASHSEED") != "0":  # what a set is iterated in belongs to the play
+        os.environ["PYTHONHASHSEED"] = "0"
+        os.execv(sys.executable, [sys.executable, "-m", "tests.explore_store", *sys.argv[1:]])
+    sys.exit(main())

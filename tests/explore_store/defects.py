@@ -1,0 +1,154 @@
+"""The defects that were proved once, each with how it is put back and by what it is found.
+
+`parts` are the texts that put it back; `words` are the steps among which it is looked for; nothing says in
+which order. A defect that no play can show names the test that fails with it put back (`test`).
+"""
+
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from tests.explore.mutating import Part
+
+ROOT: Final = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True, slots=True)
+class Defect:
+    """One defect: in words, the steps among which it shows, and what a violation must say of it."""
+
+    words: str
+    steps: str  # named more often, it comes more often
+    saying: str
+    test: str = ""
+    parts: tuple[Part, ...] = ()
+
+
+_DEFECTS: Final[dict[str, Defect]] = {
+    "number-again": Defect(
+        "a batch number that is used again is discarded, and marked as uploaded",
+        "rows send roll-back copy stop",
+        "verify|not there|cannot upload",
+    ),
+    "units-mixed": Defect(
+        "values in different units share a column, whoever added it first",
+        "rows send unit",
+        "another unit",
+    ),
+    "order-by-utc": Defect(
+        "an export goes by UTC: a clock that is set back changes the order of rows",
+        "rows turn clock export",
+        "another order|moved against",
+    ),
+    "offset-not-held": Defect(
+        "each notification has the clock's offset of its own moment",
+        "rows turn clock",
+        "moved against|another order",
+    ),
+    "last-word-by-utc": Defect(
+        "of what is said of a label the newest by the clock holds: one that was removed still does",
+        "label label label clock clock clock clock clock",
+        "a label holds",
+    ),
+    "amended-by-utc": Defect(
+        "amended parameters are ignored when the clock was set back",
+        "amend amend clock clock clock turn",
+        "a session says not",
+    ),
+    "control-dropped": Defect(
+        "a full queue drops sessions, labels and events",
+        "rows turn reboot reboot",
+        "misnamed|not there|not listed|counted|a label holds|a session says",
+    ),
+    "description-dropped": Defect(
+        "a full queue drops what a robot says of its units",
+        "rows turn unit unit unit",
+        "another unit",
+    ),
+    "crc-ignored": Defect(
+        "checksums of a damaged spool are not looked at",
+        "rows turn flip flip flip flip flip flip",
+        "another value|misnamed|nobody|nobody tells|no clock",
+    ),
+    "sessions-once": Defect(
+        "after a loss the sessions that go on are not written again",
+        "rows turn turn full full full reboot",
+        "not listed|a session says",
+        "unit/recording/test_recorder.py",
+    ),
+    "emptied-pin": Defect(
+        "a version whose files vacuum has removed can be pinned",
+        "send send pin pin vacuum vacuum vacuum compact compact",
+        "pinned",
+        "unit/store/test_upkeep.py",
+    ),
+    "not-synchronised": Defect(
+        "an append in a folder is not synchronised before the spool forgets",
+        "rows send power power crash",
+        "",
+    ),
+    "looked-up-never": Defect(
+        "an append does not look whether its transaction is there already",
+        "rows send crash kill",
+        "more than once|verify",
+    ),
+    "torn-log": Defect(
+        "an entry of a log that a power cut has torn off keeps every upload from its table",
+        "send send power power crash crash compact",
+        "cannot upload",
+    ),
+    "bad-journal": Defect(
+        "a journal's entry with a hash that is none stops recording",
+        "rows turn bad-journal journal",
+        "",
+        "unit/recording/test_recorder.py",
+    ),
+}
+
+
+def _with_parts() -> dict[str, Defect]:
+    told = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    parts = {name: tuple(Part(**part) for part in some) for name, some in told.items()}
+    return {name: replace(one, parts=parts.get(name, ())) for name, one in _DEFECTS.items()}
+
+
+DEFECTS = _with_parts()
+# What no play shows: what keeps it from coming back is tried by these.
+BESIDE: Final = {
+    "model pointers are skipped or overwritten by size alone": "unit/cloud/test_transfer.py",
+    "one wearer, spelled in two ways, is on both sides of what is held out": "unit/training/test_judging.py",
+    "a promotion race lets a model serve over another than it was to": "unit/registry/test_registry.py",
+    "a download by robot replaces what its folder has of another store": "unit/cloud/test_transfer.py",
+}
+
+
+def judge(names: list[str], seconds: float, say: Callable[[str], None]) -> int:
+    """Look for each defect, put back alone in a process of its own; how many were not found."""
+    missed = 0
+    for name in names or DEFECTS:
+        found = _looked_for(name, seconds)
+        defect = DEFECTS[name]
+        missed += not (found or defect.test)
+        say(f"{name}: {found or defect.test or 'NOT FOUND'}")
+    for words, test in () if names else BESIDE.items():
+        say(f"{words}: {test}")
+    return min(missed, 1)
+
+
+def _looked_for(name: str, seconds: float) -> str:
+    """The play that shows it; nothing where none was found."""
+    defect = DEFECTS[name]
+    command = [
+        sys.executable, "-m", "tests.explore_store", "--with-defect", name, "--seconds", str(seconds),
+        "--words", *defect.steps.split(), "--saying", defect.saying,
+    ]  # fmt: skip
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    found = re.search(r"--replay '(.*)'", done.stdout)
+    if done.returncode not in (0, 1):
+        return f"cannot be put back: {done.stderr[-300:]}"
+    return found[1] if found else ""

@@ -1,0 +1,239 @@
+"""One collector in one process, its threads called in turn: the real recorder, spool and uploader."""
+
+import contextlib
+import random
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from gateway.client import ClockOffset, ConnectionState
+from gateway.messages import JournalEntries
+from ml.store import Store
+from ml.store.labels import Label
+from server_gui.core.events import Described, Journalled, LinkChanged, Telemetry
+from server_gui.core.fleet.keeping import Keeping
+from server_gui.core.recording import records
+from server_gui.core.recording.recorder import Recorder, RecorderSettings
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.uploader import Uploader
+from tests.explore_store.disk import Disk, Ended
+from tests.explore_store.ledger import Amended, Entry, Fate, Ledger, Loss, Mark, Row, Said, Thing
+from tests.explore_store.robots import EVERY_NS, STREAM, TAIL, Link, Robot
+from tests.explore_store.times import Moment, Times
+
+CAPACITY = 12  # rows that may wait: few, so that a queue is soon full
+LONG = 10**9  # batches end when a step says so
+IN_UNIT = {"rad": 0.0, "deg": 0.25, None: 0.5}  # what an angle's fraction says of the unit it was given in
+
+
+class _Turned(BaseException):
+    """The recorder's thread would wait now."""
+
+
+class Stepped(Recorder):
+    """The real recorder, whose thread is called for one turn at a time."""
+
+    def __init__(self, spool: Spool, times: Times) -> None:
+        super().__init__(spool, settings=RecorderSettings(CAPACITY, LONG, LONG))
+        self._ending = Moment(times)  # type: ignore[assignment]
+        self._turns = 0
+
+    def turn(self) -> None:
+        self._turns = 1
+        with contextlib.suppress(_Turned):
+            self._run()
+
+    def _next(self):  # type: ignore[no-untyped-def]
+        if not self._turns:
+            raise _Turned
+        self._turns -= 1
+        return super()._next()
+
+
+class Server:
+    """A collector with its spool; `robots` by the names that its file gives them."""
+
+    def __init__(
+        self,
+        name: str,
+        disk: Disk,
+        times: Times,
+        ledger: Ledger,
+        robots: dict[str, Robot],
+        connect: Callable[[], Store],
+    ) -> None:
+        self.name = name
+        self.disk = disk
+        self.times = times
+        self.ledger = ledger
+        self.robots = robots
+        self.connect = connect
+        self.walls_ns = [times.wall_ns]  # what its clock has added to the true time; the last one does now
+        self.folder = disk.root / f"spool-{name}"
+        self.damaged = False  # somebody has flipped a bit in its spool
+        self.rolled_back = False  # somebody has put an older copy of it in its place
+        self.copied: dict[str, bytes] = {}
+        self.life = 0
+        self.spool: Spool | None = None
+        self._pending: list[Thing] = []
+        self._lost = 0
+
+    # --- lives
+
+    @property
+    def wall_ns(self) -> int:
+        return self.walls_ns[-1]
+
+    @property
+    def runs(self) -> bool:
+        return self.spool is not None
+
+    def start(self) -> None:
+        """Begin a life, and link to every robot."""
+        self.life += 1
+        self.spool = Spool(self.folder, reserve_bytes=1, keep_bytes=1 << 20, free_bytes=self._free)
+        self.disk.synced(self.disk.root)  # not yet by the spool itself
+        self.recorder = Stepped(self.spool, self.times)
+        self.uploader = Uploader(self.spool, self.connect)
+        self.links = {name: Link(robot) for name, robot in self.robots.items()}
+        self.keeping = {name: Keeping(name, self.recorder) for name in self.robots}
+        self._pending, self._lost = [], 0
+        for name in self.robots:
+            self.link(name)
+
+    def _free(self, _folder: Path) -> int:
+        return 0 if self.disk.full else 1 << 40
+
+    def stop(self) -> None:
+        """End as Ctrl-C does."""
+        if self.spool is None:
+            return
+        self.recorder._ending.set()
+        self._turn()
+        self.uploader._empty(asked=True)
+        self.spool.close()
+        self.spool = None
+
+    def abandon(self) -> None:
+        """The process is gone: the system closes its files."""
+        for opened in [each for each in self.disk.connections if each.file.parent == self.folder]:
+            sqlite3.Connection.close(opened)
+            self.disk.connections.discard(opened)
+        if self.spool is not None:
+            self.spool._lock.close()
+        self.spool = None
+        for thing in self._pending:
+            thing.fate = Fate.OPEN
+        self._pending = []
+
+    # --- what comes
+
+    def link(self, name: str) -> None:
+        """The link is made, for the first time or again, and the robot says what it is."""
+        link = self.links[name]
+        if link.number:
+            waiting = LinkChanged(ConnectionState.WAITING, "it dropped", self.times.now_ns)
+            self.keeping[name].take(waiting)
+        link.again()
+        self.keeping[name].take(LinkChanged(ConnectionState.CONNECTED, None, self.times.now_ns))
+        self.describe(name)
+
+    def describe(self, name: str) -> None:
+        self.keeping[name].take(Described(self.links[name].robot.description))
+
+    def rows(self, name: str, count: int, first: int) -> None:
+        """A notification; of every third row the angle is missing."""
+        link, robot = self.links[name], self.links[name].robot
+        counts = list(range(first, first + count))
+        stamps_ns, trues_ns = [], []
+        for _ in counts:
+            self.times.now_ns += EVERY_NS
+            stamps_ns.append(self.times.now_ns - robot.began_ns)
+            trues_ns.append(self.times.now_ns)
+        angles = [None if each % 3 == 2 else each + IN_UNIT[robot.unit] for each in counts]
+        seq = link.seq
+        batch = link.batch(counts, angles, stamps_ns, self.times.now_ns)
+        self.keeping[name].take(Telemetry(STREAM, batch, ClockOffset(-robot.began_ns, 0)))
+        key = (self.name, name, self.life * 1_000 + link.number)
+        session = self.keeping[name].session
+        for place, number in enumerate(counts):
+            self._hand(
+                Row(
+                    number, self.name, name, session, link=key, seq=seq, place=place, unit=robot.unit,
+                    stamp_ns=stamps_ns[place], true_ns=trues_ns[place], angle=angles[place],
+                )
+            )  # fmt: skip
+
+    def mark(self, name: str, number: int) -> None:
+        self.recorder.mark(name, f"mark {number}")
+        self._hand(Mark(number, self.name, name, self.keeping[name].session))
+
+    def say(self, name: str, number: int, label: str, *, removed: bool) -> None:
+        """That a label holds, or no more."""
+        session = self.keeping[name].session
+        utc_ns = self.times.now_ns // 10**12 * 10**12  # the same one, for a long time
+        said = Label(name, session, utc_ns, utc_ns, label, "ada")
+        self.recorder.add(records.label(said, removed=removed))
+        self._hand(Said(number, self.name, name, session, label=label, utc_ns=utc_ns, removed=removed))
+
+    def amend(self, name: str, value: int) -> None:
+        keeping = self.keeping[name]
+        facts = msgspec.structs.replace(keeping._facts, parameters={"value": value})
+        self.recorder.amend(name, facts)
+        self._hand(Amended(value, self.name, name, keeping.session, value=value))
+
+    def journal(self, name: str) -> None:
+        """Ask for the newest entries of the robot's journal."""
+        entries = self.robots[name].journal[-TAIL:]
+        self.keeping[name].take(Journalled(JournalEntries(entries)))
+        for entry in entries:
+            self._hand(Entry(0, self.name, name, "", n=entry["n"], hash=entry["hash"]))
+
+    def _hand(self, thing: Thing) -> None:
+        self.ledger.things.append(thing)
+        self._pending.append(thing)
+
+    # --- what its threads do
+
+    def turn(self) -> None:
+        """The recorder keeps what was handed in."""
+        if self.recorder._acknowledged < self.recorder._handed:
+            self._turn()
+
+    def _turn(self) -> None:
+        self.recorder.turn()
+        lost = self.recorder.state.lost - self._lost
+        self._lost += lost
+        for thing in self._pending:
+            thing.fate = Fate.COUNTED if lost else Fate.SAFE
+        if lost:
+            self.ledger.losses.append(Loss(self.name, self.life, lost, self._pending))
+        if not self.recorder._untold:
+            for loss in self.ledger.losses:
+                loss.told |= (loss.server, loss.life) == (self.name, self.life)
+        self._pending = []
+
+    def cut(self) -> None:
+        """The batch ends."""
+        self.recorder.cut(lambda: None)
+        self._turn()
+
+    def upload(self) -> bool:
+        """The uploader brings what waits; whether all is there."""
+        self.uploader._empty(asked=True)
+        if self.disk.left is not None:
+            raise Ended
+        return self.uploader.state.problem is None
+
+
+def flip(path: Path, seed: int) -> None:
+    """One bit of a file, where it holds something."""
+    chance = random.Random(seed)
+    data = bytearray(path.read_bytes())
+    places = [place for place, byte in enumerate(data) if byte]
+    if places:
+        data[chance.choice(places)] ^= 1 << chance.randrange(8)
+        with path.open("r+b") as out:
+            out.write(data)

@@ -1,0 +1,172 @@
+"""Where a play takes place: a computer with two servers, their robots, and a store."""
+
+import concurrent.futures
+import contextlib
+import os
+import random
+import sqlite3
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final, Self
+
+import msgspec
+
+from ml.store import Store, durable, objects, store, writing
+from ml.store.store import About
+from server_gui.core.recording import recorder
+from server_gui.core.recording.errors import SpoolUnusable
+from tests.explore_store.disk import Disk, Ended, changes, watching
+from tests.explore_store.ledger import Fate, Ledger
+from tests.explore_store.robots import Robot
+from tests.explore_store.s3 import BUCKET, S3
+from tests.explore_store.server import Server
+from tests.explore_store.times import Names, Times, ours
+
+AGAIN: Final = 5  # attempts on a disk that refuses; one refuses less often
+
+
+class World:
+    """A context manager, in which the path stands on our time, names and disk."""
+
+    def __init__(self, folder: Path, shards: int = 1, s3: S3 | None = None) -> None:
+        self.times = Times()
+        self.disk = Disk(folder)
+        self.ledger = Ledger()
+        self.shards = shards
+        self.s3 = s3
+        self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
+        self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
+        self.retained = False  # rows may be gone because they were old: then nobody can tell them from others
+        self.damage: int | None = None  # what is done to the store at the end
+        both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg")
+        self.robots = [both, mine, other]
+        self.servers = {
+            "A": self._server("A", {"exo-0": both, "exo-1": mine}),
+            "B": self._server("B", {"exo-0": both, "exo-1": other}),  # another one of this name
+        }
+        self._stack = contextlib.ExitStack()
+        self._count = 0
+
+    def _server(self, name: str, robots: dict[str, Robot]) -> Server:
+        return Server(name, self.disk, self.times, self.ledger, robots, self.store)
+
+    def __enter__(self) -> Self:
+        put = self._put
+        names = Names(random.Random(0))
+        for module in ours():
+            for ours_, theirs in ((self.times, time), (names, uuid)):
+                for name, value in list(vars(module).items()):
+                    if value is theirs:
+                        put(module, name, ours_)
+        for module in (durable, writing):
+            put(module, "ThreadPoolExecutor", _AtOnce)
+        put(recorder, "COMMIT_S", 0.0)
+        put(sqlite3, "connect", watching(self.disk))
+        for name, stand_in in changes(self.disk).items():
+            put(os, name, stand_in)
+        if self.s3 is not None:
+            self._reach(self.s3)
+        return self
+
+    def _reach(self, s3: S3) -> None:
+        s3.clear()
+        s3.objects["store/store.json"] = msgspec.json.encode(About(shards=self.shards))  # no probe
+        s3.on_write = self._on_write
+        for name, value in s3.environment.items():
+            os.environ[name] = value
+        for module in (objects, store):
+            self._put(module, "RETRIES", 2)
+
+    def _on_write(self) -> None:
+        """Between two requests a program may end, too; then the service hears no more of it."""
+        assert self.s3 is not None
+        try:
+            self.disk.point()
+        except Ended:
+            self.s3.dead = True
+
+    def _put(self, module: Any, name: str, value: Any) -> None:
+        before = getattr(module, name)
+        setattr(module, name, value)
+        self._stack.callback(setattr, module, name, before)
+
+    def __exit__(self, *exc: object) -> None:
+        for server in self.servers.values():
+            server.abandon()
+        self._stack.close()
+
+    def store(self) -> Store:
+        return Store(self.url, self.shards)
+
+    def number(self, count: int = 1) -> int:
+        """Numbers that nothing has yet; the first of them."""
+        self._count += count
+        return self._count - count + 1
+
+    @contextlib.contextmanager
+    def alive(self, name: str) -> Iterator[Server]:
+        """A server at work; where it ends within the block, the disk is then what is left of it."""
+        server = self.servers[name]
+        self.times.wall_ns = server.wall_ns
+        while not server.runs:
+            self._start(server)
+        try:
+            yield server
+        except Ended:
+            self.bury(name)
+        if self.disk.left is not None:
+            self.bury(name)
+
+    def _start(self, server: Server) -> None:
+        """As whoever looks after it: where it ends, or the disk refuses, again."""
+        for again in reversed(range(AGAIN)):
+            try:
+                server.start()
+                return
+            except Ended:
+                self.bury(server.name)
+            except (SpoolUnusable, OSError):
+                server.abandon()
+                if not again:
+                    raise
+
+    def bury(self, name: str) -> None:
+        """A server has ended, by a power cut all of them."""
+        gone = self.servers.values() if self.disk.power else [self.servers[name]]
+        for server in gone:
+            server.abandon()
+        self.disk.become(self.servers[name].folder)
+        if self.s3 is not None:
+            self.s3.dead = False
+
+    def end(self, name: str, seed: int, *, power: bool) -> None:
+        """End a server now, or cut the power."""
+        if self.servers[name].runs or power:
+            self.disk.end(seed, power=power)
+            self.bury(name)
+
+    def safe(self) -> Iterable[Any]:
+        return (thing for thing in self.ledger.things if thing.fate is Fate.SAFE)
+
+
+class _AtOnce:
+    """Stands for a pool of threads: everything is done by whoever hands it in, in its order."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        pass
+
+    def map(self, work: Callable[..., Any], *values: Iterable[Any]) -> list[Any]:
+        return list(map(work, *values))
+
+    def submit(self, work: Callable[..., Any], *values: Any) -> "concurrent.futures.Future[Any]":
+        done: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        done.set_result(work(*values))
+        return done
