@@ -114,13 +114,25 @@ def test_the_longest_silent_of_those_who_may_only_stop_makes_room(
     assert silent.line() is None
 
 
-def test_who_has_only_just_come_to_stop_is_not_sent_away_for_others(
+def test_a_burst_of_those_who_say_nothing_keeps_nobody_out(
     connect: Connect, full: list[Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(places, "FRESH_S", 1000.0)
-    early = connect()
-    others = [connect() for _ in range(4)]
-    for other in others[1:]:
+    burst = [connect() for _ in range(8)]
+    late = connect()
+    assert late.call("robot.stop", reason="late")["held"]
+    assert all(one.line() is not None for one in burst[:4])  # they were told that they made room
+
+
+def test_who_has_only_just_spoken_to_stop_is_not_sent_away_for_others(
+    connect: Connect, full: list[Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "FRESH_S", 1000.0)
+    early, beside = connect(), connect()
+    for one in (early, beside):
+        assert one.call("clock.read")
+    others = [connect() for _ in range(3)]
+    for other in others:
         message = other.line()
         assert message is not None
         assert "connect again" in message["error"]["message"]
