@@ -21,6 +21,7 @@ from gateway.modules.stop.settings import StopSettings
 from gateway.modules.stop.settings import complaints as about_stop
 from gateway.records.folder import default_folder
 from gateway.sdo_ids import complaints as about_sdo
+from gateway.wording import plainly
 
 Table = Mapping[str, Any]
 Node = tuple[str, int]  # a bus by its name, and a node id there
@@ -258,9 +259,7 @@ def _struct(where: str, table: Any, kind: type[Struct]) -> Struct:
             return kind.from_table(table)
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
-        what, _, at = str(error).partition(" - at ")
-        key = at.strip("`").removeprefix("$").removeprefix(".")
-        raise ConfigError(f"{where} {key}: {what[:1].lower()}{what[1:]}") from error
+        raise ConfigError(f"{where} {plainly(error)}") from error
 
 
 def _check_keys(where: str, table: Table, allowed: list[str] | None, required: list[str]) -> None:

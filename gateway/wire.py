@@ -13,6 +13,7 @@ import msgspec
 from msgspec import UNSET, Raw, Struct, UnsetType
 
 from gateway.limits import LINE_LIMIT, NAME_LENGTH
+from gateway.wording import plainly
 
 PROTOCOL: Final = 1
 ANSWER_LIMIT: Final = 16 * 1024 * 1024  # what a client accepts as one line
@@ -351,7 +352,7 @@ def _explain(line: bytes, error: Exception) -> BadLine:
         return BadLine('a request is an object: {"jsonrpc": "2.0", "id": 1, "method": "…", "params": {…}}')
     known = found.get("id")
     usable = isinstance(known, str) or (isinstance(known, int) and not isinstance(known, bool))
-    return BadLine(f"not a JSON-RPC 2.0 request: {error}", id=known if usable else None)
+    return BadLine(f"not a JSON-RPC 2.0 request: {plainly(error)}", id=known if usable else None)
 
 
 _Params = TypeVar("_Params", bound=Struct)
@@ -373,4 +374,4 @@ def decode_params(raw: Raw | UnsetType, type: type[_Params]) -> _Params:  # noqa
         return msgspec.json.decode(encoded, type=type)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         allowed = ", ".join(type.__struct_encode_fields__) or "none"
-        raise refuse(Kind.BAD_PARAMS, f"{error} (parameters here: {allowed})") from error
+        raise refuse(Kind.BAD_PARAMS, f"{plainly(error)} (parameters here: {allowed})") from error

@@ -1,0 +1,53 @@
+"""What the decoder says of a value that is none, in words for whoever has sent or written it."""
+
+import re
+
+_KINDS = {
+    "str": "text",
+    "int": "a whole number",
+    "float": "a number",
+    "bool": "true or false",
+    "object": "an object",
+    "array": "a list",
+    "null": "nothing",
+}
+_PATTERNS = (  # msgspec's messages, and ours
+    (r"Expected `(?P<want>[^`]+)`, got `(?P<got>[^`]+)`", "must be {want}, not {got}"),
+    (r"Expected `str` of length <= (?P<n>\d+)", "has more than {n} characters"),
+    (r"Expected `(?:str|array|object)` of length >= 1", "must not be empty"),
+    (r"Expected `str` matching regex (?P<n>.+)", "must have the form {n}"),
+    (r"Expected `array` of length <= (?P<n>\d+)", "has more than {n} entries"),
+    (r"Expected `(?P<want>[^`]+)` >= (?P<n>\S+?)(\.0)?", "must be {want}, at least {n}"),
+    (r"Expected `(?P<want>[^`]+)` <= (?P<n>\S+?)(\.0)?", "must be {want}, at most {n}"),
+    (r"Expected `(?P<want>[^`]+)` > (?P<n>\S+?)(\.0)?", "must be {want} above {n}"),
+    (r"Expected `(?P<want>[^`]+)` < (?P<n>\S+?)(\.0)?", "must be {want} below {n}"),
+    (r"Object missing required field `(?P<n>[^`]+)`", "{n} is missing"),
+    (r"Object contains unknown field `(?P<n>[^`]+)`", "there is no {n} here"),
+    (r"Invalid enum value (?P<n>.+)", "{n} is not known"),
+)
+_TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PATTERNS)
+
+
+def plainly(error: Exception) -> str:
+    """As `ttl_s must be a number, not text`; what is not in the table stays as it is."""
+    what, _, at = str(error).rpartition(" - at ")
+    if not what:
+        what, at = at, ""
+    where = at.strip("`").removeprefix("$").removeprefix(".")
+    said = next((_said(words, found) for one, words in _TABLE if (found := one.fullmatch(what))), what)
+    return f"{where} {said}" if where else said
+
+
+def _said(words: str, found: "re.Match[str]") -> str:
+    kinds = {
+        key: _kinds(value) if key in ("want", "got") else value for key, value in found.groupdict().items()
+    }
+    return words.format(**kinds)
+
+
+def _kinds(kinds: str) -> str:
+    """`int | float` is a number; nothing that can be left out is named."""
+    named = [one for one in kinds.split(" | ") if one != "null"] or ["null"]
+    if "float" in named and "int" in named:
+        named.remove("int")
+    return " or ".join(_KINDS.get(one, one) for one in named)
