@@ -21,7 +21,7 @@ from gateway.modules.stop.settings import StopSettings
 from gateway.modules.stop.settings import complaints as about_stop
 from gateway.records.folder import default_folder
 from gateway.sdo_ids import complaints as about_sdo
-from gateway.wording import plainly
+from gateway.wording import key_of, plainly
 
 Table = Mapping[str, Any]
 Node = tuple[str, int]  # a bus by its name, and a node id there
@@ -259,7 +259,8 @@ def _struct(where: str, table: Any, kind: type[Struct]) -> Struct:
             return kind.from_table(table)
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{where} {plainly(error)}") from error
+        place = where if key_of(error) else f"{where}:"
+        raise ConfigError(f"{place} {plainly(error)}") from error
 
 
 def _check_keys(where: str, table: Table, allowed: list[str] | None, required: list[str]) -> None:

@@ -30,12 +30,16 @@ _TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PA
 
 def plainly(error: Exception) -> str:
     """As `ttl_s must be a number, not text`; what is not in the table stays as it is."""
-    what, _, at = str(error).rpartition(" - at ")
-    if not what:
-        what, at = at, ""
-    where = at.strip("`").removeprefix("$").removeprefix(".")
-    said = next((_said(words, found) for one, words in _TABLE if (found := one.fullmatch(what))), what)
-    return f"{where} {said}" if where else said
+    what, key = str(error).partition(" - at ")[0], key_of(error)
+    said = next((_said(words, found) for one, words in _TABLE if (found := one.fullmatch(what))), None)
+    if said is None:
+        return f"{key}: {what[:1].lower()}{what[1:]}" if key else what
+    return f"{key} {said}" if key else said
+
+
+def key_of(error: Exception) -> str:
+    """Where it is, as `rules[0].above`; empty where it is the whole."""
+    return str(error).partition(" - at ")[2].strip("`").removeprefix("$").removeprefix(".")
 
 
 def _said(words: str, found: "re.Match[str]") -> str:

@@ -29,6 +29,7 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from gateway.client import Address, BadAddress
+from gateway.wording import key_of, plainly
 from ml.store import StoreError, default_url
 from ml.store.store import checked_url
 from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
@@ -210,10 +211,9 @@ def _convert(where: str, table: Any, kind: type[Table]) -> Table:
     try:
         return msgspec.convert(table, kind, dec_hook=_path)
     except msgspec.ValidationError as error:
-        what, _, at = str(error).partition(" - at ")
-        key = at.strip("`").removeprefix("$").removeprefix(".")
-        place = f"{where} {key}".rstrip()
-        raise SettingsError(f"{place}: {what[:1].lower()}{what[1:]}{_choices(kind, key)}") from error
+        key = key_of(error)
+        place = where if key else f"{where}:"
+        raise SettingsError(f"{place} {plainly(error)}{_choices(kind, key)}") from error
 
 
 def _path(_kind: type, value: Any) -> Path:

@@ -60,7 +60,10 @@ def test_further_keys_of_a_bus_are_python_cans_own(tmp_path: Path) -> None:
             HEAD + JOINT.replace("node_id = 2", 'node_id = "two"'),
             "[joint.knee] node_id must be a whole number, not text",
         ),
-        (HEAD + JOINT.replace("node_id = 2", "node_id = 128"), "[joint.knee] node_id must be a whole number, at most 127"),
+        (
+            HEAD + JOINT.replace("node_id = 2", "node_id = 128"),
+            "[joint.knee] node_id must be a whole number, at most 127",
+        ),
         (HEAD + JOINT.replace("node_id = 2\n", ""), "[joint.knee] lacks the key 'node_id'"),
         (HEAD + JOINT.replace("gear_ratio", "gear_ration"), "did you mean 'gear_ratio'?"),
         (HEAD + JOINT + "direction = 2", "[joint.knee] direction "),

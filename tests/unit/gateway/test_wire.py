@@ -92,7 +92,7 @@ def test_no_line_raises_anything_but_bad_line(line: bytes) -> None:
         ("component.snapshot", b"[]", "by name"),
         ("component.snapshot", b'"x"', "must be an object, not text"),
         ("component.snapshot", b'{"chanels":[]}', "there is no chanels here (parameters here: channels)"),
-        ("stream.start", b'{"modules":["component"],"rate_hz":1001}', "rate_hz must be a number, at most 1000"),
+        ("stream.start", b'{"modules":["component"],"rate_hz":1001}', "rate_hz must be a number, at most"),
         ("stream.start", b'{"modules":["component"],"rate_hz":1e999}', "out of range"),
         ("stream.start", b'{"modules":[],"rate_hz":1}', "modules must not be empty"),
         ("stream.start", b'{"modules":["motor"],"rate_hz":1}', "motor"),
