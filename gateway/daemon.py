@@ -125,8 +125,11 @@ class Daemon:
                 self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, self._sharing, refusal
             )
 
-        opened = self._places.admit(inlet.peer.rpartition(":")[0], session)
-        if opened is not None:
+        address = inlet.peer.rpartition(":")[0]
+        opened = self._places.admit(address, session)
+        if opened is None:
+            self._sharing.complain(address, "has taken all the places that it may have")
+        else:
             opened.on_close(self._left)
             opened.on_close(lambda: self._tidy_after(opened))
             self._service.opened(opened)

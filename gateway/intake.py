@@ -38,6 +38,7 @@ _TOO_MANY = wire.refuse(
     "too many requests wait; this one is not done: ask again when some have been answered",
 )
 
+FOREIGN = "speaks another protocol: is it a browser, or another program?"
 # What a client of ours begins with, or a stop in an odd form: no method of HTTP, no TLS and no SSH.
 _BEGINNINGS = frozenset(b"{[ \t\"'")
 
@@ -184,7 +185,7 @@ class Inlet:
         if not self._began:
             self._began = bool(begin := data.lstrip(b"\r\n"))
             if self._began and begin[0] not in _BEGINNINGS and begin[0] < 0x80:
-                self._end("it speaks another protocol", Heard())
+                self._end(FOREIGN, Heard())
                 return True
         self.received_bytes += len(data)
         lines = self._splitter.feed(data)

@@ -18,7 +18,7 @@ from msgspec import UNSET, UnsetType
 
 from gateway import wire
 from gateway.futures import outcome
-from gateway.intake import Heard, Inlet
+from gateway.intake import FOREIGN, Heard, Inlet
 from gateway.limits import BAD_LINES, OUTPUT_BYTES, PENDING, SPEAK_S
 from gateway.loop import WRITE, Loop, Timer
 from gateway.sharing import Sharing
@@ -221,6 +221,8 @@ class Session:
             return
         if heard.lost is not None:
             log.info("%s: %s", self.peer, heard.lost)
+            if heard.lost == FOREIGN:
+                self._sharing.complain(self.address, FOREIGN)
             self.close()
             return
         if self._refusal is None:
@@ -316,6 +318,9 @@ class Session:
         is_last = self._bad == BAD_LINES
         self.send(wire.encode_error(error.id, error) + wire.encode_error(None, _NO_REQUESTS) * is_last)
         if is_last:
+            self._sharing.complain(
+                self.address, f"sends what is no request, {BAD_LINES} lines on one connection"
+            )
             self.close()
 
     def _handled(self, request: wire.Request) -> Answer:

@@ -16,6 +16,8 @@ from gateway.loop import Loop
 
 log = logging.getLogger(__name__)
 
+COMPLAIN_S = 60.0  # between two lines of the log about one address and one matter …
+COMPLAINTS = 256  # … and so many of them in that time, of all addresses
 TURN_NS = 2_000_000  # what requests may take of one turn of the loop; the one that exceeds it is the last
 
 Run = Callable[[], object]
@@ -44,6 +46,7 @@ class Sharing:
         self._until_ns = 0
         self._bytes = 0
         self._holders: dict[Holder, None] = {}
+        self._complaints: dict[tuple[str, str], float] = {}  # when they were made
 
     # Time
 
@@ -84,6 +87,17 @@ class Sharing:
         if self._turn != self._loop.turns:
             self._turn, self._until_ns = self._loop.turns, now_ns + TURN_NS
         return now_ns < self._until_ns
+
+    # The log
+
+    def complain(self, address: str, what: str) -> None:
+        """Put into the log what an address does that it should not; now and then, or that fills the disk."""
+        now_s, about = time.monotonic(), (address, what)
+        recent = {one: at_s for one, at_s in self._complaints.items() if now_s - at_s < COMPLAIN_S}
+        if about not in recent and len(recent) < COMPLAINTS:
+            log.warning("%s %s; said once in %.0f s", address, what, COMPLAIN_S)
+            recent[about] = now_s
+        self._complaints = recent
 
     # Memory
 
