@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from gateway import resting
 
-BACKLOG = 32
+BACKLOG = 1024  # who comes while it wakes up; where there is no room, TCP tries again a second later
 PORT, CLASSIC = "port", "classic_port"  # how systemd's units name them
 _NUMBER, _PROCESS, _NAMES, _RESTING = "LISTEN_FDS", "LISTEN_PID", "LISTEN_FDNAMES", "GWRMS_RESTING"
 _SPARE = 64  # above every number that sockets are handed over with
