@@ -41,7 +41,7 @@ def synchronise(files: Iterable[Path]) -> None:
     folders = {folder for file in found for folder in list(file.parents)[:_LEVELS]}
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         list(pool.map(_sync, found))
-        list(pool.map(_sync, folders))
+        list(pool.map(_sync_names, folders))
 
 
 def create(file: Path, data: bytes) -> bool:
@@ -122,6 +122,11 @@ def _locked(table: Path, how: int) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _sync_names(folder: Path) -> None:
+    with contextlib.suppress(PermissionError):  # another's, which was there before
+        _sync(folder)
 
 
 def _sync(path: Path) -> None:
