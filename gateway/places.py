@@ -7,7 +7,7 @@ from gateway import wire
 from gateway.limits import CLIENTS, CLIENTS_OF_ONE_ADDRESS, STOPPERS
 from gateway.session import Session
 
-FRESH_S = 0.3  # how long one of these that has spoken keeps its place whoever comes
+FRESH_S = 0.3  # how long one of these that has spoken keeps its place whoever comes, from its own coming on
 SILENT_S = 10.0  # who has said nothing for so long since it came makes room where all places are taken
 
 _STOPS_ONLY = (
@@ -62,13 +62,14 @@ class Places:
 
 
 def _make_room(stoppers: Iterable[Session]) -> bool:
-    """Close the one that has been silent for longest, unless all have only just spoken.
+    """Close the one that has been silent for longest, unless all have only just come and spoken.
 
-    Whoever has come and not spoken yet makes room, however fresh: so a burst of connections that say nothing
-    keeps nobody out, and a stop that follows its connection within a moment is there before so many others.
+    Who has been here for longer makes room however much it says, and who has not spoken yet however fresh it
+    is: so neither talk nor a burst of silent connections keeps anybody out, and a stop that follows its
+    connection within a moment is there before so many others.
     """
     before_ns = time.monotonic_ns() - round(FRESH_S * 1e9)
-    silent = [one for one in stoppers if not one.spoke or one.heard_ns <= before_ns]
+    silent = [one for one in stoppers if not one.spoke or one.came_ns <= before_ns]
     if not silent:
         return False
     # One that waits for an answer has been heard: what it asked for is being done.

@@ -90,7 +90,7 @@ class Session:
         self.closed = False
         self.named: str | None = None  # what it has called itself
         self.spoke = False  # whether it has said anything yet
-        self.heard_ns = time.monotonic_ns()  # when it did last, or came
+        self.came_ns = self.heard_ns = time.monotonic_ns()  # when it came, and when it said something last
         self.spending = False  # whether what is worked now is put down already
         self._loop = loop
         self._inlet = inlet

@@ -17,6 +17,8 @@ STOP: Final = "robot.stop"
 
 _BLANK = bytes(range(33))  # white space, and what no text should hold
 _MARKS = (b"stop", b"\\", b"\0")  # one of these is in every line that asks for a stop: letters may be escaped
+_SHORTEST = len("method:robot.stop")
+_ID_LENGTH = 200  # characters of an id; a longer one is answered as null
 _LONGEST_MARK = max(map(len, _MARKS))
 _KEPT_BYTES = 160  # of what was dropped: more than a method takes with every letter escaped
 _ESCAPED = re.compile(rb"\\u00([2-7][0-9A-Fa-f])")
@@ -30,7 +32,7 @@ _REASON = re.compile(rb'"reason"\s{0,64}:\s{0,64}"((?:[^"\\]|\\.){0,800})', re.D
 
 def stop_in(line: bytes) -> StopRequest | None:
     """The stop that a line asks for, in time that grows with its length only."""
-    if not any(mark in line for mark in _MARKS):
+    if len(line) < _SHORTEST or not any(mark in line for mark in _MARKS):
         return None  # as nearly all are
     try:
         found = _decode(line)
@@ -59,6 +61,8 @@ def _request(found: dict[str, Raw]) -> StopRequest:
     known: dict[str, Any] = {
         key: msgspec.json.decode(found[key]) for key in ("params", "id", "jsonrpc") if key in found
     }
+    if len(bytes(found.get("id", b""))) > _ID_LENGTH:
+        known["id"] = None
     return StopRequest(_reason(known.get("params")), _id(known))
 
 

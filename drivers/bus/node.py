@@ -7,7 +7,7 @@ it should be, and the only one; else `distrust` says why not.
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -159,9 +159,11 @@ class Node(BusUser):
     def upload_all(self, objects: Sequence[tuple[int, int]]) -> Future[list[bytes | DriverError]]:
         """Read several objects in a row, nothing in between; an error stands in its object's place.
 
-        After one that was not answered the others are not asked for: the list ends there.
+        After one that was not answered the others are not asked for: the list ends there. What was read
+        before an urgent job interrupts is not read again.
         """
-        return self.worker.submit(lambda sdo: list(self._upload_each(sdo, objects)))
+        found: list[bytes | DriverError] = []
+        return self.worker.submit(lambda sdo: self._upload_rest(sdo, objects, found))
 
     def download(
         self,
@@ -369,16 +371,17 @@ class Node(BusUser):
         except DeviceAbort:
             return None
 
-    def _upload_each(
-        self, sdo: SdoChannel, objects: Sequence[tuple[int, int]]
-    ) -> Iterator[bytes | DriverError]:
-        for index, subindex in objects:
+    def _upload_rest(
+        self, sdo: SdoChannel, objects: Sequence[tuple[int, int]], found: list[bytes | DriverError]
+    ) -> list[bytes | DriverError]:
+        for index, subindex in objects[len(found) :]:
             try:
-                yield self._trim(index, subindex, sdo.upload(index, subindex))
+                found.append(self._trim(index, subindex, sdo.upload(index, subindex)))
             except DriverError as error:
-                yield error
+                found.append(error)
                 if not isinstance(error, DeviceAbort):
-                    return
+                    break
+        return found
 
     def _trim(self, index: int, subindex: int, data: bytes) -> bytes:
         """Some devices answer with four bytes whatever the object's size."""

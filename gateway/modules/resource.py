@@ -7,13 +7,14 @@ are taken in a thread of their own, one after the other: a table with command li
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.futures import back, pass_on, then
+from gateway.futures import back, done, pass_on, then
 from gateway.messages import ResourceSnapshot, ResourceSnapshotParams
 from gateway.sources import Selection, whole
 from gateway.turns import Turns
@@ -58,6 +59,14 @@ def columns(snapshot: ResourceSnapshot) -> tuple[float | None, ...]:
         snapshot.gateway.cpu_percent,
         snapshot.gateway.rss_bytes,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wish:
+    """Something to measure for a client, and its answer."""
+
+    begin: "Callable[[], Future[Any]]"
+    answer: "Future[Any]"
 
 
 class HostSource:
@@ -117,7 +126,7 @@ class ResourceModule:
         loop = context.config.control_loop
         self._control = () if loop is None else loop.processes
         self._meters: dict[tuple[Session, str], Meter] = {}
-        self._turns = Turns[Callable[[], Future[Any]]]()
+        self._turns = Turns[_Wish]()
         self._measuring = False  # for a client
         self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.snapshot": self._snapshot}
 
@@ -184,23 +193,21 @@ class ResourceModule:
             session.cpu_ns += done[1]
             return done[0]
 
-        def begin() -> "Future[T]":
-            given = then(back(self._context.loop, self._worker.submit(metered)), give)
-            given.add_done_callback(lambda given: pass_on(given, answer))
-            return given
-
-        self._turns.add(session, begin)
+        wish = _Wish(lambda: then(back(self._context.loop, self._worker.submit(metered)), give), answer)
+        self._turns.add(session, wish)
         self._go_on()
         return answer
 
     def _go_on(self) -> None:
         """One thing at a time, so that what waits is in turn."""
-        following = None if self._measuring else self._turns.next(lambda begin: begin)
+        following = None if self._measuring else self._turns.next(lambda wish: wish)
         if following is not None:
-            client, begin, _begin = following
-            self._turns.done(client, begin)
+            client, wish, _wish = following
+            self._turns.done(client, wish)
             self._measuring = True
-            begin().add_done_callback(lambda _given: self._context.loop.post(self._ended))
+            given = then(done(None), lambda _none: wish.begin())  # also where it raises
+            given.add_done_callback(lambda given: pass_on(given, wish.answer))
+            given.add_done_callback(lambda _given: self._context.loop.post(self._ended))
 
     def _ended(self) -> None:
         self._measuring = False

@@ -50,6 +50,11 @@ class Rules:
         device = self._devices[parameter.component]
         return device.bus, device.node_id, parameter.index, parameter.subindex
 
+    def device(self, parameter: Parameter) -> str:
+        """What is one device is one name, whichever tables of the robot's file describe it."""
+        bus, node_id, _index, _subindex = self.address(parameter)
+        return f"node {node_id} on {bus}"
+
     def node(self, parameter: Parameter) -> Node:
         """Raises `RpcError` (unavailable) where its device could not be built."""
         component: Any = self._component.robot.components.get(parameter.component)

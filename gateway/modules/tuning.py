@@ -7,13 +7,13 @@ for them: what is not written by then is not written any more.
 import itertools
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from drivers.errors import DriverError
+from drivers.errors import DeviceTimeout, DriverError
 from drivers.samples import State
 from gateway.config import RobotConfig
 from gateway.futures import back, done, gather, then
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Changed = Callable[[], None]
+
+UNASKED_S = 1.0  # a device that did not answer a read is not read again so soon
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +86,8 @@ class Tuning:
         self._infos = [one.info for one in self._parameters.values()]
         self._joints = tuple(config.joint)
         self._rules = Rules(config, component, self._parameters)
-        self._reads = Reads(loop, self._read_some)
+        self._reads = Reads(loop, self._rules.device, self._read_all)
+        self._silent: dict[str, tuple[int, str]] = {}  # component → until when it is not asked, and why
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
@@ -199,19 +202,38 @@ class Tuning:
         stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
         return _value(parameter, value, stamp_ns, problem)
 
-    def _read_some(self, parameters: Sequence[Parameter]) -> "Future[list[ParameterValue]]":
-        """For `Reads`: the first parameters, of one device, that can be asked for or that cannot."""
-        silence = self._rules.silence(parameters[0].component)
-        whys = [self._refusal(one, silence) for one in parameters]
-        refused = list(itertools.takewhile(bool, whys))
-        if refused:
-            return done([self._found(one, why) for one, why in zip(parameters, refused, strict=False) if why])
-        asked = [
-            one
-            for one, _why in itertools.takewhile(lambda pair: not pair[1], zip(parameters, whys, strict=True))
-        ]
-        uploads = self._rules.node(asked[0]).upload_all([(one.index, one.subindex) for one in asked])
-        return then(back(self._loop, gather({"all": uploads})), lambda told: self._told(asked, told["all"]))
+    def _read_all(self, parameters: Sequence[Parameter]) -> "Future[list[ParameterValue]]":
+        """For `Reads`: these are of one device. What cannot be asked of it says why."""
+        why = {name: self._why_silent(name) for name in {one.component for one in parameters}}
+        refusals = ((one.name, self._refusal(one, why[one.component])) for one in parameters)
+        refused = {name: refusal for name, refusal in refusals if refusal is not None}
+        asked = [one for one in parameters if one.name not in refused]
+        if not asked:
+            return done([self._found(one, refused[one.name]) for one in parameters])
+        node = self._rules.node(asked[0])
+        uploads = gather({"all": node.upload_all([(one.index, one.subindex) for one in asked])})
+
+        def told(found: Mapping[str, Any]) -> list[ParameterValue]:
+            each = self._each(asked, found["all"])
+            return [self._found(one, refused.get(one.name) or next(each)) for one in parameters]
+
+        return then(back(self._loop, uploads), told)
+
+    def _each(
+        self, asked: Sequence[Parameter], told: "Sequence[bytes | DriverError] | Exception"
+    ) -> Iterator[bytes | Exception]:
+        """What is told of each; where a device did not answer, that is so for all that is left."""
+        found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
+        last = found[-1]
+        if isinstance(last, DeviceTimeout):
+            until_ns = time.monotonic_ns() + round(UNASKED_S * 1e9)
+            self._silent.update({one.component: (until_ns, str(last)) for one in asked})
+        return itertools.islice(itertools.chain(found, itertools.repeat(last)), len(asked))
+
+    def _why_silent(self, component: str) -> str | None:
+        """Why it cannot be asked, or is not asked so soon again."""
+        until_ns, problem = self._silent.get(component, (0, ""))
+        return self._rules.silence(component) or (problem if time.monotonic_ns() < until_ns else None)
 
     def _refusal(self, parameter: Parameter, silence: str | None) -> RpcError | None:
         """Why it is not asked for."""
@@ -223,12 +245,6 @@ class Tuning:
         except RpcError as error:
             return error
         return None
-
-    def _told(
-        self, asked: Sequence[Parameter], told: "Sequence[bytes | DriverError] | Exception"
-    ) -> list[ParameterValue]:
-        found = [told] * len(asked) if isinstance(told, Exception) else told
-        return [self._found(one, each) for one, each in zip(asked, found, strict=False)]
 
     def _found(self, parameter: Parameter, found: bytes | Exception) -> ParameterValue:
         stamp_ns = time.monotonic_ns()

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.messages import ParameterValue
+from gateway.modules import reads
 from gateway.modules.reads import DEVICES, OBJECTS, Reads
 
 DEVICE_NAMES = ("left_hip", "left_knee", "right_hip", "right_knee")
@@ -35,24 +36,31 @@ class _Bench:
     """The loop's turns and the devices' answers are the test's."""
 
     def __init__(self) -> None:
+        self.refuses = False
         self.posted: list[Callable[[], None]] = []
         self.asked: list[tuple[list[Any], Future[list[ParameterValue]]]] = []
-        self.reads = Reads(self, self._read_some)  # type: ignore[arg-type]
+        self.reads = Reads(self, lambda one: one.component, self._read_all)  # type: ignore[arg-type]
 
     def post(self, callback: Callable[[], None]) -> None:
         self.posted.append(callback)
 
-    def _read_some(self, parameters: Sequence[Any]) -> "Future[list[ParameterValue]]":
+    def _read_all(self, parameters: Sequence[Any]) -> "Future[list[ParameterValue]]":
+        if self.refuses:
+            raise ZeroDivisionError
         self.asked.append((list(parameters), Future()))
         return self.asked[-1][1]
 
-    def answer(self, count: int = OBJECTS) -> list[str]:
-        """The oldest of what the devices were asked for, `count` at most; what that was."""
-        parameters, future = self.asked.pop(0)
-        future.set_result([_value(one.name) for one in parameters[:count]])
+    def answer(self, device: str | None = None) -> list[str]:
+        """The oldest of what the devices were asked for; what that was."""
+        at = next(at for at, (asked, _) in enumerate(self.asked) if device in (None, asked[0].component))
+        parameters, future = self.asked.pop(at)
+        future.set_result([_value(one.name) for one in parameters])
+        self.turn()
+        return [one.name for one in parameters]
+
+    def turn(self) -> None:
         while self.posted:
             self.posted.pop(0)()
-        return [one.name for one in parameters[:count]]
 
 
 @pytest.fixture
@@ -84,14 +92,12 @@ def test_a_few_objects_of_a_few_devices_are_asked_for_at_a_time(bench: _Bench) -
         bench.answer()
 
 
-@pytest.mark.parametrize("count", [OBJECTS, 3, 1])
-def test_it_is_answered_once_all_is_there_in_the_order_that_was_asked_for(bench: _Bench, count: int) -> None:
-    """However few a device answers at once."""
+def test_it_is_answered_once_all_is_there_in_the_order_that_was_asked_for(bench: _Bench) -> None:
     chosen = _everything()
     answer = bench.reads.ask(_Client("a"), chosen)
     while bench.asked:
         assert not answer.done()
-        bench.answer(count)
+        bench.answer()
     values = answer.result(0).values
     assert list(values) == [one.name for one in chosen]
     assert all(values[one.name] == _value(one.name) for one in chosen)
@@ -146,21 +152,50 @@ def test_what_a_client_that_has_gone_asked_for_is_not_read(bench: _Bench) -> Non
     assert not bench.asked
 
 
-def test_a_device_that_is_slow_keeps_nobody_from_the_others(bench: _Bench) -> None:
-    bench.reads.ask(_Client("a"), _of("left_hip", 100))
-    slow = bench.asked.pop(0)
+def test_devices_that_are_slow_keep_nobody_from_the_others(
+    bench: _Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow = ("left_hip", "right_hip", "right_knee")
+    for device in slow:
+        bench.reads.ask(_Client(device), _of(device, 100))
+    monkeypatch.setattr(reads, "SLOW_S", 0.0)
+    for device in slow:  # each is known to be slow once it has been waited for
+        bench.answer(device)
+    monkeypatch.setattr(reads, "SLOW_S", 1000.0)
     answer = bench.reads.ask(_Client("b"), _of("left_knee", 20))
     while not answer.done():
-        bench.answer()
-    assert not slow[1].done()
+        bench.answer("left_knee")
+    assert {asked[0].component for asked, _future in bench.asked} == set(slow)
 
 
 def test_an_unforeseen_error_is_its_own_requests_and_the_next_goes_on(bench: _Bench) -> None:
     client = _Client("a")
     first, second = (bench.reads.ask(client, _of("left_hip", 1)) for _ in range(2))
     bench.asked.pop(0)[1].set_exception(ZeroDivisionError())
-    while bench.posted:
-        bench.posted.pop(0)()
+    bench.turn()
     assert isinstance(first.exception(0), ZeroDivisionError)
+    bench.answer()
+    assert second.result(0).values
+
+
+def test_two_errors_of_one_request_are_one_answer_and_the_next_goes_on(bench: _Bench) -> None:
+    first = bench.reads.ask(_Client("a"), [*_of("left_hip", 1), *_of("left_knee", 1)])
+    second = bench.reads.ask(_Client("b"), _of("left_hip", 1))
+    for _parameters, future in bench.asked[:2]:
+        future.set_exception(ZeroDivisionError())
+    del bench.asked[:2]
+    bench.turn()
+    assert isinstance(first.exception(0), ZeroDivisionError)
+    bench.answer()
+    assert second.result(0).values
+
+
+def test_a_device_whose_reading_cannot_begin_is_not_busy_for_ever(bench: _Bench) -> None:
+    bench.refuses = True
+    first = bench.reads.ask(_Client("a"), _of("left_hip", 1))
+    bench.turn()
+    assert isinstance(first.exception(0), ZeroDivisionError)
+    bench.refuses = False
+    second = bench.reads.ask(_Client("a"), _of("left_hip", 1))
     bench.answer()
     assert second.result(0).values
