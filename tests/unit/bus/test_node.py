@@ -11,7 +11,7 @@ from drivers.bus.life import EMCY_HISTORY
 from drivers.bus.node import shared_node
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
-from drivers.errors import DriverError, SettingsError, Unavailable
+from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
 from drivers.samples import State
 from eds import Description
 from tests.unit.bus.conftest import IDENTITY
@@ -60,6 +60,58 @@ def test_reading_and_writing_an_object(bus: CanBus, channel: str, describe: Desc
         gait.stop()
         with pytest.raises(Unavailable, match=r"gait.*not open|not open"):
             gait.node.upload(0x2001, 0).result(WAIT_S)
+
+
+def test_several_objects_are_read_in_a_row_and_what_cannot_be_read_is_an_error_in_its_place(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    with FakeNode(channel, 5, {**IDENTITY, (0x2001, 0): b"\x90\x01"}):
+        gait = device(bus, describe)
+        gait.start()
+        until(lambda: gait.node.ready)
+        step, absent, vendor = gait.node.upload_all([(0x2001, 0), (0x2009, 0), (0x1018, 1)]).result(WAIT_S)
+        assert (step, vendor) == (b"\x90\x01", IDENTITY[0x1018, 1])
+        assert isinstance(absent, DeviceAbort)
+        gait.stop()
+
+
+def test_after_an_object_that_is_not_answered_no_other_is_asked_for(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    objects = {**IDENTITY, (0x2001, 0): b"\x90\x01"}
+    with FakeNode(channel, 5, objects, deaf_to={(0x2009, 0)}) as fake:
+        gait = device(bus, describe)
+        gait.start()
+        until(lambda: gait.node.ready)
+        found = gait.node.upload_all([(0x2001, 0), (0x2009, 0), (0x2001, 0), (0x2001, 0)]).result(WAIT_S)
+        assert found[0] == b"\x90\x01"
+        assert isinstance(found[1], DeviceTimeout)
+        assert len(found) == 2
+        assert sum(data[1:3] == b"\x01\x20" for _can_id, data in fake.seen) == 1
+        gait.stop()
+
+
+def test_what_was_read_before_an_urgent_job_is_not_read_again(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    """Else those that come again and again would keep all that waits behind for ever."""
+    with FakeNode(channel, 5, {**IDENTITY, (0x2001, 0): b"\x90\x01"}) as fake:
+        gait = device(bus, describe)
+        gait.start()
+        until(lambda: gait.node.ready)
+        asked = 0
+
+        def interrupt_every_second(request: bytes) -> None:
+            nonlocal asked
+            if request[:3] == b"\x40\x01\x20":
+                asked += 1
+                if asked % 2 == 0:
+                    gait.node.run(lambda sdo: sdo.upload(0x1000, 0), urgent=True)
+
+        fake.on_request = interrupt_every_second
+        found = gait.node.upload_all([(0x2001, 0)] * 8).result(WAIT_S)
+        assert found == [b"\x90\x01"] * 8
+        gait.stop()
 
 
 def test_replies_that_come_twice_confuse_no_reading(bus: CanBus, channel: str, describe: Describe) -> None:
