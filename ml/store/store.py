@@ -121,8 +121,6 @@ class Store:
                             self._commit(delta, table, files, Transaction(writer, sequence))
                     except CommitFailedError:
                         continue  # another writer was faster, or we ourselves, when that seemed to fail
-                    finally:
-                        self._open.pop(location, None)
                     full = delta.version() // CHECKPOINT_EVERY > seen // CHECKPOINT_EVERY
                     self.make_last(location, delta, checkpoint=full)
                 self._open[location] = delta
@@ -186,7 +184,10 @@ class Store:
             with translated(f"{self.url}/{location} cannot be mended"):
                 durable.synchronise([self.folder / ABOUT])
                 torn.set_aside(self.folder / location)
-                self._synchronise(self.folder / location, torn.newest(self.folder / location))
+                try:
+                    self._synchronise(self.folder / location, torn.newest(self.folder / location))
+                except ValueError:
+                    raise StoreError(str(torn.find(self.folder / location))) from None
 
     def unfinished(self, location: str) -> AbstractContextManager[None]:
         """Around commits that `make_last` has not seen yet: nobody takes them for what a kill has left."""
@@ -256,7 +257,7 @@ class Store:
         return {} if self.folder is not None else s3_options() | {"max_retries": str(RETRIES)}
 
     def _writable(self, table: Table, location: str, schema: pa.Schema) -> DeltaTable:
-        delta = self._open.get(location)
+        delta = self._open.pop(location, None)  # whoever has changed it with success puts it back
         if delta is not None:
             return delta
         self.mend(location)
@@ -266,7 +267,7 @@ class Store:
             return self._create(table, location, schema)
 
     def _create(self, table: Table, location: str, schema: pa.Schema) -> DeltaTable:
-        return DeltaTable.create(
+        delta = DeltaTable.create(
             self._uri(location),
             schema,
             mode="ignore",
@@ -275,6 +276,8 @@ class Store:
             configuration={"delta.dataSkippingNumIndexedCols": str(table.indexed)},
             storage_options=self._options(),
         )
+        self.make_last(location, delta)
+        return delta
 
     def _files(self, table: Table, location: str, batches: Iterator[pa.RecordBatch]) -> list[AddAction]:
         """New files with these rows, in a folder already synchronised: a log never names what may vanish."""

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import pyarrow as pa
 import pytest
 
-from ml.store import Store, StoreError, torn, upkeep
+from ml.store import Store, StoreError, durable, torn, upkeep
 from ml.store.durable import LOG
 from ml.store.tables import EVENTS
 
@@ -195,6 +195,26 @@ def test_of_two_entries_the_second_alone_may_be_left(url: str, left: bytes | Non
         cut(entry(url, 5), left)
     assert append(url, 4)
     assert texts(url) == [1, 2, 3, 4]
+
+
+def test_an_entry_in_the_middle_is_named_also_where_nothing_says_what_lasts(url: str) -> None:
+    for each in log_of(url).glob("*.json"):
+        cut(each, each.read_bytes())
+    cut(entry(url, 1), bytes(2_000))
+    with pytest.raises(StoreError, match=r"0001\.json is damaged, and was whole once"):
+        append(url, 4)
+
+
+def test_the_beginning_of_a_log_lasts_before_anything_follows_it(
+    folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Store, "_commit", killed)
+    with pytest.raises(KeyboardInterrupt):
+        append(folder_url, 1)
+    assert durable.is_marked(entry(folder_url, 0))
 
 
 def test_an_entry_that_somebody_has_removed_is_named(url: str) -> None:
