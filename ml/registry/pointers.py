@@ -14,7 +14,6 @@ from msgspec import Struct
 
 from ml.errors import UnusableModel
 from ml.registry.card import checked_name
-from ml.registry.lasting import create
 from ml.store.objects import Objects
 
 FOLDER: Final = "models/serving"
@@ -121,7 +120,7 @@ class Pointers:
         return max((int(name[1]) for name in names if name), default=0)
 
     def _create(self, number: int, pointer: Pointer) -> bool:
-        return create(self._objects, self._path(number), msgspec.json.encode(pointer))
+        return self._objects.create(self._path(number), msgspec.json.encode(pointer))
 
     def _read(self, number: int) -> Pointer:
         data = self._objects.read(self._path(number))

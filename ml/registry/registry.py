@@ -15,7 +15,6 @@ import msgspec
 from ml.errors import Overtaken, UnusableModel
 from ml.registry.card import Card, checked_name, content_id, decoded, encoded
 from ml.registry.code import features_hash
-from ml.registry.lasting import create
 from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
@@ -251,7 +250,7 @@ class Registry:
 
     def _create(self, model: str, name: str, data: bytes) -> None:
         """Write a file, unless it is there; then it must be the same."""
-        if create(self._objects, f"{FOLDER}/{model}/{name}", data):
+        if self._objects.create(f"{FOLDER}/{model}/{name}", data):
             return
         same = self._read_card(model).id == model if name == CARD else self.file(model, name) == data
         if not same:

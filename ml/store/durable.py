@@ -1,17 +1,21 @@
 """Commits in a folder, made to last: the table format's library never synchronises what it writes.
 
-An entry of the log that was synchronised has an attribute that says so. Nothing makes that attribute last:
-after a power cut it may be missing from an entry that did last, but it is on none that did not.
+An entry of the log has an attribute where it and all before it were synchronised, with their files; so has a
+checkpoint. Nothing makes that attribute last: after a power cut it may be missing from what did last, but it
+is on nothing that did not.
 """
 
 import contextlib
+import fcntl
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from urllib.parse import unquote
+
+from ml.store.private import opener, private_folder
 
 LOG: Final = "_delta_log"
 _MARK: Final = "user.gwrms.lasts"
@@ -19,15 +23,16 @@ _LEVELS: Final = 5  # of folders, from a file in a partition up to the store's o
 _AT_ONCE: Final = 8  # so that the disk can take several in one go
 
 
-def make_last(table: Path, writer: str, sequence: int) -> None:
-    """Synchronise the files of the commit that holds this transaction, its log entry and their folders."""
-    entry = _commit(table, writer, sequence)
-    if entry is None:  # the log was cleaned since: everything is old, or we cannot tell
-        os.sync()
-        return
-    actions = map(json.loads, entry.read_text().splitlines())
+def make_last(table: Path, newest: int, known: int = -1) -> None:
+    """Synchronise the log up to this version, with all files that it names; up to `known` that was done.
+
+    Also what others have committed: what is built on it is worth nothing without it.
+    """
+    entries = list(_open(table, newest, known))
+    actions = (action for entry in entries for action in read(entry))
     files = [table / unquote(action["add"]["path"]) for action in actions if "add" in action]
-    synchronise([*files, entry])
+    synchronise([*files, *entries])
+    mark(entries)
 
 
 def synchronise(files: Iterable[Path]) -> None:
@@ -36,29 +41,92 @@ def synchronise(files: Iterable[Path]) -> None:
     folders = {folder for file in found for folder in list(file.parents)[:_LEVELS]}
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         list(pool.map(_sync, found))
-        list(pool.map(_sync, folders))
-    for file in found:
-        if file.parent.name == LOG and file.suffix == ".json":
-            with contextlib.suppress(OSError):  # not every file system has attributes
-                os.setxattr(file, _MARK, b"1")
+        list(pool.map(_sync_names, folders))
 
 
-def is_marked(entry: Path) -> bool:
-    """Whether this entry is known to have been synchronised, and so may have been acknowledged."""
+def create(file: Path, data: bytes) -> bool:
+    """Write a file that is not there yet, whole or not at all; False where it is. Either way it lasts."""
+    private_folder(file.parent)
+    number = int.from_bytes(os.urandom(6))
+    draft = file.with_name(f"{file.name}#{number}")  # as the library's own drafts, which no listing shows
     try:
-        return os.getxattr(entry, _MARK) == b"1"
+        with open(draft, "xb", opener=opener) as out:
+            out.write(data)
+            out.flush()
+            os.fsync(out.fileno())
+        with contextlib.suppress(FileExistsError):
+            file.hardlink_to(draft)
+            return True
+        return False
+    finally:
+        draft.unlink(missing_ok=True)
+        synchronise([file])
+
+
+@contextlib.contextmanager
+def unfinished(table: Path) -> Iterator[None]:
+    """While there may be commits of ours that do not last yet: nobody sets them aside within the block."""
+    with _locked(table, fcntl.LOCK_SH):
+        yield
+
+
+@contextlib.contextmanager
+def undisturbed(table: Path) -> Iterator[bool]:
+    """Keep everybody's commits away within the block; False where somebody has some that do not last yet."""
+    try:
+        with _locked(table, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            yield True
+    except BlockingIOError:
+        yield False
+
+
+def mark(synchronised: Iterable[Path]) -> None:
+    """Say of entries or checkpoints that they last."""
+    for file in synchronised:
+        with contextlib.suppress(OSError):  # not every file system has attributes
+            os.setxattr(file, _MARK, b"1")
+
+
+def is_marked(file: Path) -> bool:
+    """Whether this is known to have been synchronised, and so, if it is an entry, may be acknowledged."""
+    try:
+        return os.getxattr(file, _MARK) == b"1"
     except OSError:
         return False
 
 
-def _commit(table: Path, writer: str, sequence: int) -> Path | None:
-    """The log entry that holds the transaction, looked for from the newest back."""
-    for entry in sorted((table / LOG).glob("*.json"), reverse=True):
-        for action in map(json.loads, entry.read_text().splitlines()):
-            known = action.get("txn")
-            if known is not None and known["appId"] == writer:
-                return entry if known["version"] == sequence else None
-    return None
+def log_entry(table: Path, version: int) -> Path:
+    """The log entry of this version."""
+    return table / LOG / f"{version:020}.json"
+
+
+def read(entry: Path) -> Iterator[dict[str, Any]]:
+    """What it says, line by line."""
+    yield from map(json.loads, entry.read_bytes().splitlines())
+
+
+def _open(table: Path, newest: int, known: int) -> Iterator[Path]:
+    """From the newest entry back, as far as nobody knows that they last."""
+    for version in range(newest, known, -1):
+        file = log_entry(table, version)
+        if not file.exists() or is_marked(file):  # not there: the log was cleaned below
+            return
+        yield file
+
+
+@contextlib.contextmanager
+def _locked(table: Path, how: int) -> Iterator[None]:
+    descriptor = os.open(table / LOG, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, how)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _sync_names(folder: Path) -> None:
+    with contextlib.suppress(PermissionError):  # another's, which was there before
+        _sync(folder)
 
 
 def _sync(path: Path) -> None:

@@ -15,6 +15,7 @@ import pyarrow as pa
 from obstore.exceptions import AlreadyExistsError, NotFoundError
 from obstore.store import MemoryStore, ObjectStore, from_url
 
+from ml.store import durable
 from ml.store.errors import translated
 from ml.store.private import private_folder
 
@@ -50,13 +51,15 @@ class Objects:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self._folder = Path(unquote(urlsplit(url).path)) if url.startswith("file://") else None
+        self.folder = Path(unquote(urlsplit(url).path)) if url.startswith("file://") else None
         self._opened: ObjectStore | None = None
         self._objects()
 
     def create(self, path: str, data: bytes) -> bool:
-        """Write an object that is not there yet; False where it is."""
+        """Write an object that is not there yet; False where it is. In a folder it lasts then."""
         with translated(f"{self.url}/{path} cannot be written"):
+            if self.folder is not None:
+                return durable.create(self.folder / path, data)
             try:
                 obstore.put(self._objects(write=True), path, data, mode="create", use_multipart=False)
             except AlreadyExistsError:
@@ -115,7 +118,7 @@ class Objects:
 
     def _objects(self, *, write: bool = False) -> ObjectStore:
         if self._opened is None:
-            if self._folder is not None and not write and not self._folder.is_dir():
+            if self.folder is not None and not write and not self.folder.is_dir():
                 return MemoryStore()
             with translated(f"the store {self.url} cannot be opened"):
                 self._opened = _open(self.url)

@@ -1,8 +1,10 @@
 """A store by its URL: tables that are appended to exactly once, by several servers at a time."""
 
+import contextlib
 import functools
 import os
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final, Self
 from urllib.parse import urlsplit
@@ -70,14 +72,15 @@ class Store:
 
     def __init__(self, url: str | None = None, shards: int = 1, several_writers: bool = True) -> None:
         self.url = checked_url(url or default_url())
-        self.folder = Path(urlsplit(self.url).path) if self.url.startswith("file://") else None
         self.objects = Objects(self.url)
+        self.folder = self.objects.folder
         self.about = self._about(About(shards=shards, several_writers=several_writers))
         if several_writers and not self.about.several_writers:
             raise UnsafeStore(
                 f"the store {self.url} is for one writer alone: no other may open it for writing"
             )
         self._open: dict[str, DeltaTable] = {}
+        self._lasting: dict[Path, int] = {}  # up to which version each table is known to last
 
     @classmethod
     def existing(cls, url: str | None = None) -> Self:
@@ -88,9 +91,7 @@ class Store:
 
         """
         url = checked_url(url or default_url())
-        folder = Path(urlsplit(url).path) if url.startswith("file://") else None
-        there = (folder / ABOUT).exists() if folder else Objects(url).read(ABOUT) is not None
-        if not there:
+        if Objects(url).read(ABOUT) is None:
             raise NoSuchTable(f"there is no store at {url} yet: nothing has been uploaded to it")
         return cls(url, several_writers=False)
 
@@ -111,17 +112,19 @@ class Store:
             for _ in range(ATTEMPTS):
                 delta = self._writable(table, location, schema)
                 seen = delta.version()
-                try:
-                    self._widen(delta, table, location, schema)
-                    new = (delta.transaction_version(writer) or 0) < sequence
-                    if new:
-                        files = files or self._files(table, location, batches())
-                        self._commit(delta, table, files, Transaction(writer, sequence))
-                except CommitFailedError:
-                    continue  # another writer was faster, or we ourselves in an attempt that seemed to fail
-                finally:
-                    self._open.pop(location, None)
-                self._settle(location, delta, seen, writer, sequence)
+                with self.unfinished(location):
+                    try:
+                        self._widen(delta, table, location, schema)
+                        new = (delta.transaction_version(writer) or 0) < sequence
+                        if new:
+                            files = files or self._files(table, location, batches())
+                            self._commit(delta, table, files, Transaction(writer, sequence))
+                    except CommitFailedError:
+                        continue  # another writer was faster, or we ourselves, when that seemed to fail
+                    finally:
+                        self._open.pop(location, None)
+                    full = delta.version() // CHECKPOINT_EVERY > seen // CHECKPOINT_EVERY
+                    self.make_last(location, delta, checkpoint=full)
                 self._open[location] = delta
                 return new
         raise StoreError(
@@ -137,14 +140,16 @@ class Store:
         """
         with translated(f"{self.url}/{location} cannot be written"):
             delta = self._writable(table, location, table.schema)
-            write_deltalake(
-                delta,
-                rows,
-                mode="append",
-                schema_mode="merge",
-                writer_properties=writer_properties(rows.schema),
-                post_commithook_properties=NO_HOOKS,
-            )
+            with self.unfinished(location):
+                write_deltalake(
+                    delta,
+                    rows,
+                    mode="append",
+                    schema_mode="merge",
+                    writer_properties=writer_properties(rows.schema),
+                    post_commithook_properties=NO_HOOKS,
+                )
+                self.make_last(location, delta)
 
     @functools.cached_property
     def files(self) -> FileSystem:
@@ -169,7 +174,9 @@ class Store:
             raise StoreError(str(found)) from None
 
     def mend(self, location: str) -> None:
-        """Set aside what a power cut has torn off in the table's log, where it is in a folder.
+        """Before anything is built on a table in a folder: set aside what a power cut has torn off.
+
+        What is there is made to last, whoever wrote it: that may have been killed before.
 
         Raises:
             StoreError: something else has damaged it, or it may just be written.
@@ -177,7 +184,30 @@ class Store:
         """
         if self.folder is not None:
             with translated(f"{self.url}/{location} cannot be mended"):
+                durable.synchronise([self.folder / ABOUT])
                 torn.set_aside(self.folder / location)
+                self._synchronise(self.folder / location, torn.newest(self.folder / location))
+
+    def unfinished(self, location: str) -> AbstractContextManager[None]:
+        """Around commits that `make_last` has not seen yet: nobody takes them for what a kill has left."""
+        if self.folder is None:
+            return contextlib.nullcontext()
+        return durable.unfinished(self.folder / location)
+
+    def make_last(self, location: str, delta: DeltaTable, *, checkpoint: bool = False) -> None:
+        """Synchronise the table in a folder as it is known to `delta`; a checkpoint spares readers its log.
+
+        Only then, so that no checkpoint knows more than its log after a power cut.
+        """
+        if self.folder is not None:
+            self._synchronise(self.folder / location, delta.version())
+        if checkpoint:
+            delta.create_checkpoint()
+            if self.folder is not None:
+                log = self.folder / location / durable.LOG
+                made = log / f"{delta.version():020}.checkpoint.parquet"
+                durable.synchronise([made, log / torn.HINT])
+                durable.mark([made])
 
     def dataset(self, location: str, version: int | None = None) -> pyarrow.dataset.Dataset:
         """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
@@ -199,14 +229,17 @@ class Store:
 
     # --- inside
 
+    def _synchronise(self, table: Path, newest: int) -> None:
+        durable.make_last(table, newest, self._lasting.get(table, -1))
+        self._lasting[table] = newest
+
     def _about(self, wanted: About) -> About:
         """What the store is; a new one is probed first."""
         data = self.objects.read(ABOUT)
         if data is None:
             if self.folder is None and wanted.several_writers:
                 probe(self.objects)
-            if self.objects.create(ABOUT, msgspec.json.encode(wanted)) and self.folder is not None:
-                durable.synchronise([self.folder / ABOUT])
+            self.objects.create(ABOUT, msgspec.json.encode(wanted))
             data = self.objects.read(ABOUT) or b""
         try:
             about = msgspec.json.decode(data, type=About)
@@ -233,7 +266,7 @@ class Store:
             return self._create(table, location, schema)
 
     def _create(self, table: Table, location: str, schema: pa.Schema) -> DeltaTable:
-        delta = DeltaTable.create(
+        return DeltaTable.create(
             self._uri(location),
             schema,
             mode="ignore",
@@ -242,9 +275,6 @@ class Store:
             configuration={"delta.dataSkippingNumIndexedCols": str(table.indexed)},
             storage_options=self._options(),
         )
-        if self.folder is not None:
-            durable.synchronise((self.folder / location / durable.LOG).iterdir())
-        return delta
 
     def _files(self, table: Table, location: str, batches: Iterator[pa.RecordBatch]) -> list[AddAction]:
         """New files with these rows, in a folder already synchronised: a log never names what may vanish."""
@@ -264,9 +294,6 @@ class Store:
         new = [field for field in wanted if field.name not in known]
         if new:
             delta.alter.add_columns(new, post_commithook_properties=NO_HOOKS)
-            if self.folder is not None:
-                entry = f"{delta.version():020}.json"
-                durable.synchronise([self.folder / location / durable.LOG / entry])
 
     def _check_units(self, delta: DeltaTable, table: Table, location: str, schema: pa.Schema) -> None:
         """Values in different units never stand in one column, also where another has just added it."""
@@ -291,17 +318,6 @@ class Store:
             post_commithook_properties=NO_HOOKS,
         )
         delta.update_incremental()
-
-    def _settle(self, location: str, delta: DeltaTable, seen: int, writer: str, sequence: int) -> None:
-        """Make the commit last, and now and then spare readers the log before it; `seen` was before it."""
-        checkpoint = delta.version() // CHECKPOINT_EVERY > seen // CHECKPOINT_EVERY
-        if checkpoint:
-            delta.create_checkpoint()
-        if self.folder is not None:
-            durable.make_last(self.folder / location, writer, sequence)
-            if checkpoint:
-                log = self.folder / location / durable.LOG
-                durable.synchronise([*log.glob("*.checkpoint.parquet"), log / "_last_checkpoint"])
 
 
 def writer_properties(schema: pa.Schema) -> WriterProperties:

@@ -17,7 +17,7 @@ import pyarrow.dataset
 from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError
 
-from ml.store import durable, reading
+from ml.store import reading
 from ml.store.alone import alone
 from ml.store.errors import NoSuchTable, StoreError, translated
 from ml.store.store import NO_HOOKS, Store, writer_properties
@@ -149,11 +149,12 @@ def retain(
 def _retain(store: Store, location: str, before: datetime) -> int:
     delta = store.table(location)
     _note(store, location, before)
-    found = delta.delete(
-        f"utc < '{before.isoformat()}'",
-        post_commithook_properties=NO_HOOKS,
-    )
-    _make_last(store, location, delta)
+    with store.unfinished(location):
+        found = delta.delete(
+            f"utc < '{before.isoformat()}'",
+            post_commithook_properties=NO_HOOKS,
+        )
+        store.make_last(location, delta, checkpoint=True)
     return int(found["num_deleted_rows"] or 0)
 
 
@@ -174,8 +175,6 @@ def retained(store: Store, location: str) -> datetime | None:
 def _note(store: Store, location: str, before: datetime) -> None:
     name = f"{_noted(location)}/{before.astimezone(UTC).strftime(_INSTANT)}.json"
     store.objects.create(name, msgspec.json.encode({"location": location, "before": before}))
-    if store.folder is not None:
-        durable.synchronise([store.folder / name])
 
 
 def _noted(location: str) -> str:
@@ -207,13 +206,21 @@ def vacuum(
 def _vacuum(
     store: Store, location: str, grace: timedelta, versions: list[int], *, dry_run: bool
 ) -> list[str]:
-    return store.table(location).vacuum(
-        retention_hours=int(grace / timedelta(hours=1)),
-        enforce_retention_duration=False,
-        dry_run=dry_run,
-        keep_versions=versions or None,
-        post_commithook_properties=NO_HOOKS,
-    )
+    delta = store.table(location)
+    with store.unfinished(location):
+        if not dry_run:  # nothing goes before what stands for it lasts
+            store.make_last(location, delta)
+        gone = delta.vacuum(
+            retention_hours=int(grace / timedelta(hours=1)),
+            enforce_retention_duration=False,
+            dry_run=dry_run,
+            keep_versions=versions or None,
+            post_commithook_properties=NO_HOOKS,
+        )
+        if not dry_run:
+            delta.update_incremental()
+            store.make_last(location, delta)
+    return gone
 
 
 def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
@@ -238,26 +245,14 @@ def _compact(store: Store, location: str) -> Compacted:
 def _put_together(store: Store, location: str) -> Compacted:
     delta = store.table(location)
     before = len(delta.file_uris())
-    delta.optimize.compact(
-        target_size=TARGET_BYTES,
-        writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
-        post_commithook_properties=NO_HOOKS,
-    )
-    _make_last(store, location, delta)
+    with store.unfinished(location):
+        delta.optimize.compact(
+            target_size=TARGET_BYTES,
+            writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
+            post_commithook_properties=NO_HOOKS,
+        )
+        store.make_last(location, delta, checkpoint=True)
     return Compacted(location, before, len(delta.file_uris()))
-
-
-def _make_last(store: Store, location: str, delta: DeltaTable) -> None:
-    """Synchronise a folder's files, and begin the log anew with a checkpoint."""
-    delta.create_checkpoint()
-    if store.folder is not None:
-        table = store.folder / location
-        files = [
-            table / unquote(path) for path in delta.get_add_actions(flatten=True).column("path").to_pylist()
-        ]
-        log = table / durable.LOG  # where others may be writing: their drafts come and go
-        entries = (entry for entry in log.glob("*.json") if not durable.is_marked(entry))
-        durable.synchronise([*files, *entries, *log.glob("*.checkpoint.parquet"), log / "_last_checkpoint"])
 
 
 def _mend(store: Store, tables: Sequence[Table]) -> None:

@@ -24,16 +24,7 @@ PLACES: Final = (*[Place.FOLDER] * 14, *[Place.SHARDS] * 5, Place.S3)  # S3 take
 SHRINK_S: Final = 60.0
 MEMORY: Final = Path("/dev/shm")  # a disk that costs nothing; ours says itself what a power cut leaves
 # What is not mended yet, and why: what a violation says, as a regular expression.
-KNOWN: Final[dict[str, str]] = {
-    r"part-[-0-9a-f]*(-c000)?\.zstd\.parquet is not there": "a vacuum after a compaction that did not last",
-    r"Invalid table version": "a checkpoint without its entry after a power cut",
-    r"Invalid Checkpoint": "entries or checkpoints that were not synchronised, after a power cut",
-    r"a version is pinned and cannot be read": "a pin that was not synchronised, after a power cut",
-    r"deserialize thrift": "a torn checkpoint that is not known for one",
-    r"uploaded\.db cannot be used": "a segment that could not be opened stays open, and its log behind",
-    r"json is damaged, and was whole once": "two entries of a vacuum that were not synchronised, likewise",
-    r"store\.json is damaged": "who made it was killed before it was synchronised; later the power failed",
-}
+KNOWN: Final[dict[str, str]] = {}
 
 
 @dataclass(slots=True)

@@ -96,7 +96,6 @@ class Server:
         """Begin a life, and link to every robot."""
         self.life += 1
         self.spool = Spool(self.folder, reserve_bytes=1, keep_bytes=1 << 20, free_bytes=self._free)
-        self.disk.synced(self.disk.root)  # not yet by the spool itself
         self.recorder = Stepped(self.spool, self.times)
         self.uploader = Uploader(self.spool, self.connect)
         self.links = {name: Link(robot) for name, robot in self.robots.items()}

@@ -18,7 +18,7 @@ from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.proving import Advance, Proof, prove
-from server_gui.core.recording.errors import Damaged
+from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 
 AT_ONCE: Final = 4  # files
@@ -172,7 +172,7 @@ def _unknown(store: Store, spool: Path, known_batches: Set[tuple[str, int]]) -> 
     for number in spooled.uploaded(spool):
         try:
             batch = spooled.batch(spool, number)
-        except Damaged as error:
+        except SpoolUnusable as error:
             yield str(error)
             continue
         if (batch.writer, batch.number) in known_batches:

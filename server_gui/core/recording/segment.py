@@ -57,6 +57,8 @@ def translated(file: Path) -> Iterator[None]:
         damaged = getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED
         kind, how = (Damaged, "is damaged") if damaged else (SpoolUnusable, "cannot be used")
         raise kind(f"the spool's file {file} {how}: {error}") from error
+    except OSError as error:
+        raise SpoolUnusable(f"the spool's file {file} cannot be used: {error.strerror or error}") from error
     except (msgspec.MsgspecError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise Damaged(f"the spool's file {file} is damaged: {error}") from error
 
@@ -94,21 +96,28 @@ class Segment:
         with translated(path):
             path.touch(FILE)  # what SQLite puts beside it is as private as this is
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-            self._database.execute(f"PRAGMA page_size={PAGE_BYTES}")
-            self._database.execute(f"PRAGMA mmap_size={MAPPED_BYTES}")
-            # WAL with FULL: a commit has returned only when the log is on the disk.
-            self._database.execute("PRAGMA journal_mode=WAL")
-            self._database.execute("PRAGMA synchronous=FULL")
-            self._database.text_factory = _text
-            self._database.executescript(SCHEMA)
-            self._bring_forward()
-            self._layouts: dict[tuple[str, Layout], int] = {}
-            self._sums: dict[int, int] = {}  # of each layout, which its runs' checksums begin with
-            for number, robot, description in self._database.execute("SELECT * FROM layout"):
-                self._layouts[robot, _layout_decoder.decode(description)] = number
-                self._sums[number] = _sum(robot, description)
-            self.rows = self._count()
-            self.writer = self._told("writer")
+            try:
+                self._prepare()
+            except BaseException:
+                self._database.close()  # else the next close is not the last, and leaves the log behind
+                raise
+
+    def _prepare(self) -> None:
+        self._database.execute(f"PRAGMA page_size={PAGE_BYTES}")
+        self._database.execute(f"PRAGMA mmap_size={MAPPED_BYTES}")
+        # WAL with FULL: a commit has returned only when the log is on the disk.
+        self._database.execute("PRAGMA journal_mode=WAL")
+        self._database.execute("PRAGMA synchronous=FULL")
+        self._database.text_factory = _text
+        self._database.executescript(SCHEMA)
+        self._bring_forward()
+        self._layouts: dict[tuple[str, Layout], int] = {}
+        self._sums: dict[int, int] = {}  # of each layout, which its runs' checksums begin with
+        for number, robot, description in self._database.execute("SELECT * FROM layout"):
+            self._layouts[robot, _layout_decoder.decode(description)] = number
+            self._sums[number] = _sum(robot, description)
+        self.rows = self._count()
+        self.writer = self._told("writer")
 
     def _bring_forward(self) -> None:
         """Give a segment from before there were checksums room for them."""

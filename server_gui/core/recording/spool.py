@@ -18,13 +18,14 @@ import shutil
 import sqlite3
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import IO, Final, Self
 
 import msgspec
 
+from ml.store import durable
 from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
@@ -88,15 +89,18 @@ class Spool:
         self._free_bytes = free_bytes
         self._lock = _take(folder)
         try:
-            self.id = self._identify()
-            self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
-            self.receipts = Receipts(folder / RECEIPTS)
-            self._writers = {self.id}
-            self._look_at_logs()
-            self._heads = self._known_heads()
-            self._began_ns: int | None = None
-            self._current = self._resume()
-            self.first = self._current.number  # of what this opening writes
+            with _writing(folder):
+                self.id = self._identify()
+                durable.synchronise([folder / "id"])  # with the names of the folders above it
+                self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
+                self.receipts = Receipts(folder / RECEIPTS)
+                self._writers = {self.id}
+                self._look_at_names()
+                self._look_at_logs()
+                self._heads = self._known_heads()
+                self._began_ns: int | None = None
+                self._current = self._resume()
+                self.first = self._current.number  # of what this opening writes
         except BaseException:
             self._lock.close()
             raise
@@ -124,12 +128,11 @@ class Spool:
             SpoolUnusable: nothing was kept; the message says why.
 
         """
-        try:
-            self._current.append(runs, records, heads or {})
-        except UNFIT as error:
-            raise NotKept(f"the spool {self.folder} does not take it: {error}") from error
-        except sqlite3.Error as error:
-            raise SpoolUnusable(f"the spool {self.folder} cannot be written: {error}") from error
+        with _writing(self.folder):
+            try:
+                self._current.append(runs, records, heads or {})
+            except UNFIT as error:
+                raise NotKept(f"the spool {self.folder} does not take it: {error}") from error
         self._heads.update(heads or {})
         if self._began_ns is None and self._current.rows:
             self._began_ns = time.monotonic_ns()
@@ -178,17 +181,17 @@ class Spool:
         return Segment(self._path(number), number)
 
     def uploaded(self, number: int) -> None:
-        """The segment is in the store, durably, and has its receipt: it may go when room is needed."""
-        self._path(number).rename(self._path(number, Kept.UPLOADED))
-        _sync(self.folder)
+        """The segment is in the store, durably, and has its receipt: it may go when room is needed.
+
+        Raises:
+            SpoolUnusable: it waits for upload as before.
+
+        """
+        self._name(number, Kept.UPLOADED)
 
     def set_aside(self, number: int) -> Path:
         """The segment cannot be read: it waits no longer, so that those after it are uploaded; its file."""
-        for suffix in SUFFIXES:
-            name = self._path(number).name + suffix
-            if (self.folder / name).exists():
-                (self.folder / name).rename(self.folder / (self._path(number, Kept.DAMAGED).name + suffix))
-        _sync(self.folder)
+        self._name(number, Kept.DAMAGED)
         return self._path(number, Kept.DAMAGED)
 
     def damaged(self) -> list[Path]:
@@ -218,6 +221,23 @@ class Spool:
 
     def _path(self, number: int, kept: Kept = Kept.WAITING) -> Path:
         return self.folder / f"{number:08}{kept.value}.db"
+
+    def _name(self, number: int, kept: Kept) -> None:
+        """Call a segment that has waited by another name, with its log, which a reader may keep open."""
+        with _writing(self.folder):
+            for suffix in SUFFIXES:
+                file = self._path(number).with_name(self._path(number).name + suffix)
+                if file.exists():
+                    file.rename(file.with_name(self._path(number, kept).name + suffix))
+            _sync(self.folder)
+
+    def _look_at_names(self) -> None:
+        """What was cut off when a segment got another name goes on."""
+        for number, kept in self._own():
+            file = self._path(number)
+            left = file.with_name(f"{file.name}-wal").exists() and not file.exists()
+            if left and kept is not Kept.WAITING:
+                self._name(number, kept)
 
     def _segments(self) -> list[tuple[int, Kept]]:
         names = (_NAME.fullmatch(path.name) for path in self.folder.iterdir())
@@ -317,15 +337,26 @@ class Spool:
     def _begin(self, number: int) -> Segment:
         segment = Segment(self._path(number), number)
         try:
-            if not segment.rows:
-                segment.name(self.writer)
-            segment.append((), (), self._heads)
-        except sqlite3.Error as error:
+            with _writing(self.folder):
+                if not segment.rows:
+                    segment.name(self.writer)
+                segment.append((), (), self._heads)
+                _sync(self.folder)
+        except BaseException:
             segment.close()
-            raise SpoolUnusable(f"the spool {self.folder} cannot be written: {error}") from error
-        _sync(self.folder)
+            raise
         self._began_ns = None
         return segment
+
+
+@contextlib.contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Turn what the disk refuses within the block into `SpoolUnusable`."""
+    try:
+        yield
+    except (sqlite3.Error, OSError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SpoolUnusable(f"the spool {folder} cannot be written: {reason}") from error
 
 
 def _take(folder: Path) -> IO[bytes]:

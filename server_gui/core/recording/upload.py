@@ -96,6 +96,7 @@ def ahead(spool: Spool, store: Store) -> list[str]:
     found = []
     for location in (*TELEMETRY.locations(store.about.shards), SESSIONS.name):
         with contextlib.suppress(NoSuchTable):
+            store.mend(location)
             table = store.table(location)
             newest = max(table.transaction_version(each) or 0 for each in spool.earlier_writers())
             if newest >= spool.first:

@@ -157,12 +157,18 @@ class Uploader:
     def _reach(self) -> Store:
         store = self._connect()
         if not self._compared:
-            self._compared = True
-            found = tuple(ahead(self._spool, store))
-            for text in found:
-                log.error("%s", text)
-            self.state = replace(self.state, ahead=found)
+            try:
+                self._compare(store)
+            except StoreError as error:  # what it keeps from being uploaded tells that itself
+                log.warning("the store is not compared with the spool yet: %s", error)
         return store
+
+    def _compare(self, store: Store) -> None:
+        found = tuple(ahead(self._spool, store))
+        for text in found:
+            log.error("%s", text)
+        self.state = replace(self.state, ahead=found)
+        self._compared = True
 
     def _tell(self, waiting: list[int]) -> None:
         backlog = self._spool.backlog_bytes()

@@ -91,3 +91,14 @@ def test_a_batch_that_never_arrived_is_named(store_url: str, tmp_path: Path) -> 
         f"{recorded.store.url}/{table}" for table in ("sessions", "telemetry/000")
     ]
     assert all(f"batch {number} of the spool {recorded.spool}" in text for text in missing)
+
+
+def test_a_second_copy_that_cannot_be_opened_is_named_and_the_others_are_looked_into(
+    folder_url: str, tmp_path: Path
+) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    copy = recorded.spool / "00000001.uploaded.db"
+    copy.unlink()
+    copy.mkdir()
+    [problem] = verify.batches_missing(recorded.store, recorded.spool)
+    assert "00000001.uploaded.db cannot be used" in problem

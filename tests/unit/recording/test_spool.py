@@ -1,14 +1,18 @@
 """The spool: what was kept stays, in order, under numbers that are given once."""
 
+import os
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ml.store import durable
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run
-from server_gui.core.recording.segment import Segment
+from server_gui.core.recording.segment import SCHEMA, Segment
 from server_gui.core.recording.spool import Spool
 
 LAYOUT = Layout(("left_knee.position", "trunk.tilt_forward"), ("rad", None))
@@ -154,3 +158,123 @@ def test_every_commit_is_synchronised(tmp_path: Path) -> None:
         database: sqlite3.Connection = spool._current._database
         assert database.execute("PRAGMA synchronous").fetchone() == (2,)
         assert database.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+
+
+def _refused(*_: Any, **__: Any) -> None:
+    raise OSError(5, "Input/output error")
+
+
+@pytest.mark.parametrize("broken", [(os, "fsync"), (Path, "touch")])
+def test_a_segment_that_the_disk_refuses_is_begun_later_and_the_one_before_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: tuple[object, str]
+) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([run()], [])
+        with monkeypatch.context() as failing:
+            failing.setattr(*broken, _refused)
+            with pytest.raises(SpoolUnusable, match="Input/output error"):
+                spool.freeze()
+        spool.append([run(seq=5)], [])
+        spool.freeze()
+        assert spool.waiting() == [1]
+        assert sum(map(len, runs(spool.read(1)))) == 6
+        spool.append([run(seq=6)], [])
+        spool.freeze()
+        assert spool.waiting() == [1, 2]
+
+
+@pytest.mark.parametrize("work", [lambda spool: spool.uploaded(1), lambda spool: spool.set_aside(1)])
+@pytest.mark.parametrize("broken", [(os, "fsync"), (Path, "rename")])
+def test_a_name_that_the_disk_refuses_is_an_error_of_the_spool(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    work: Callable[[Spool], object],
+    broken: tuple[object, str],
+) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([run()], [])
+        spool.freeze()
+        monkeypatch.setattr(*broken, _refused)
+        with pytest.raises(SpoolUnusable, match="Input/output error"):
+            work(spool)
+        monkeypatch.undo()
+
+
+def test_a_spool_that_cannot_be_begun_says_so_and_lets_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as failing:
+        failing.setattr(os, "fsync", _refused)
+        with pytest.raises(SpoolUnusable, match="Input/output error"):
+            Spool(tmp_path)
+    Spool(tmp_path).close()
+
+
+def test_an_uploaded_batch_takes_its_log_along(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([run()], [])
+        reader = sqlite3.connect(tmp_path / "00000001.db")  # as an export that has it open when it is frozen
+        reader.execute("SELECT count(*) FROM run").fetchone()
+        spool.freeze()
+        spool.uploaded(1)
+        reader.close()
+    assert not list(tmp_path.glob("00000001.db*"))
+    assert len(runs(Segment(tmp_path / "00000001.uploaded.db", 1))) == 1
+
+
+def test_a_batch_that_was_killed_between_its_names_is_whole(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([run()], [])
+        reader = sqlite3.connect(tmp_path / "00000001.db")
+        reader.execute("SELECT count(*) FROM run").fetchone()
+        spool.freeze()
+    database, wal = ((tmp_path / f"00000001.db{suffix}").read_bytes() for suffix in ("", "-wal"))
+    reader.close()
+    (tmp_path / "00000001.db").unlink()
+    (tmp_path / "00000001.uploaded.db").write_bytes(database)
+    (tmp_path / "00000001.db-wal").write_bytes(wal)
+    Spool(tmp_path).close()
+    assert not list(tmp_path.glob("00000001.db*"))
+    assert len(runs(Segment(tmp_path / "00000001.uploaded.db", 1))) == 1
+
+
+def test_a_segment_that_cannot_be_opened_is_let_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[sqlite3.Connection] = []
+    connect = sqlite3.connect
+
+    class Failing(sqlite3.Connection):
+        def executescript(self, sql: str) -> sqlite3.Cursor:
+            assert sql == SCHEMA
+            raise sqlite3.OperationalError("disk I/O error")
+
+    def failing(path: Path, **options: Any) -> sqlite3.Connection:
+        opened.append(connect(path, factory=Failing, **options))
+        return opened[-1]
+
+    monkeypatch.setattr(sqlite3, "connect", failing)
+    with pytest.raises(SpoolUnusable, match="disk I/O error"):
+        Segment(tmp_path / "00000001.db", 1)
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        opened[0].execute("SELECT 1")
+
+
+def test_the_names_of_the_folders_above_a_spool_last_whoever_made_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: set[Path] = set()
+    monkeypatch.setattr(durable, "_sync", synced.add)
+    folder = tmp_path / "data" / "gwrms" / "spool"
+    folder.mkdir(parents=True)  # by a server that was killed then
+    Spool(folder).close()
+    assert synced >= {folder, folder.parent, folder.parent.parent, tmp_path}
+
+
+def test_a_folder_above_that_is_anothers_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def theirs(path: Path) -> None:
+        if path == tmp_path:
+            raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(durable, "_sync", theirs)
+    Spool(tmp_path / "spool").close()

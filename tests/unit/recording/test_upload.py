@@ -1,6 +1,7 @@
 """From the spool to the store: every row once, as it was; problems are told, and end."""
 
 import contextlib
+import os
 import sqlite3
 import threading
 import time
@@ -12,7 +13,7 @@ import msgspec
 import pytest
 
 from gateway.messages import ResourceSnapshot
-from ml.store import Store, StoreUnreachable
+from ml.store import Store, StoreUnreachable, durable
 from ml.store.labels import Label
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.columns import Columns
@@ -323,3 +324,38 @@ def test_what_a_library_raises_is_no_end_and_quotes_nothing(spool: Spool, folder
         until(lambda: uploader.state.problem == "internal error, RuntimeError")
         uploader.now()
         until(lambda: uploader.state.uploaded == 1)
+
+
+def test_the_first_upload_after_a_power_cut_mends_the_log_and_compares(spool: Spool, folder_url: str) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 7, batch(1), clock_offset_ns=0)
+    store = Store(folder_url)
+    upload_all(spool, store)
+    assert store.folder is not None
+    entry = max((store.folder / HERE / durable.LOG).glob("*.json"))
+    torn = entry.read_bytes()[:50]
+    entry.unlink()
+    entry.write_bytes(torn)
+    os.utime(entry, (0, 0))
+    uploader = Uploader(spool, lambda: Store(folder_url))
+    assert uploader._empty(asked=True)
+    assert uploader.state.problem is None
+    assert uploader._compared
+    assert store.dataset(HERE).count_rows() == len(batch(1).stamps_ns)
+
+
+def test_a_store_that_cannot_be_compared_is_uploaded_to_and_compared_later(
+    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 7, batch(1), clock_offset_ns=0)
+    uploader = Uploader(spool, lambda: Store(folder_url))
+
+    def away(*_: object) -> list[str]:
+        raise StoreUnreachable("no answer")
+
+    with monkeypatch.context() as failing:
+        failing.setattr("server_gui.core.recording.uploader.ahead", away)
+        assert uploader._empty(asked=True)
+    uploader._reach()
+    assert uploader._compared

@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -173,3 +173,63 @@ def test_everything_that_the_library_writes_is_whole(url: str, tmp_path: Path) -
     entries = sorted((tmp_path / "log").glob("*.json"))
     assert len(entries) == 8
     assert all(torn.whole(each.read_bytes()) for each in entries)
+
+
+def vacuumed(url: str) -> None:
+    """A vacuum's two entries, 5 and 6, as where nobody has made them last."""
+    upkeep.compact(Store(url), [EVENTS])
+    upkeep.vacuum(Store(url), [EVENTS], timedelta(0))
+    for version in (5, 6):
+        cut(entry(url, version), entry(url, version).read_bytes())
+
+
+@pytest.mark.parametrize("left", [None, b"", b'{"commitInfo', bytes(200)])
+@pytest.mark.parametrize("marked", [True, False])
+def test_of_two_entries_the_second_alone_may_be_left(url: str, left: bytes | None, marked: bool) -> None:
+    vacuumed(url)
+    for each in () if marked else log_of(url).glob("*.json"):  # a file system without attributes
+        cut(each, each.read_bytes())
+    if left is None:
+        entry(url, 5).unlink()
+    else:
+        cut(entry(url, 5), left)
+    assert append(url, 4)
+    assert texts(url) == [1, 2, 3, 4]
+
+
+def test_an_entry_that_somebody_has_removed_is_named(url: str) -> None:
+    entry(url, 2).unlink()
+    for attempt in (lambda: texts(url), lambda: append(url, 4)):
+        with pytest.raises(StoreError, match=r"0002\.json is missing, and was whole once: bring"):
+            attempt()
+
+
+def test_a_checkpoint_without_its_entry_is_set_aside(url: str) -> None:
+    Store(url).table(EVENTS.name).create_checkpoint()
+    for checkpoint in log_of(url).glob("*.parquet"):
+        cut(checkpoint, checkpoint.read_bytes())
+    entry(url, 3).unlink()
+    assert append(url, 3)
+    assert texts(url) == [1, 2, 3]
+    assert not list(log_of(url).glob("*.parquet"))
+
+
+def test_a_hint_at_a_checkpoint_that_is_not_there_is_set_aside(url: str) -> None:
+    Store(url).table(EVENTS.name).create_checkpoint()
+    for checkpoint in log_of(url).glob("*.parquet"):
+        checkpoint.unlink()
+    with pytest.raises(StoreError, match="_last_checkpoint is cut off"):
+        texts(url)
+    assert append(url, 4)
+    assert texts(url) == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("at", [4, 100, 500, -100])
+def test_a_checkpoint_of_which_a_part_was_not_written_is_set_aside(url: str, at: int) -> None:
+    Store(url).table(EVENTS.name).create_checkpoint()
+    [file] = log_of(url).glob("*.parquet")
+    data = bytearray(file.read_bytes())
+    data[at : at + 90] = bytes(90)
+    cut(file, bytes(data))
+    assert append(url, 4)
+    assert texts(url) == [1, 2, 3, 4]
