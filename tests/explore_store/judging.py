@@ -8,6 +8,7 @@ from typing import Any
 
 from ml.store import NoSuchTable, Store, StoreError, reading, sessions
 from ml.store.labels import holding, utc_ns
+from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, JOURNAL, LABELS, TELEMETRY, Table
 from server_gui.core.cloud import verify
 from server_gui.core.cloud.recordings import Recordings
@@ -58,7 +59,9 @@ def roll_back(world: World, server: Server) -> None:
 def judge(world: World) -> None:
     """Let everything come to rest, and look."""
     rest(world)
-    store = Store.existing(world.url) if any(True for _ in world.safe()) else world.store()
+    if not any(True for _ in world.safe()):
+        world.store()  # nobody needs to have made it
+    store = Snapshot.existing(world.url)  # nobody writes any more: each table is opened once
     problems = {name: verified(store, server) for name, server in world.servers.items()}
     for name, server in world.servers.items():
         check(server.damaged or not problems[name], "verify finds damage where there is none", problems[name])
@@ -76,6 +79,8 @@ def judge(world: World) -> None:
     _sessions(world, store)
     for server in world.servers.values():
         exports(world, server)
+    for look in world.looks:
+        look(world, store)
     for location, version, rows in world.pinned:
         found = rows_of_version(store, location, version)
         check(found == rows, "a pinned version has other rows", location, version, found, rows)
@@ -83,8 +88,9 @@ def judge(world: World) -> None:
         world.damage is not None
         and not world.retained
         and world.s3 is None
-        and damages.do(store, world.damage)
+        and damages.do(Store.existing(world.url), world.damage)
     ):
+        store = Snapshot.existing(world.url)
         seen = [problem for server in world.servers.values() for problem in verified(store, server)]
         check(bool(seen), "verify does not find a damage", damages.DAMAGES[world.damage].__name__)
 
@@ -229,15 +235,22 @@ def _records(world: World, store: Store) -> None:
         if isinstance(thing, Entry):
             key = (_identity(server), thing.robot, thing.n, thing.hash)
             check(entries[key] >= 1, "an entry of a journal was acknowledged and is not there", thing)
-    _labels(world, {(line["robot"], line["session"], line["label"]) for line in labels})
+    _labels(
+        world,
+        {
+            (line["robot"], line["session"], line["label"], utc_ns(line["utc"]), utc_ns(line["ended"]))
+            for line in labels
+        },
+    )
 
 
-def _labels(world: World, hold: set[tuple[str, str, str]]) -> None:
+def _labels(world: World, hold: set[tuple[str, str, str, int, int]]) -> None:
     """The last that was said of a label holds."""
-    said: dict[tuple[str, str, str], list[Said]] = defaultdict(list)
+    said: dict[tuple[str, str, str, int, int], list[Said]] = defaultdict(list)
     for thing in world.ledger.things:
         if isinstance(thing, Said):
-            said[thing.robot, thing.session, thing.label].append(thing)
+            key = (thing.robot, thing.session, thing.label, thing.began_ns, thing.ended_ns)
+            said[key].append(thing)
     check(hold <= said.keys(), "labels hold that nobody has given", hold - said.keys())
     for key, things in said.items():
         newest = things[-1]

@@ -1,8 +1,9 @@
 """The plain list of what was handed in, and of what is known to have become of it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 
 class Fate(Enum):
@@ -49,7 +50,8 @@ class Said(Thing):
     """That a label holds, or holds no more."""
 
     label: str = ""
-    utc_ns: int = 0
+    began_ns: int = 0
+    ended_ns: int = 0
     removed: bool = False
 
 
@@ -88,3 +90,24 @@ class Ledger:
 
     def rows(self) -> Iterator[Row]:
         return (thing for thing in self.things if isinstance(thing, Row))
+
+
+@dataclass(frozen=True, slots=True)
+class Promoted:
+    """A model that was let serve a robot ("": every one) in the place of another ("": of none)."""
+
+    robot: str
+    model: str
+    over: str
+
+
+@dataclass(slots=True)
+class Classes:
+    """What was learned, and what was said of it."""
+
+    trained: dict[int, tuple[str, str]] = field(default_factory=dict)  # by whom: model, and over which
+    published: set[str] = field(default_factory=set)
+    promoted: dict[str, Promoted] = field(default_factory=dict)  # by pointer
+    written: list[tuple[str, str, str]] = field(default_factory=list)  # pointers, by whom, models
+    meanwhile: Callable[[], None] | None = None  # what somebody else does just before the next pointer
+    split: Any = None  # of the newest training

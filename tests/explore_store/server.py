@@ -25,6 +25,8 @@ from tests.explore_store.times import Moment, Times
 
 CAPACITY = 12  # rows that may wait: few, so that a queue is soon full
 LONG = 10**9  # batches end when a step says so
+PEOPLE = {"P01": "1", "p01 ": "1", "P-01": "1", "P02": "2", "P03": "3"}  # who is called so
+EVER_NS = 4_000_000_000_000_000_000  # the year 2096
 IN_UNIT = {"rad": 0.0, "deg": 0.25, None: 0.5}  # what an angle's fraction says of the unit it was given in
 
 
@@ -171,11 +173,28 @@ class Server:
 
     def say(self, name: str, number: int, label: str, *, removed: bool) -> None:
         """That a label holds, or no more."""
+        began_ns = self.times.now_ns // 10**12 * 10**12  # the same one, for a long time
+        self._say(name, number, label, began_ns, began_ns, removed=removed)
+
+    def teach(self, name: str, first: int, wearer: str) -> None:
+        """A session in which a wearer walks, and then stands; with three numbers from this one on."""
+        until_ns = self.times.time_ns() + EVERY_NS // 2
+        self._say(name, first, "walk", 0, until_ns)
+        self._say(name, first + 1, "stand", until_ns, EVER_NS)
+        self._say(name, first + 2, f"wearer {wearer}", 0, EVER_NS)
+
+    def _say(
+        self, name: str, number: int, label: str, began_ns: int, ended_ns: int, *, removed: bool = False
+    ) -> None:
         session = self.keeping[name].session
-        utc_ns = self.times.now_ns // 10**12 * 10**12  # the same one, for a long time
-        said = Label(name, session, utc_ns, utc_ns, label, "ada")
+        said = Label(name, session, began_ns, ended_ns, label, "ada")
         self.recorder.add(records.label(said, removed=removed))
-        self._hand(Said(number, self.name, name, session, label=label, utc_ns=utc_ns, removed=removed))
+        self._hand(
+            Said(
+                number, self.name, name, session, label=label, began_ns=said.began_utc_ns,
+                ended_ns=said.ended_utc_ns, removed=removed,
+            )
+        )  # fmt: skip
 
     def amend(self, name: str, value: int) -> None:
         keeping = self.keeping[name]

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -16,7 +17,7 @@ from tests.explore_store import judging
 from tests.explore_store.damages import DAMAGES
 from tests.explore_store.disk import Ended
 from tests.explore_store.s3 import S3, Fault
-from tests.explore_store.server import flip
+from tests.explore_store.server import PEOPLE, flip
 from tests.explore_store.world import World
 
 SERVERS: Final = ("A", "B")
@@ -105,6 +106,37 @@ def _say(world: World, s: int, r: int, what: int) -> None:
     with world.alive(SERVERS[s]) as server:
         if server.keeping[ROBOTS[r]].session:
             server.say(ROBOTS[r], world.number(), LABELS[what % 2], removed=what >= 2)
+
+
+def _teach(world: World, s: int, one: int, other: int) -> None:
+    """Three new sessions with labels, each of one wearer, spelled somehow; brought to the store."""
+    for r, who in ((0, one), (1, other), (0, one + other + 1)):
+        _reboot(world, s, r, 0)
+        with world.alive(SERVERS[s]) as server:
+            server.turn()
+            server.rows(ROBOTS[r], 4, world.number(4))
+            server.turn()
+            server.teach(ROBOTS[r], world.number(3), tuple(PEOPLE)[who % len(PEOPLE)])
+            server.turn()
+            server.rows(ROBOTS[r], 4, world.number(4))
+            server.turn()
+    _send(world, s)
+
+
+def _train(world: World, who: int, *_: int) -> None:
+    from tests.explore_store import learning
+
+    learning.train(world, who)
+    _buried(world)
+
+
+def _promote(world: World, who: int, robot: int, race: int) -> None:
+    from tests.explore_store import learning
+
+    names = ("", *ROBOTS)
+    other = functools.partial(learning.promote, world, 1 - who, "")
+    learning.promote(world, who, names[robot], other if race else None)
+    _buried(world)
 
 
 def _mark(world: World, s: int, r: int, _: int) -> None:
@@ -208,10 +240,15 @@ def _kept_up(work: Callable[[Store], object]) -> Play:
     def play(world: World, *_: int) -> None:
         with contextlib.suppress(StoreError, OSError, Ended):
             work(Store.existing(world.url))
-        if world.disk.left is not None:  # it ended within
-            world.bury("A")
+        _buried(world)
 
     return play
+
+
+def _buried(world: World) -> None:
+    """Where it ended within."""
+    if world.disk.left is not None:
+        world.bury("A")
 
 
 def _retain(world: World, age: int, *_: int) -> None:
@@ -261,6 +298,9 @@ KINDS: Final = {
     "rename": Kind(_rename, (2, 2, 3), 1),
     "clock": Kind(_clock, (2, 6), 2),
     "label": Kind(_say, (2, 2, 4), 3),
+    "teach": Kind(_teach, (2, len(PEOPLE), len(PEOPLE)), 2),
+    "train": Kind(_train, (2,), 1),
+    "promote": Kind(_promote, (2, 3, 2), 1),
     "mark": Kind(_mark, (2, 2), 2),
     "amend": Kind(_amend, (2, 2), 2),
     "journal": Kind(_journal, (2, 2, 5), 2),
@@ -317,14 +357,26 @@ class Script:
         return cls(Place(first[1]), tuple(Step(word, tuple(map(int, numbers))) for word, *numbers in words))
 
 
+def _learning() -> Callable[[World], object]:
+    """Only where it is needed: scikit-learn takes seconds."""
+    from tests.explore_store import learning
+
+    return learning.prepare
+
+
+def _nothing(_: World) -> None:
+    pass
+
+
 BETWEEN_NS: Final = 1_234_567  # two steps
 
 
 def play(script: Script, folder: Path, s3: S3) -> World:
     """Play these steps, come to rest, and judge; raises `judging.Wrong`."""
-    with World(
-        folder, 2 if script.place is Place.SHARDS else 1, s3 if script.place is Place.S3 else None
-    ) as world:
+    shards = 2 if script.place is Place.SHARDS else 1
+    prepare = _learning() if any(step.word == "train" for step in script.steps) else _nothing
+    with World(folder, shards, s3 if script.place is Place.S3 else None) as world:
+        prepare(world)
         for step in script.steps:
             world.times.now_ns += BETWEEN_NS
             step.play(world)

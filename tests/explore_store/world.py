@@ -18,7 +18,7 @@ from ml.store.store import About
 from server_gui.core.recording import recorder
 from server_gui.core.recording.errors import SpoolUnusable
 from tests.explore_store.disk import Disk, Ended, changes, watching
-from tests.explore_store.ledger import Fate, Ledger
+from tests.explore_store.ledger import Classes, Fate, Ledger
 from tests.explore_store.robots import Robot
 from tests.explore_store.s3 import BUCKET, S3
 from tests.explore_store.server import Server
@@ -34,6 +34,8 @@ class World:
         self.times = Times()
         self.disk = Disk(folder)
         self.ledger = Ledger()
+        self.classes = Classes()
+        self.looks: list[Callable[[World, Store], None]] = []  # at the end, besides the usual ones
         self.shards = shards
         self.s3 = s3
         self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
@@ -53,7 +55,7 @@ class World:
         return Server(name, self.disk, self.times, self.ledger, robots, self.store)
 
     def __enter__(self) -> Self:
-        put = self._put
+        put = self.put
         names = Names(random.Random(0))
         for module in ours():
             for ours_, theirs in ((self.times, time), (names, uuid)):
@@ -77,7 +79,7 @@ class World:
         for name, value in s3.environment.items():
             os.environ[name] = value
         for module in (objects, store):
-            self._put(module, "RETRIES", 2)
+            self.put(module, "RETRIES", 2)
 
     def _on_write(self) -> None:
         """Between two requests a program may end, too; then the service hears no more of it."""
@@ -87,7 +89,8 @@ class World:
         except Ended:
             self.s3.dead = True
 
-    def _put(self, module: Any, name: str, value: Any) -> None:
+    def put(self, module: Any, name: str, value: Any) -> None:
+        """Let this stand there until the end."""
         before = getattr(module, name)
         setattr(module, name, value)
         self._stack.callback(setattr, module, name, before)
