@@ -18,20 +18,23 @@ from gateway.acceptor import Acceptor
 from gateway.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
 from gateway.loop import HANGUP, READ, Loop
 from gateway.registry import StopNow
+from gateway.sharing import TimeSharing
 from gateway.stop_lines import StopSplitter
 
 log = logging.getLogger(__name__)
 
-RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it
+RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it …
+UNKNOWN_BYTES = 2 * 1024  # … and of whoever has just come, or has cost something just now
+TURN_NS = 500_000  # what these may take together before the others are read
 ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
 PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read
 COSTLY_NS = 300_000  # what a client's reads may take of the thread at once; beyond, it is left alone …
 PACE_FACTOR = 4  # … for so many times as long as they took, and for each client that is left alone just now.
 LONGEST_REST_S = 1.0  # So they all together leave the thread most of its time
-FLOOD = 8  # stops in one read: whoever sends more floods the drives with them …
-FLOOD_NS = 12_500_000  # … and that read counts as one that took so long
+FLOOD = 8  # stops at once, of a client; who sends more floods the drives with them …
+FLOOD_S = 0.05  # … and is read again so much later: as many more are given to it in twice that time
 LAST_READS = 16  # of a connection that ends: a stop may still be in it …
-LAST_NS = 4_000_000  # … which is looked for so long
+LAST_NS = 1_000_000  # … which is looked for so long
 
 _TOO_MANY = wire.refuse(
     wire.Kind.UNAVAILABLE,
@@ -63,11 +66,12 @@ class Heard:
         self.cpu_ns = 0
 
 
-class Pace:
-    """How many clients are left alone just now, of all."""
+class Pace(TimeSharing):
+    """What the clients of an intake share of its thread; those that are not known yet take turns."""
 
-    def __init__(self) -> None:
-        self.resting = 0
+    def __init__(self, front: Loop) -> None:
+        super().__init__(front, TURN_NS)
+        self.resting = 0  # clients that are left alone just now
 
     def rest_s(self, spent_ns: int) -> float:
         """How long who has cost so much is left alone."""
@@ -107,6 +111,7 @@ class Inlet:
         self._handed = self._handed_bytes = self._done = self._done_bytes = 0
         self._cpu_ns = 0
         self._owed_ns = self._owed_at_ns = 0  # of the thread's time
+        self._stops, self._stops_at_s = 0.0, 0.0  # stops that are not forgotten yet
         _prepare(connection)
         front.watch(connection, READ, self._on_ready)
 
@@ -164,16 +169,37 @@ class Inlet:
         return data
 
     def _on_ready(self, events: int) -> None:
-        if not self._ended:
-            self._receive()
-        elif events & HANGUP:
-            self._end("it has gone", Heard())
+        if self._ended:
+            if events & HANGUP:
+                self._end("it has gone", Heard())
+        elif self._is_known:
+            self._receive(RECEIVE_BYTES)
+        else:
+            self._front.watch(self.socket, HANGUP, self._on_ready)
+            self._pace.add(self.address, self._take_turn)
 
-    def _receive(self) -> bool:
+    @property
+    def address(self) -> str:
+        """Whence it comes, without the port."""
+        return self.peer.rpartition(":")[0]
+
+    @property
+    def _is_known(self) -> bool:
+        """Whether it has said something, and costs little."""
+        self._owe(0)
+        return self._began and not self._owed_ns
+
+    def _take_turn(self) -> None:
+        """Of those that are not known: so all of them together keep no other client waiting."""
+        if not (self._ended or self._closed):
+            self._front.watch(self.socket, READ, self._on_ready)
+            self._receive(UNKNOWN_BYTES)
+
+    def _receive(self, most: int) -> bool:
         """Read once; false where there was nothing."""
         self._spent()  # what was worked for others
         try:
-            data = self.socket.recv(RECEIVE_BYTES)
+            data = self.socket.recv(most)
         except BlockingIOError:
             return False
         except OSError as error:
@@ -192,12 +218,14 @@ class Inlet:
         heard = self._sorted(lines)
         spent_ns = self._spent()
         self._cpu_ns += spent_ns
-        self._owe(max(spent_ns, FLOOD_NS * (len(heard.stops) > FLOOD)))
+        self._owe(spent_ns)
         if self._is_full or self._splitter.dropping or self._owed_ns > COSTLY_NS:
-            self._rest()
+            self._rest(self._pace.rest_s(self._owed_ns))
+        elif self._floods(sum(isinstance(line, wire.StopRequest) for line in lines)):
+            self._rest(FLOOD_S)
         if self._bad >= BAD_LINES:  # from now on only stops are heard, until the loop has closed it
             heard.ended = True
-            self._rest()
+            self._rest(self._pace.rest_s(self._owed_ns))
         if lines or heard.ended:
             self._hand_over(heard)
         return True
@@ -208,10 +236,19 @@ class Inlet:
         forgotten_ns = (now_ns - self._owed_at_ns) // PACE_FACTOR
         self._owed_ns, self._owed_at_ns = max(0, self._owed_ns - forgotten_ns) + spent_ns, now_ns
 
-    def _rest(self) -> None:
+    def _floods(self, stops: int) -> bool:
+        """Whether these are too many, with those just before. All of them act; they are read later."""
+        now_s = time.monotonic()
+        forgotten = (now_s - self._stops_at_s) * FLOOD / (2 * FLOOD_S)
+        self._stops, self._stops_at_s = max(0.0, self._stops - forgotten) + stops, now_s
+        floods = stops > 0 and self._stops > FLOOD
+        self._stops = min(self._stops, FLOOD)
+        return floods
+
+    def _rest(self, seconds: float) -> None:
         """Leave it alone for a while."""
         self._front.watch(self.socket, HANGUP, self._on_ready)
-        self._front.call_later(self._pace.rest_s(self._owed_ns), self._go_on)
+        self._front.call_later(seconds, self._go_on)
         self._pace.resting += not self._rests
         self._rests = True
 
@@ -305,7 +342,7 @@ class Intake:
         self._stop_now = stop_now
         self._inlets: set[Inlet] = set()
         self._spent_ns = 0
-        self._pace = Pace()
+        self._pace = Pace(self._front)
         self._acceptor = Acceptor(self._front, listener, self._accepted)
         self._thread = threading.Thread(target=self._run, name="intake")
 

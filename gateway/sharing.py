@@ -35,20 +35,16 @@ class Holder(Protocol):
     def close(self) -> None: ...
 
 
-class Sharing:
-    """One gateway's. It belongs to the loop's thread."""
+class TimeSharing:
+    """One loop's time: `turn_ns` of each of its turns. It belongs to the loop's thread."""
 
-    def __init__(self, loop: Loop) -> None:
+    def __init__(self, loop: Loop, turn_ns: int) -> None:
         self._loop = loop
+        self._turn_ns = turn_ns
         self._waiting: dict[str, deque[Run]] = {}  # by address
         self._posted = False
         self._turn = -1
         self._until_ns = 0
-        self._bytes = 0
-        self._holders: dict[Holder, None] = {}
-        self._complaints: dict[tuple[str, str], float] = {}  # when they were made
-
-    # Time
 
     def take(self, address: str, run: Run) -> None:
         """Run it now, where nobody waits and this turn of the loop has time; else in turn."""
@@ -85,8 +81,18 @@ class Sharing:
     def _has_time(self) -> bool:
         now_ns = time.monotonic_ns()
         if self._turn != self._loop.turns:
-            self._turn, self._until_ns = self._loop.turns, now_ns + TURN_NS
+            self._turn, self._until_ns = self._loop.turns, now_ns + self._turn_ns
         return now_ns < self._until_ns
+
+
+class Sharing(TimeSharing):
+    """One gateway's. It belongs to the loop's thread."""
+
+    def __init__(self, loop: Loop) -> None:
+        super().__init__(loop, TURN_NS)
+        self._bytes = 0
+        self._holders: dict[Holder, None] = {}
+        self._complaints: dict[tuple[str, str], float] = {}  # when they were made
 
     # The log
 

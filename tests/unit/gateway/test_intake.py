@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from gateway import intake, wire
+from gateway import intake, stop_lines, wire
 from gateway.daemon import Daemon
 from gateway.intake import Heard, Inlet, Pace
 from gateway.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
@@ -21,6 +21,7 @@ from gateway.messages import Stopped
 from gateway.registry import Context, Spec
 from gateway.session import Session
 from gateway.sharing import Sharing
+from gateway.stop_lines import stop_in
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config, until
 
@@ -324,14 +325,14 @@ class Turned:
             lambda: stop_now,
             lambda: self.spent.pop() if self.spent else 0,
             lambda _inlet: None,
-            Pace(),
+            Pace(self.front),
         )
         self.inlet.receiver = self.heard.append
 
     def says(self, data: bytes) -> None:
-        """One read."""
+        """One read of a client that is known."""
         self.client.sendall(data)
-        self.inlet._on_ready(READ)
+        self.inlet._receive(intake.RECEIVE_BYTES)
 
     def turn_loop(self) -> float | None:
         """As long as there is something to do; how long it would sleep then."""
@@ -385,6 +386,24 @@ def test_who_floods_with_stops_is_left_alone_and_who_stops_is_not(turned: Turned
     turned.says(STOP % b"many" * (intake.FLOOD + 1))
     assert turned.inlet._rests
     assert turned.asked == ["a few", "many"]
+
+
+def test_single_stops_by_the_dozen_are_a_flood_too_and_its_rest_is_short(turned: Turned) -> None:
+    """However many others are left alone just now: somebody may have reset in between."""
+    turned.inlet._pace.resting = 100
+    rests: list[float] = []
+    turned.front.call_later = lambda delay_s, callback: rests.append(delay_s)  # type: ignore[method-assign, assignment, return-value]
+    while not rests:
+        turned.says(STOP % b"one")
+        assert len(turned.asked) < 10 * intake.FLOOD
+    assert len(turned.asked) > intake.FLOOD
+    assert rests == [intake.FLOOD_S]
+
+
+def test_an_id_without_end_is_not_kept() -> None:
+    stop = stop_in(b'{"jsonrpc":"2.0","method":"robot.stop","id":"%s"}' % (b"x" * 60_000))
+    assert stop is not None
+    assert stop.id is None
 
 
 def test_small_costs_add_up(turned: Turned, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -477,7 +496,30 @@ def test_who_has_cost_nothing_does_not_rest_for_others(turned: Turned) -> None:
     assert not turned.inlet._rests
 
 
-def test_no_rest_is_long() -> None:
-    pace = Pace()
-    pace.resting = 100
-    assert pace.rest_s(50_000_000) == intake.LONGEST_REST_S
+def test_no_rest_is_long(turned: Turned) -> None:
+    turned.inlet._pace.resting = 100
+    assert turned.inlet._pace.rest_s(50_000_000) == intake.LONGEST_REST_S
+
+
+def test_who_has_just_come_is_read_in_turn_and_only_a_little(turned: Turned) -> None:
+    turned.client.sendall(CLOCK % 1 * 200)
+    turned.inlet._on_ready(READ)
+    assert turned.inlet.received_bytes == 0  # whoever is known comes first
+    turned.front.call_later(0, lambda: None)
+    turned.front._turn()
+    assert turned.inlet.received_bytes == intake.UNKNOWN_BYTES
+
+
+def test_who_costs_something_takes_turns_again(turned: Turned) -> None:
+    turned.says(CLOCK % 1)
+    assert turned.inlet._is_known
+    turned.spent = [intake.COSTLY_NS // 2, 0]
+    turned.says(CLOCK % 1)
+    assert not turned.inlet._is_known
+
+
+def test_lines_that_could_hold_no_stop_are_not_looked_into() -> None:
+    """Each costs a failed reading: they were 19 ms of the thread in one read."""
+    assert all(stop_in(b"{\\" + b"x" * more) is None for more in range(20))
+    assert stop_in(b"method:robot.stop") is not None
+    assert len(b"method:robot.stop") == stop_lines._SHORTEST
