@@ -77,12 +77,12 @@ _DEFECTS: Final[dict[str, Defect]] = {
     ),
     "sessions-once": Defect(
         "after a loss the sessions that go on are not written again",
-        "rows turn turn full full full reboot",
+        "rows turn turn full full reboot kill",
         "not listed|not told of|a session says",
     ),
     "emptied-pin": Defect(
         "a version whose files vacuum has removed can be pinned",
-        "send send pin pin vacuum vacuum vacuum compact compact",
+        "rows send send pin pin pin vacuum vacuum compact compact",
         "pinned",
     ),
     "not-synchronised": Defect(
@@ -111,7 +111,7 @@ _DEFECTS: Final[dict[str, Defect]] = {
     ),
     "promotion-race": Defect(
         "a promotion race lets a model serve over another than it was judged against",
-        "teach teach train train promote promote promote",
+        "teach teach train train train promote promote promote",
         "serves over another",
     ),
     "pointers-by-size": Defect(

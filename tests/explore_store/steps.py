@@ -133,7 +133,7 @@ def _train(world: World, who: int, *_: int) -> None:
 def _promote(world: World, who: int, robot: int, race: int) -> None:
     from tests.explore_store import learning
 
-    names = ("", *ROBOTS)
+    names = ("", ROBOTS[0])
     other = functools.partial(learning.promote, world, 1 - who, "")
     learning.promote(world, who, names[robot], other if race else None)
     _buried(world)
@@ -300,7 +300,7 @@ KINDS: Final = {
     "label": Kind(_say, (2, 2, 4), 3),
     "teach": Kind(_teach, (2, len(PEOPLE), len(PEOPLE)), 2),
     "train": Kind(_train, (2,), 1),
-    "promote": Kind(_promote, (2, 3, 2), 1),
+    "promote": Kind(_promote, (2, 2, 2), 1),
     "mark": Kind(_mark, (2, 2), 2),
     "amend": Kind(_amend, (2, 2), 2),
     "journal": Kind(_journal, (2, 2, 5), 2),
