@@ -110,13 +110,13 @@ def _say(world: World, s: int, r: int, what: int) -> None:
 
 def _teach(world: World, s: int, one: int, other: int) -> None:
     """Three new sessions with labels, each of one wearer, spelled somehow; brought to the store."""
-    for r, who in ((0, one), (1, other), (0, one + other + 1)):
+    for r, who in ((0, one), (1, other), (0, len(PEOPLE) - 1)):
         _reboot(world, s, r, 0)
         with world.alive(SERVERS[s]) as server:
             server.turn()
             server.rows(ROBOTS[r], 4, world.number(4))
             server.turn()
-            server.teach(ROBOTS[r], world.number(3), tuple(PEOPLE)[who % len(PEOPLE)])
+            server.teach(ROBOTS[r], world.number(3), tuple(PEOPLE)[who])
             server.turn()
             server.rows(ROBOTS[r], 4, world.number(4))
             server.turn()
