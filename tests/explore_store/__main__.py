@@ -22,6 +22,10 @@ def main() -> int:
         from tests.explore_store.defects import judge
 
         return judge(options.defects, options.seconds, _say)
+    if options.test is not None:
+        import pytest
+
+        return int(pytest.main([f"tests/unit/{options.test}", "-q", "-x", "-p", "no:cacheprovider"]))
     if options.replay is not None:
         return _replay(options.replay)
     if options.workers > 1:
@@ -38,6 +42,7 @@ def _options() -> argparse.Namespace:
     add("--words", nargs="+", default=[], metavar="WORD", help="only these steps")
     add("--saying", default="", metavar="PATTERN", help="only violations that say this count")
     add("--replay", metavar="STEPS", help="play these again, as a violation printed them")
+    add("--test", metavar="TEST", help="run this test below tests/unit, with a defect put back")
     add("--with-defect", metavar="DEFECT", help="put this defect back before")
     add("--defects", nargs="*", metavar="DEFECT", help="look for each of these, or of all, put back")
     return parser.parse_args()

@@ -260,11 +260,17 @@ def _labels(world: World, hold: set[tuple[str, str, str, int, int]]) -> None:
 
 def _sessions(world: World, store: Store) -> None:
     """Each session with rows is listed, and says what was said of it last."""
-    listed = {(each.robot, each.session): each for each in sessions.sessions(store)}
+    listed, losses = (
+        {(each.robot, each.session): each for each in sessions.sessions(store)},
+        world.ledger.losses,
+    )
     for row in world.ledger.rows():
         server = world.servers[row.server]
         if row.fate is Fate.SAFE and not server.damaged:
             check((row.robot, row.session) in listed, "a session with rows is not listed", row)
+            notes = listed[row.robot, row.session].notes
+            told = server.rolled_back or any(loss.server == row.server and not loss.told for loss in losses)
+            check(told or notes != sessions.UNTOLD, "a session with rows is not told of", row)
     newest = {
         (thing.robot, thing.session): thing
         for thing in world.ledger.things if isinstance(thing, Amended)

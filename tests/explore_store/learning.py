@@ -7,7 +7,7 @@ import bisect
 import dataclasses
 import functools
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
@@ -39,6 +39,7 @@ TASK: Final = "activity"
 NOTHING: Final = Path("/nonexistent")  # no models come with it
 OLDEST_NS: Final = 100_000_000  # a value that is older is missing (docs/prediction.md)
 FOLDER: Final = "models/serving"
+HELD_OUT: Final = ((), ("P03",))  # two people seldom have the same model
 Split = tuple[list[Part], list[Part], list[Part]]
 Row = tuple[int, int, float]  # stamp and UTC in ns, angle
 
@@ -54,25 +55,29 @@ _SMALL: Final = dataclasses.replace(task.ACTIVITY, delay_ms=0, look_back=1)
 
 def prepare(world: World) -> None:
     """Let the knee's angle be enough for a model, and a decision every row."""
-    groups_ = {"knees": (ANGLE,)}
     for module in ours():
         for name in [name for name, value in vars(module).items() if value is _TASKS]:
             world.put(module, name, {TASK: _SMALL})
-    for module, name, value in (
-        (groups, "GROUPS", groups_), (task, "GROUPS", groups_), (groups, "UNITS", {"angle": "rad"}),
-        (task, "BLOCKS", {TASK: {"knees": _newest}}), (task, "RATE_HZ", 100), (dataset, "EVERY_MS", {TASK: 10}),
-        (learn, "LEAST_ROWS", 1), (training, "LEAST_ROWS", 1), (learn, "EPOCHS", 1), (learn, "HIDDEN", (2,)),
-        (training, "split", functools.partial(_split, world)),
-        (Pointers, "_create", functools.partialmethod(_create, world)),
-    ):  # fmt: skip
-        world.put(module, name, value)
+    for of, name, value in _changes(world, {"knees": (ANGLE,)}):
+        world.put(of, name, value)
     world.looks.append(look)
 
 
-def _split(world: World, parts: Sequence[Part], held: Any) -> Split:
+def _changes(world: World, known: dict[str, tuple[str, ...]]) -> Iterator[tuple[Any, str, Any]]:
+    """What stands for what."""
+    yield from ((groups, "GROUPS", known), (groups, "UNITS", {"angle": "rad"}))
+    yield from ((task, "GROUPS", known), (task, "BLOCKS", {TASK: {"knees": _newest}}), (task, "RATE_HZ", 100))
+    yield from ((learn, "LEAST_ROWS", 1), (learn, "EPOCHS", 1), (learn, "HIDDEN", (2,)))
+    yield dataset, "EVERY_MS", {TASK: 10}
+    yield from ((training, "LEAST_ROWS", 1), (training, "split", functools.partial(_split, world)))
+    yield Pointers, "_create", functools.partialmethod(_create, world)
+
+
+def _split(world: World, parts: Sequence[Part], held: Set[str]) -> Split:
     """What is learned from and judged by is looked at in passing."""
-    world.classes.split = choosing.split(parts, held)
-    return world.classes.split
+    found = choosing.split(parts, held)
+    world.classes.split = found
+    return found
 
 
 _really_create: Final = Pointers._create
@@ -97,7 +102,7 @@ def train(world: World, who: int) -> None:
     before = serving(world)
     registry, split = Registry(world.url, NOTHING), None
     try:
-        trained = training.train(registry, Wish(TASK))
+        trained = training.train(registry, Wish(TASK, held_out=HELD_OUT[who]))
         split = world.classes.split
         model = registry.publish(trained.learned.state(), trained.card)
     except UnusableModel as error:

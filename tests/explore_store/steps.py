@@ -110,13 +110,13 @@ def _say(world: World, s: int, r: int, what: int) -> None:
 
 def _teach(world: World, s: int, one: int, other: int) -> None:
     """Three new sessions with labels, each of one wearer, spelled somehow; brought to the store."""
-    for r, who in ((0, one), (1, other), (0, one + other + 1)):
+    for r, who in ((0, one), (1, other), (0, len(PEOPLE) - 1)):
         _reboot(world, s, r, 0)
         with world.alive(SERVERS[s]) as server:
             server.turn()
             server.rows(ROBOTS[r], 4, world.number(4))
             server.turn()
-            server.teach(ROBOTS[r], world.number(3), tuple(PEOPLE)[who % len(PEOPLE)])
+            server.teach(ROBOTS[r], world.number(3), tuple(PEOPLE)[who])
             server.turn()
             server.rows(ROBOTS[r], 4, world.number(4))
             server.turn()
@@ -133,7 +133,7 @@ def _train(world: World, who: int, *_: int) -> None:
 def _promote(world: World, who: int, robot: int, race: int) -> None:
     from tests.explore_store import learning
 
-    names = ("", *ROBOTS)
+    names = ("", ROBOTS[0])
     other = functools.partial(learning.promote, world, 1 - who, "")
     learning.promote(world, who, names[robot], other if race else None)
     _buried(world)
@@ -300,7 +300,7 @@ KINDS: Final = {
     "label": Kind(_say, (2, 2, 4), 3),
     "teach": Kind(_teach, (2, len(PEOPLE), len(PEOPLE)), 2),
     "train": Kind(_train, (2,), 1),
-    "promote": Kind(_promote, (2, 3, 2), 1),
+    "promote": Kind(_promote, (2, 2, 2), 1),
     "mark": Kind(_mark, (2, 2), 2),
     "amend": Kind(_amend, (2, 2), 2),
     "journal": Kind(_journal, (2, 2, 5), 2),
@@ -319,7 +319,7 @@ KINDS: Final = {
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
     "vacuum": Kind(_kept_up(lambda store: upkeep.vacuum(store, grace=timedelta(0))), (), 1),
     "retain": Kind(_retain, (6,), 1),
-    "pin": Kind(_pin, (3,), 2),
+    "pin": Kind(_pin, (6,), 2),
     "query": Kind(_query, (), 1),
     "export": Kind(_export, (2,), 1),
 }
