@@ -118,9 +118,10 @@ def check_whole(kept: Kept) -> None:
         assert len(named) == len(set(named))
         assert {seq for seq, _ in named} == set(range(named[-1][0] + 1))
         missing += (rows[-1]["stamp_ns"] - rows[0]["stamp_ns"]) // PERIOD_NS + 1 - len(rows)
-    told = [json.loads(event["data"])["rows"] for event in kept.events if event["kind"] == "dropped"]
-    assert missing == sum(told)  # by the robot, on a computer that is too busy
-    assert len(told) == len(kept.events)
+    dropped = sum(json.loads(event["data"])["rows"] for event in kept.events if event["kind"] == "dropped")
+    kinds = {event["kind"] for event in kept.events}
+    assert kinds <= {"dropped", "shed"}, kept.events  # by the robot, on a computer that is too busy
+    assert missing >= dropped if "shed" in kinds else missing == dropped
 
 
 @pytest.fixture

@@ -155,7 +155,9 @@ class Gathering:
             )
         if batch.shed != shed:
             share = (
-                f"one row of {batch.shed}: it keeps to its max_cpu_percent" if batch.shed > 1 else "every row"
+                f"one row of {batch.shed}: more would be late, or beyond its max_cpu_percent"
+                if batch.shed > 1
+                else "every row"
             )
             happened(EventKind.SHED, f"the robot sends {share}", shed=batch.shed)
         for step in steps:

@@ -56,7 +56,7 @@ def test_each_table_builds_its_component(
         ('bus = "main"\nformat = "cia410"', "[imu.trunk] lacks the key 'node_id'"),
         ('bus = "main"\nformat = "witmotion-can"', "[imu.trunk] lacks the key 'can_id'"),
         ('format = "witmotion"', "[imu.trunk] lacks the key 'port'"),
-        ('format = []\nport = "x"', "[imu.trunk] format: "),
+        ('format = []\nport = "x"', "[imu.trunk] format must"),
         ('bus = "mian"\nnode_id = 20', "[imu.trunk] bus: there is no bus 'mian'"),
         ('bus = "mian"\ncan_id = 80', "[imu.trunk] bus: there is no bus 'mian'"),
         ('bus = "main"\nnode_id = 20\nport = "x"', "unknown key 'port'"),
@@ -64,7 +64,7 @@ def test_each_table_builds_its_component(
             'bus = "main"\nnode_id = 20' + JOINT,
             "[imu.trunk] node_id: 20 on bus 'main' belongs to [joint.left_",
         ),
-        ('bus = "main"\nnode_id = 20\ndirections = [1, 2]', "[imu.trunk] directions[1]: "),
+        ('bus = "main"\nnode_id = 20\ndirections = [1, 2]', "[imu.trunk] directions[1] 2"),
     ],
 )
 def test_a_table_that_cannot_work_is_named(tmp_path: Path, text: str, says: str) -> None:
