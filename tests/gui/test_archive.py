@@ -68,9 +68,9 @@ def record(settings: ServerSettings, *, sent: bool = True) -> str:
 def foretold(session: str, stamp_ns: int) -> Record:
     """That a model said then that somebody walks."""
     utc_ns = stamp_ns + time.time_ns() - time.monotonic_ns()
-    return record_of(
-        session, dataclasses.replace(predicted("walk", {"walk": 0.94}), stamp_ns=stamp_ns, utc_ns=utc_ns)
-    )
+    told = predicted("walk", {"walk": 0.94})
+    prediction = dataclasses.replace(told.prediction, stamp_ns=stamp_ns)
+    return record_of(session, dataclasses.replace(told, prediction=prediction, utc_ns=utc_ns))
 
 
 @pytest.fixture

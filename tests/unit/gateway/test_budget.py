@@ -169,7 +169,7 @@ def test_watch_says_that_rows_are_shed(
     with serving(robot) as (host, port):
         assert main(["watch", "*", "--robot", f"{host}:{port}", "--rate", "1000", "--count", "500"]) == 0
     assert capsys.readouterr().err == (
-        "gwrms watch: the robot sends one row of 2: it keeps to its max_cpu_percent\n"
+        "gwrms watch: the robot sends one row of 2: more would be late, or beyond its max_cpu_percent\n"
     )
 
 
