@@ -225,9 +225,10 @@ class Inlet:
         spent_ns = self._spent()
         self._cpu_ns += spent_ns
         self._owe(spent_ns)
+        floods = self._floods(sum(isinstance(line, wire.StopRequest) for line in lines))
         if self._is_full or self._splitter.dropping or self._owed_ns > COSTLY_NS:
-            self._rest(self._pace.rest_s(self._owed_ns))
-        elif self._floods(sum(isinstance(line, wire.StopRequest) for line in lines)):
+            self._rest(max(self._pace.rest_s(self._owed_ns), FLOOD_S * floods))
+        elif floods:
             self._rest(FLOOD_S)
         if self._bad >= BAD_LINES:  # from now on only stops are heard, until the loop has closed it
             heard.ended = True

@@ -400,6 +400,14 @@ def test_single_stops_by_the_dozen_are_a_flood_too_and_its_rest_is_short(turned:
     assert rests == [intake.FLOOD_S]
 
 
+def test_a_flood_of_stops_that_costs_much_rests_no_less(turned: Turned) -> None:
+    rests: list[float] = []
+    turned.front.call_later = lambda delay_s, callback: rests.append(delay_s)  # type: ignore[method-assign, assignment, return-value]
+    turned.spent = [2 * intake.COSTLY_NS, 0]
+    turned.says(STOP % b"many" * (intake.FLOOD + 1))
+    assert rests == [intake.FLOOD_S]
+
+
 def test_an_id_without_end_is_not_kept() -> None:
     stop = stop_in(b'{"jsonrpc":"2.0","method":"robot.stop","id":"%s"}' % (b"x" * 60_000))
     assert stop is not None
