@@ -22,6 +22,8 @@ WILD_CARDS = 12  # … and so many of these in one
 QUEUED_LINES = 1024  # requests of one client that may wait to be handled …
 QUEUED_BYTES = 1024 * 1024  # … and their bytes; what comes beyond is refused
 PENDING = 64  # requests of one client that wait for a device before the next is handled
+MOST_STOPS = 1024  # stops of one client whose answer is waited for; beyond, they act and are not answered
+ID_LENGTH = 200  # characters of a stop's id; a longer one is answered as null
 OUTPUT_BYTES = 1024 * 1024  # answers a client has not taken before its next request is handled …
 OUTPUTS_BYTES = 64 * 1024 * 1024  # … and of all clients; beyond, who has most of it is closed
 

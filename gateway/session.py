@@ -19,7 +19,7 @@ from msgspec import UNSET, UnsetType
 from gateway import wire
 from gateway.futures import outcome
 from gateway.intake import FOREIGN, Heard, Inlet
-from gateway.limits import BAD_LINES, OUTPUT_BYTES, PENDING, SPEAK_S
+from gateway.limits import BAD_LINES, MOST_STOPS, OUTPUT_BYTES, PENDING, SPEAK_S
 from gateway.loop import WRITE, Loop, Timer
 from gateway.sharing import Sharing
 from gateway.stop_lines import STOP
@@ -30,7 +30,6 @@ GREETINGS = frozenset({"hello", "clock.read"})
 STREAM_BYTES = 64 * 1024  # output not yet taken before streams hold back
 LAST_ANSWERS_S = 10.0  # how long a client that will say nothing more is waited for
 
-MOST_STOPS = 1024  # whose answer is waited for
 SILENCE_S = 5.0  # how long one that may only stop may say nothing
 
 _NO_REQUESTS = wire.refuse(

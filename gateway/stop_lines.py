@@ -10,7 +10,7 @@ from typing import Any, Final
 import msgspec
 from msgspec import UNSET, Raw, UnsetType
 
-from gateway.limits import REASON_LENGTH
+from gateway.limits import ID_LENGTH, REASON_LENGTH
 from gateway.wire import Id, Line, LineSplitter, StopRequest
 
 STOP: Final = "robot.stop"
@@ -18,7 +18,6 @@ STOP: Final = "robot.stop"
 _BLANK = bytes(range(33))  # white space, and what no text should hold
 _MARKS = (b"stop", b"\\", b"\0")  # one of these is in every line that asks for a stop: letters may be escaped
 _SHORTEST = len("method:robot.stop")
-_ID_LENGTH = 200  # characters of an id; a longer one is answered as null
 _LONGEST_MARK = max(map(len, _MARKS))
 _KEPT_BYTES = 160  # of what was dropped: more than a method takes with every letter escaped
 _ESCAPED = re.compile(rb"\\u00([2-7][0-9A-Fa-f])")
@@ -61,7 +60,7 @@ def _request(found: dict[str, Raw]) -> StopRequest:
     known: dict[str, Any] = {
         key: msgspec.json.decode(found[key]) for key in ("params", "id", "jsonrpc") if key in found
     }
-    if len(bytes(found.get("id", b""))) > _ID_LENGTH:
+    if len(bytes(found.get("id", b""))) > ID_LENGTH:
         known["id"] = None
     return StopRequest(_reason(known.get("params")), _id(known))
 

@@ -345,7 +345,7 @@ def _explain(line: bytes, error: Exception) -> BadLine:
     except RecursionError:
         return BadLine("the message is nested too deeply", PARSE_ERROR)
     except (msgspec.DecodeError, UnicodeDecodeError) as reason:
-        return BadLine(f"this is not UTF-8 JSON: {reason}", PARSE_ERROR)
+        return BadLine(f"this cannot be read as JSON: {reason}", PARSE_ERROR)
     if isinstance(found, list):
         return BadLine("batches are not supported: send one request a line")
     if not isinstance(found, dict):

@@ -12,6 +12,7 @@ _KINDS = {
     "null": "nothing",
 }
 _PATTERNS = (  # msgspec's messages, and ours
+    (r"Expected `int`, got `float`", "must be a whole number, not a fraction"),
     (r"Expected `(?P<want>[^`]+)`, got `(?P<got>[^`]+)`", "must be {want}, not {got}"),
     (r"Expected `str` of length <= (?P<n>\d+)", "has more than {n} characters"),
     (r"Expected `(?:str|array|object)` of length >= 1", "must not be empty"),
@@ -21,8 +22,8 @@ _PATTERNS = (  # msgspec's messages, and ours
     (r"Expected `(?P<want>[^`]+)` <= (?P<n>\S+?)(\.0)?", "must be {want}, at most {n}"),
     (r"Expected `(?P<want>[^`]+)` > (?P<n>\S+?)(\.0)?", "must be {want} above {n}"),
     (r"Expected `(?P<want>[^`]+)` < (?P<n>\S+?)(\.0)?", "must be {want} below {n}"),
-    (r"Object missing required field `(?P<n>[^`]+)`", "{n} is missing"),
-    (r"Object contains unknown field `(?P<n>[^`]+)`", "there is no {n} here"),
+    (r"Object missing required field `(?P<n>.+)`", "{n} is missing"),
+    (r"Object contains unknown field `(?P<n>.+)`", "there is no {n} here"),
     (r"Invalid enum value (?P<n>.+)", "{n} is not known"),
 )
 _TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PATTERNS)
@@ -30,7 +31,7 @@ _TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PA
 
 def plainly(error: Exception) -> str:
     """As `ttl_s must be a number, not text`; what is not in the table stays as it is."""
-    what, key = str(error).partition(" - at ")[0], key_of(error)
+    what, key = _parts(error)
     said = next((_said(words, found) for one, words in _TABLE if (found := one.fullmatch(what))), None)
     if said is None:
         return f"{key}: {what[:1].lower()}{what[1:]}" if key else what
@@ -39,7 +40,12 @@ def plainly(error: Exception) -> str:
 
 def key_of(error: Exception) -> str:
     """Where it is, as `rules[0].above`; empty where it is the whole."""
-    return str(error).partition(" - at ")[2].strip("`").removeprefix("$").removeprefix(".")
+    return _parts(error)[1]
+
+
+def _parts(error: Exception) -> tuple[str, str]:
+    what, at, where = str(error).rpartition(" - at `$")  # a name may have anything in it
+    return (what, where.strip("`").removeprefix(".")) if at else (str(error), "")
 
 
 def _said(words: str, found: "re.Match[str]") -> str:

@@ -88,7 +88,10 @@ def _report_losses(batch: Batch, dropped: int, shed: int) -> None:
     if batch.dropped > dropped:
         warn("watch", f"the robot dropped {batch.dropped - dropped} rows: we read too slowly")
     if batch.shed > shed:
-        warn("watch", f"the robot sends one row of {batch.shed}: more would be late, or beyond its max_cpu_percent")
+        warn(
+            "watch",
+            f"the robot sends one row of {batch.shed}: more would be late, or beyond its max_cpu_percent",
+        )
 
 
 def _follow_json(rows: Iterator[Row]) -> None:

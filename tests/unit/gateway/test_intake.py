@@ -14,7 +14,7 @@ import pytest
 from gateway import intake, stop_lines, wire
 from gateway.daemon import Daemon
 from gateway.intake import Heard, Inlet, Pace
-from gateway.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
+from gateway.limits import BAD_LINES, MOST_STOPS, QUEUED_BYTES, QUEUED_LINES
 from gateway.listeners import listen
 from gateway.loop import HANGUP, READ, Loop
 from gateway.messages import Stopped
@@ -406,6 +406,28 @@ def test_a_flood_of_stops_that_costs_much_rests_no_less(turned: Turned) -> None:
     turned.spent = [2 * intake.COSTLY_NS, 0]
     turned.says(STOP % b"many" * (intake.FLOOD + 1))
     assert rests == [intake.FLOOD_S]
+
+
+def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
+    turned: Turned, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(intake, "LAST_NS", 0)
+    turned.client.sendall(STOP % b"late")
+    turned.inlet.finish()
+    assert turned.asked == []
+
+
+def test_stops_beyond_what_may_wait_act_and_are_not_answered(
+    turned: Turned, caplog: pytest.LogCaptureFixture
+) -> None:
+    session = Session(turned.loop, turned.inlet, lambda _session, _request: None, 30.0, Sharing(turned.loop))
+    heard = Heard()
+    heard.stops = [wire.StopRequest("x", number) for number in range(MOST_STOPS + 5)]
+    heard.stop, heard.stopped = heard.stops[-1], Future()
+    session.hear(heard)
+    assert session._pending == MOST_STOPS
+    session.close()
+    assert "5 of its requests were dropped" in caplog.text
 
 
 def test_an_id_without_end_is_not_kept() -> None:

@@ -34,6 +34,8 @@ class _All(Struct, forbid_unknown_fields=True):
     [
         ({}, "must is missing"),
         ({"other": 1}, "there is no other here"),
+        ({"a - at `b": 1}, "there is no a - at `b here"),
+        ({"count": 1.5}, "count must be a whole number, not a fraction"),
         ({"must": 1}, "must must be true or false, not a whole number"),
         ({"name": "abcd"}, "name has more than 3 characters"),
         ({"name": ""}, "name must not be empty"),
