@@ -15,7 +15,7 @@ from server_gui.core.cloud import parts, transfer
 from server_gui.core.fleet.door import NobodyCollects, ask
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import send
+from server_gui.core.recording.upload import lost_batches, send
 from server_gui.core.settings import load
 
 UPLOAD_EPILOG = """Without --from: what waits in this computer's spool goes to the store now. A collector
@@ -73,21 +73,22 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
         else Store(arguments.url)
     )
     with Spool(folder) as spool:
+        damaged = lost_batches(spool, store)
         waiting = spool.waiting()
-        damaged = []
+        uploaded = 0
         with progress("batches", len(waiting)) as advance:
             for number in waiting:
                 try:
                     send(spool, number, store)
+                    uploaded += 1
                 except Damaged as error:
                     damaged.append(str(error))
                 advance(1)
     for problem in damaged:
         warn("cloud", problem)
-    uploaded = len(waiting) - len(damaged)
     _tell(
         arguments,
-        f"{uploaded} batches uploaded to {store.url}; nothing waits",
+        f"{uploaded} {'batch' if uploaded == 1 else 'batches'} uploaded to {store.url}; nothing waits",
         uploaded=uploaded,
         waiting=0,
     )

@@ -157,7 +157,7 @@ def status_text(report: CollectorReport) -> str:
         *(f"ALARM  {trouble.text}" for trouble in report.threads),
         *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
         *([f"ALARM  {uploader.problem}"] if uploader.problem else []),
-        *(f"ALARM  {problem}" for problem in uploader.ahead),
+        *(f"ALARM  {problem}" for problem in (*uploader.lost, *uploader.ahead)),
         *(
             f"ALARM  {file} is damaged: what is damaged of it is not in the store"
             for file in uploader.damaged

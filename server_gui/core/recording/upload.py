@@ -12,8 +12,9 @@ import pyarrow as pa
 
 from ml.store.errors import NoSuchTable
 from ml.store.store import Store
-from ml.store.tables import SESSIONS, TABLES, TELEMETRY, Table
+from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
 from server_gui.core.recording import lacking
+from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.gathering import EventKind
@@ -24,6 +25,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.tally import Tally, tallied
 
 _CUT: Final = -(1 << 62)  # the number of its event
+_WHOLE: Final = _CUT - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +50,40 @@ def send(spool: Spool, number: int, store: Store) -> None:
     except Damaged as error:
         aside = spool.set_aside(number)
         text = f"{error}; it is kept as {aside.name}, and is not in the store as a whole"
-        spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
+        _tell(spool, number, text, store)
         raise Damaged(text) from error
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
     if sent.is_damaged:
         aside = spool.set_aside(number)
         raise Damaged(f"{'; '.join(sent.lost)}; {aside.name} is kept, and all else of it is in the store")
     spool.uploaded(number)
+
+
+def lost_batches(spool: Spool, store: Store) -> list[str]:
+    """Tell the store which batches are lost as a whole, each once; in words, those that were told now.
+
+    Raises:
+        StoreError: it is not known whether that is in the store.
+
+    """
+    return [text for number, text in spool.untold().items() if _tell(spool, number, text, store)]
+
+
+def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
+    """An event for each robot whose rows may have been in a batch; False where the store has it already.
+
+    One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
+    """
+    lost = _Lost(_WHOLE, text, tuple(sorted(spool.robots_beside(number))), None, None, {"batch": number})
+    origin = {"spool": f"{spool.id}/lost", "batch": number}
+    now_ns = Moment.now().utc_ns
+    rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
+    again = functools.partial(rows.to_reader, None)
+    new = store.append(EVENTS, EVENTS.name, rows.schema, again, f"{spool.id}/lost.{number}", 1)
+    if spool.is_aside(number):
+        spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
+    spool.told(number)
+    return new
 
 
 def upload(segment: Segment, spool: str, store: Store) -> Sent:
