@@ -66,8 +66,8 @@ examples
   gwrms collect --unit | sudo tee /etc/systemd/system/gwrms-collect.service
 
 exit status
-  0 ended as asked, or a collector has answered; 1 it cannot record, or nobody answers;
-  2 usage"""
+  0 ended as asked, or a collector has answered; 1 it cannot record, nobody answers, or
+  rows are lost that no event tells; 2 usage"""
 
 
 def main(argv: list[str]) -> int:
@@ -111,11 +111,15 @@ def _collect(settings: ServerSettings, operator: str, notes: str) -> int:
         while True:
             ending.check()
             collector.wait(LOOK_S)
+    status = 0
+    if collector.untold:
+        log.error("%d rows are lost, and no event tells of them: see above", collector.untold)
+        status = 1
     log.info("ended")
     if collector.hangs:
         logging.shutdown()
-        os._exit(0)  # what an upload under way has done is found out at the next start
-    return 0
+        os._exit(status)  # what an upload under way has done is found out at the next start
+    return status
 
 
 def _log_to_stderr() -> None:
