@@ -15,7 +15,7 @@ from server_gui.core.cloud import parts, transfer
 from server_gui.core.fleet.door import NobodyCollects, ask
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import lost_batches, send
+from server_gui.core.recording.upload import ahead, lost_batches, send
 from server_gui.core.settings import load
 
 UPLOAD_EPILOG = """Without --from: what waits in this computer's spool goes to the store now. A collector
@@ -73,6 +73,8 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
         else Store(arguments.url)
     )
     with Spool(folder) as spool:
+        for problem in ahead(spool, store):
+            warn("cloud", problem)
         damaged = lost_batches(spool, store)
         waiting = spool.waiting()
         uploaded = 0

@@ -87,6 +87,7 @@ class Spool:
         self._reserve_bytes = reserve_bytes
         self._keep_bytes = keep_bytes
         self._free_bytes = free_bytes
+        self.missing: str | None = None  # in words, where files that were there are not any more
         self._lock = _take(folder)
         try:
             with _writing(folder):
@@ -383,7 +384,11 @@ class Spool:
         receipt = self.receipts.newest()
         known = receipt.batch if receipt else 0
         if known > newest:
-            log.error("files are missing in the spool %s: batch %d was uploaded from it", self.folder, known)
+            self.missing = (
+                f"files are missing in the spool {self.folder}: batch {known} was uploaded from it, and the "
+                f"newest there is {newest}. What was not uploaded of them is lost"
+            )
+            log.error("%s", self.missing)
         if kept is not Kept.WAITING or known > newest:
             return self._begin(max(newest, known) + 1)
         segment = self._begin(newest)

@@ -10,7 +10,7 @@ from typing import Any, Final
 import msgspec
 import pyarrow as pa
 
-from ml.store.errors import NoSuchTable
+from ml.store.errors import NoSuchTable, translated
 from ml.store.store import Store
 from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
 from server_gui.core.recording import lacking
@@ -123,11 +123,12 @@ def ahead(spool: Spool, store: Store) -> list[str]:
     Then somebody has put an older copy of the spool in its place. What is recorded now is kept apart.
     """
     found = []
+    writers = spool.earlier_writers() | _openings(spool, store)
     for location in (*TELEMETRY.locations(store.about.shards), SESSIONS.name):
         with contextlib.suppress(NoSuchTable):
             store.mend(location)
             table = store.table(location)
-            newest = max(table.transaction_version(each) or 0 for each in spool.earlier_writers())
+            newest = max(table.transaction_version(each) or 0 for each in writers)
             if newest >= spool.first:
                 found.append(
                     f"{store.url}/{location} has batch {newest} of the spool {spool.folder}, which had only "
@@ -135,6 +136,16 @@ def ahead(spool: Spool, store: Store) -> list[str]:
                     "files were removed. What was not uploaded of them is lost; what is recorded now is not"
                 )
     return found
+
+
+def _openings(spool: Spool, store: Store) -> set[str]:
+    """What other openings of this spool were called, also those after it was copied: each begins sessions."""
+    with contextlib.suppress(NoSuchTable):
+        store.mend(SESSIONS.name)
+        with translated(f"{store.url}/{SESSIONS.name} cannot be read"):
+            names = store.dataset(SESSIONS.name).to_table(columns=["spool"])["spool"].unique().to_pylist()
+        return {name for name in names if name and name.startswith(f"{spool.id}/")} - {spool.writer}
+    return set()
 
 
 def _telemetry(

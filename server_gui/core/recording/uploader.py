@@ -54,7 +54,7 @@ class Uploader:
         wanted: Callable[[], bool] = lambda: True,
         compacting: Compacting | None = None,
     ) -> None:
-        self.state = UploaderState()
+        self.state = UploaderState(lost=(spool.missing,) if spool.missing else ())
         self._spool = spool
         self._connect = connect
         self._wanted = wanted
