@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import socketserver
 import threading
 from collections.abc import Iterator
@@ -60,6 +61,27 @@ def test_sessions_are_listed_also_those_that_wait_for_upload(desk: Desk) -> None
     assert first.session not in desk.run("sessions", "ls", "--robot", "*2")
     assert desk.ask("sessions", "ls", "--to", "2020-01-01") == []
     assert len(desk.ask("sessions", "ls", "--from", "2020-01-01T00:00")) == 2
+
+
+@pytest.mark.parametrize("damage", ["a batch", "the folder"])
+def test_sessions_of_the_store_are_listed_where_the_spool_cannot_be_read(
+    desk: Desk, damage: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored, waiting = desk.record(), desk.record("exo-02", sent=False)
+    if damage == "a batch":
+        file = desk.spool / "00000002.db"
+        assert file.exists()
+        file.write_bytes(b"x" * 20_000)
+        told = "00000002.db is damaged: file is not a database; gwrms cloud upload sets it aside; sessions"
+    else:
+        access = os.access
+        monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.R_OK and access(path, mode))
+        told = f"the spool {desk.spool} cannot be read: it belongs to somebody else; sessions"
+    assert main(["sessions", "ls", "--config", str(desk.config)]) == 1
+    said = capsys.readouterr()
+    assert f"{told} that it alone has are not listed" in said.err
+    assert stored.session in said.out
+    assert waiting.session not in said.out
 
 
 def test_sessions_are_listed_before_anything_was_uploaded(desk: Desk) -> None:
