@@ -12,7 +12,7 @@ from ml.store.sessions import Session
 from ml.store.store import Store, checked_url
 from server_gui.commands.cloud_reach import add_url, parser, progress, reach, url
 from server_gui.core.cloud import parts, transfer
-from server_gui.core.fleet.door import NobodyCollects, ask
+from server_gui.core.fleet.door import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, lost_batches, send
@@ -56,12 +56,17 @@ def upload(argv: list[str]) -> int:
         raise SpoolUnusable(
             f"a collector owns the spool {folder} and uploads to its own store; end it, or leave the URL out"
         )
-    return _tell(
+    problem = why_not_uploaded(folder)
+    _tell(
         arguments,
         "the collector that runs uploads what it has; gwrms collect --status tells how that goes",
         uploaded=0,
         waiting=waiting,
     )
+    if problem is None:
+        return 0
+    warn("cloud", f"it tries again, and could not the last time: {problem}")
+    return 1
 
 
 def _empty(folder: Path, arguments: argparse.Namespace) -> int:

@@ -223,14 +223,21 @@ def test_a_spool_that_another_server_owns_is_left_alone(desk: Desk) -> None:
 
 
 @pytest.fixture
-def collector(desk: Desk) -> Iterator[list[bytes]]:
+def problem() -> str | None:
+    """Why the collector could not upload."""
+    return None
+
+
+@pytest.fixture
+def collector(desk: Desk, problem: str | None) -> Iterator[list[bytes]]:
     """Answers as one that runs on the spool would; what it was asked."""
     asked: list[bytes] = []
+    status = json.dumps({"version": "1", "uploader": {"uploaded": 0, "problem": problem}}).encode() + b"\n"
 
     class Handler(socketserver.StreamRequestHandler):
         def handle(self) -> None:
             asked.append(self.rfile.readline())
-            self.wfile.write(b"3\n")
+            self.wfile.write(b"3\n" if b"upload" in asked[-1] else status)
 
     desk.spool.mkdir(exist_ok=True)
     with socketserver.UnixStreamServer(str(desk.spool / NAME), Handler) as server:
@@ -243,8 +250,17 @@ def collector(desk: Desk) -> Iterator[list[bytes]]:
 
 def test_a_collector_that_runs_is_asked_to_upload(desk: Desk, collector: list[bytes]) -> None:
     assert desk.ask("cloud", "upload") == {"uploaded": 0, "waiting": 3}
-    assert collector == [b'{"ask":"upload"}\n']
+    assert collector == [b'{"ask":"upload"}\n', b'{"ask":"status"}\n']
     assert "owns the spool" in desk.run("cloud", "upload", desk.url, status=1)
+
+
+@pytest.mark.parametrize("problem", ["Permission denied"])
+@pytest.mark.parametrize("command", [("cloud", "upload"), ("collect", "--upload")])
+@pytest.mark.usefixtures("collector")
+def test_a_collector_that_cannot_upload_is_told_with_the_exit_status(
+    desk: Desk, command: tuple[str, ...]
+) -> None:
+    assert "could not the last time: Permission denied" in desk.run(*command, status=1)
 
 
 def test_a_store_moves_to_another_url_and_back_in_parts(desk: Desk, tmp_path: Path) -> None:
