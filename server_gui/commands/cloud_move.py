@@ -12,10 +12,10 @@ from ml.store.sessions import Session
 from ml.store.store import Store, checked_url
 from server_gui.commands.cloud_reach import add_url, parser, progress, reach, url
 from server_gui.core.cloud import parts, transfer
-from server_gui.core.fleet.door import NobodyCollects, ask
+from server_gui.core.fleet.door import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import send
+from server_gui.core.recording.upload import ahead, lost_batches, send
 from server_gui.core.settings import load
 
 UPLOAD_EPILOG = """Without --from: what waits in this computer's spool goes to the store now. A collector
@@ -56,12 +56,17 @@ def upload(argv: list[str]) -> int:
         raise SpoolUnusable(
             f"a collector owns the spool {folder} and uploads to its own store; end it, or leave the URL out"
         )
-    return _tell(
+    problem = why_not_uploaded(folder)
+    _tell(
         arguments,
         "the collector that runs uploads what it has; gwrms collect --status tells how that goes",
         uploaded=0,
         waiting=waiting,
     )
+    if problem is None:
+        return 0
+    warn("cloud", f"it tries again, and could not the last time: {problem}")
+    return 1
 
 
 def _empty(folder: Path, arguments: argparse.Namespace) -> int:
@@ -73,21 +78,24 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
         else Store(arguments.url)
     )
     with Spool(folder) as spool:
+        for problem in ahead(spool, store):
+            warn("cloud", problem)
+        damaged = lost_batches(spool, store)
         waiting = spool.waiting()
-        damaged = []
+        uploaded = 0
         with progress("batches", len(waiting)) as advance:
             for number in waiting:
                 try:
                     send(spool, number, store)
+                    uploaded += 1
                 except Damaged as error:
                     damaged.append(str(error))
                 advance(1)
     for problem in damaged:
         warn("cloud", problem)
-    uploaded = len(waiting) - len(damaged)
     _tell(
         arguments,
-        f"{uploaded} batches uploaded to {store.url}; nothing waits",
+        f"{uploaded} {'batch' if uploaded == 1 else 'batches'} uploaded to {store.url}; nothing waits",
         uploaded=uploaded,
         waiting=0,
     )

@@ -16,7 +16,7 @@ from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import NONE, age, say, size, table, warn
 from ml.store.private import private_files
 from server_gui.core.fleet.collector import Collector, CollectorReport
-from server_gui.core.fleet.door import ask
+from server_gui.core.fleet.door import ask, why_not_uploaded
 from server_gui.core.fleet.statistics import LinkReport
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingState, TaskReport
 from server_gui.core.settings import ServerSettings, SettingsError, add_robots, default_file, load
@@ -66,8 +66,8 @@ examples
   gwrms collect --unit | sudo tee /etc/systemd/system/gwrms-collect.service
 
 exit status
-  0 ended as asked, or a collector has answered; 1 it cannot record, or nobody answers;
-  2 usage"""
+  0 ended as asked, or a collector has answered; 1 it cannot record, nobody answers, its last
+  upload did not succeed (--upload), or rows are lost that no event tells; 2 usage"""
 
 
 def main(argv: list[str]) -> int:
@@ -84,7 +84,11 @@ def main(argv: list[str]) -> int:
     if arguments.upload:
         ask(spool, "upload")
         say("the collector uploads what it has; gwrms collect --status tells how that goes\n")
-        return 0
+        problem = why_not_uploaded(spool)
+        if problem is None:
+            return 0
+        warn("collect", f"it tries again, and could not the last time: {problem}")
+        return 1
     if arguments.mark is not None:
         return _mark(spool, arguments.mark)
     if not settings.robots:
@@ -111,11 +115,15 @@ def _collect(settings: ServerSettings, operator: str, notes: str) -> int:
         while True:
             ending.check()
             collector.wait(LOOK_S)
+    status = 0
+    if collector.untold:
+        log.error("%d rows are lost, and no event tells of them: see above", collector.untold)
+        status = 1
     log.info("ended")
     if collector.hangs:
         logging.shutdown()
-        os._exit(0)  # what an upload under way has done is found out at the next start
-    return 0
+        os._exit(status)  # what an upload under way has done is found out at the next start
+    return status
 
 
 def _log_to_stderr() -> None:
@@ -157,7 +165,7 @@ def status_text(report: CollectorReport) -> str:
         *(f"ALARM  {trouble.text}" for trouble in report.threads),
         *(f"ALARM  {alarm.text}" for alarm in recorder.alarms),
         *([f"ALARM  {uploader.problem}"] if uploader.problem else []),
-        *(f"ALARM  {problem}" for problem in uploader.ahead),
+        *(f"ALARM  {problem}" for problem in (*uploader.lost, *uploader.ahead)),
         *(
             f"ALARM  {file} is damaged: what is damaged of it is not in the store"
             for file in uploader.damaged

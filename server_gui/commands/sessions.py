@@ -60,12 +60,14 @@ def ls(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
     found = [session for session in known.sessions() if _wanted(session, arguments)]
+    if known.unread is not None:
+        warn("sessions", f"{known.unread}; sessions that it alone has are not listed")
     if arguments.json:
         say_json([_fields(session) for session in found])
     else:
         away = known.problem is not None
         say(table(HEADER, [_row(session, away=away) for session in found], right=(3, 4, 5)))
-    return 0 if known.problem is None else 1
+    return 0 if known.problem is None and known.unread is None else 1
 
 
 def _wanted(session: Session, arguments: argparse.Namespace) -> bool:

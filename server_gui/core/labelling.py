@@ -143,6 +143,8 @@ class Labelling:
         found = Recordings(self._settings.store.url, self._spool)
         if found.problem is not None:  # what is said already must be known
             raise found.problem
+        if found.unread is not None:
+            raise found.unread
         return found
 
 

@@ -228,7 +228,7 @@ class Server:
             thing.fate = Fate.COUNTED if lost else Fate.SAFE
         if lost:
             self.ledger.losses.append(Loss(self.name, self.life, lost, self._pending))
-        if not self.recorder._untold:
+        if not self.recorder.untold:
             for loss in self.ledger.losses:
                 loss.told |= (loss.server, loss.life) == (self.name, self.life)
         self._pending = []

@@ -6,7 +6,7 @@ neither missed nor found twice.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -26,6 +26,7 @@ from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.columns import OWN, Columns
+from server_gui.core.recording.errors import SpoolUnusable
 
 _US: Final = timedelta(microseconds=1)
 Row = dict[str, Any]
@@ -35,20 +36,23 @@ class Recordings:
     """What there was of them when this was made; for one thread.
 
     Where the store cannot be reached, `problem` says why, and the recordings are those of which this
-    computer's spool has something, also what it keeps of uploaded batches.
+    computer's spool has something, also what it keeps of uploaded batches. Where the spool or a batch of it
+    cannot be read, `unread` says why, and sessions of which nothing else is known are not listed; what may
+    have rows there is not opened, and raises that.
 
     Raises:
         StoreError: there is no store, or it cannot be reached, and nothing in the spool either.
-        SpoolUnusable: the spool cannot be read.
+        SpoolUnusable: likewise, and the spool cannot be read.
 
     """
 
     def __init__(self, url: str, spool: Path) -> None:
         """`spool` is the one that goes to this store; a folder that is not there has nothing."""
         self.problem: StoreError | None = None
+        self.unread: SpoolUnusable | None = None
         self._url = url
         self._spool = spool
-        self._batches = spooled.waiting(self._spool)
+        self._batches = self._listed(spooled.waiting)
         self._writers: dict[int, str] = {}  # of the batches
         self._store: Snapshot | None = None
         self._reach()
@@ -56,23 +60,32 @@ class Recordings:
     def _reach(self) -> None:
         try:
             self._store = Snapshot.existing(self._url)
-        except NoSuchTable:
+        except NoSuchTable as error:
             if not self.sessions():
-                raise
+                raise (self.unread or error) from None
         except (StoreRefused, StoreUnreachable) as error:
-            self._batches = spooled.kept(self._spool)
+            self._batches = self._listed(spooled.kept)
             if not self.sessions():
                 raise
             self.problem = error
 
     def sessions(self) -> list[Session]:
         """Every session, oldest first; rows that wait for upload are not counted."""
-        told = self._waiting(SESSIONS)
+        told: list[Row] = []
+        names: dict[tuple[str, str], Session] = {}
+        for batch in self._batches:
+            try:
+                here = spooled.untold(self._spool, [batch], ())
+                told += spooled.rows(self._spool, SESSIONS, self._missing(SESSIONS.name, [batch]))
+            except SpoolUnusable as error:
+                self.unread = self.unread or error
+            else:
+                names |= {(each.robot, each.session): each for each in here}
         found = (
             sessions.unstored(told) if self._store is None else sessions.sessions(self._store, waiting=told)
         )
-        known = ((each.robot, each.session) for each in found)
-        return sessions.in_order([*found, *spooled.untold(self._spool, self._batches, known)])
+        known = {(each.robot, each.session) for each in found}
+        return sessions.in_order([*found, *(each for name, each in names.items() if name not in known)])
 
     def find(self, name: str, robot: str | None = None) -> Session:
         """The session whose name is this, or alone begins so.
@@ -83,8 +96,9 @@ class Recordings:
 
         """
         known = [each for each in self.sessions() if robot in (None, each.robot)]
-        if self.problem is not None and not any(each.session.startswith(name) for each in known):
-            raise self.problem
+        why = self.problem or self.unread
+        if why is not None and not any(each.session.startswith(name) for each in known):
+            raise why
         return sessions.among(known, name, self._url)
 
     def happenings(self, session: Session, table: Table = EVENTS) -> list[Row]:
@@ -117,19 +131,26 @@ class Recordings:
 
     # --- inside
 
+    def _listed(self, look: Callable[[Path], list[int]]) -> list[int]:
+        try:
+            return look(self._spool)
+        except SpoolUnusable as error:
+            self.unread = error
+            return []
+
     def _looked_into(self, session: Session) -> "_Waiting":
         location = TELEMETRY.location(session.robot, 1 if self._store is None else self._store.about.shards)
         units = {} if self._store is None else self._store.units(location)
-        return _Waiting(self._spool, self._missing(location), session, units)
+        return _Waiting(self._spool, self._missing(location, self._batches), session, units)
 
     def _waiting(self, table: Table) -> list[Row]:
-        return spooled.rows(self._spool, table, self._missing(table.name))
+        return spooled.rows(self._spool, table, self._missing(table.name, self._batches))
 
-    def _missing(self, location: str) -> list[int]:
+    def _missing(self, location: str, batches: list[int]) -> list[int]:
         """The batches of the spool that are not in this table."""
         if self._store is None:
-            return self._batches
-        return [each for each in self._batches if not self._store.has(location, self._writer(each), each)]
+            return batches
+        return [each for each in batches if not self._store.has(location, self._writer(each), each)]
 
     def _writer(self, batch: int) -> str:
         if batch not in self._writers:

@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import os
 import sqlite3
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -35,7 +36,14 @@ class Batch:
 
 
 def waiting(spool: Path) -> list[int]:
-    """The batches that wait for upload, and the one that is being recorded; oldest first."""
+    """The batches that wait for upload, and the one that is being recorded; oldest first.
+
+    Raises:
+        SpoolUnusable: the folder is there, and cannot be read.
+
+    """
+    if not os.access(spool, os.R_OK | os.X_OK) and os.access(spool, os.F_OK):
+        raise SpoolUnusable(f"the spool {spool} cannot be read: it belongs to somebody else")
     return sorted(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.db"))
 
 

@@ -18,8 +18,9 @@ from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 from server_gui.core.fleet.collector import connect
+from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import send
+from server_gui.core.recording.upload import lost_batches, send
 from server_gui.core.settings import ServerSettings
 
 FORMATS: Final[dict[str, Callable[[Path, Recording], int]]] = {
@@ -51,13 +52,17 @@ def upload(settings: ServerSettings) -> Work:
 
     def work(job: Job) -> str:
         with Spool(settings.recorder.spool) as spool:
+            store = connect(settings.store)
+            lost = lost_batches(spool, store)
             waiting = spool.waiting()
             job.expect(len(waiting), "batches")
-            store = connect(settings.store)
             for number in waiting:
                 send(spool, number, store)
                 job.advance(1)
-        return f"{len(waiting)} batches uploaded to {settings.store.url}; nothing waits"
+        if lost:
+            raise Damaged("; ".join(lost))
+        batches = "1 batch" if len(waiting) == 1 else f"{len(waiting)} batches"
+        return f"{batches} uploaded to {settings.store.url}; nothing waits"
 
     return work
 

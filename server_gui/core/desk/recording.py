@@ -160,7 +160,7 @@ class Recording:
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]
         problems += [alarm.text for alarm in report.recorder.alarms]
         problems += [] if report.uploader.problem is None else [report.uploader.problem]
-        problems += report.uploader.ahead
+        problems += (*report.uploader.lost, *report.uploader.ahead)
         facts = [
             f"Recording{who}",
             f"{rows:.0f} rows/s",

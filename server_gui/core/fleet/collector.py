@@ -124,6 +124,11 @@ class Collector:
         self.hangs = not self._uploader.close(BREAK_OFF_S)
         self._spool.close()
 
+    @property
+    def untold(self) -> int:
+        """How many rows are lost that no event tells; for when it has ended."""
+        return self._recorder.untold
+
     def wait(self, within_s: float) -> None:
         """Let it work so long, and see to its threads; raises what has ended it, a mistake of ours."""
         self.watch.look()

@@ -28,6 +28,16 @@ class Request(msgspec.Struct, frozen=True, omit_defaults=True):
     text: str = ""
 
 
+class _Uploading(msgspec.Struct, frozen=True):
+    """Of the uploader's state, why it did not succeed the last time it tried."""
+
+    problem: str | None
+
+
+class _Status(msgspec.Struct, frozen=True):
+    uploader: _Uploading
+
+
 @contextlib.asynccontextmanager
 async def door(folder: Path, answers: Answers) -> AsyncIterator[None]:
     """Answer who asks; the folder must be ours alone. `answers` are called in this loop, or awaited."""
@@ -79,6 +89,16 @@ def ask(folder: Path, what: str, text: str = "") -> bytes:
             f"the collector on the spool {folder} does not know what {what!r} is, or is ending"
         )
     return answer
+
+
+def why_not_uploaded(folder: Path) -> str | None:
+    """Why the collector on this spool did not bring the newest batch that it tried into its store.
+
+    Raises:
+        NobodyCollects: as `ask`.
+
+    """
+    return msgspec.json.decode(ask(folder, "status"), type=_Status).uploader.problem
 
 
 async def _answer(line: bytes, answers: Answers) -> bytes:

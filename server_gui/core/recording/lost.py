@@ -1,35 +1,87 @@
 """What was to be kept and could not be, by name: whose rows, how many, from when to when."""
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import Final
 
 from server_gui.core.recording.rows import JournalHead, Record, Run
 
 Part = Run | Record | tuple[str, JournalHead]  # what is committed: rows, or up to where a journal is recorded
+_ANY: Final = ""  # nobody knows of which table
 
 
-def told(parts: Iterable[Part]) -> list[str]:
-    """A line a robot and table; journals that were not recorded are seen again, and not told."""
-    counts: dict[tuple[str, str], int] = defaultdict(int)
-    times: dict[tuple[str, str], list[int]] = defaultdict(list)
-    for part in parts:
-        if isinstance(part, Run):
-            whose = (part.robot, f"telemetry, session {part.session}")
-            counts[whose] += len(part)
-            times[whose] += (part.stamps_ns + part.utc_offset_ns).tolist()
-        elif isinstance(part, Record):
-            whose = (str(part.fields.get("robot") or "no robot"), part.table)
-            counts[whose] += 1
-            times[whose] += [utc_ns for utc_ns in [part.fields.get("utc")] if isinstance(utc_ns, int)]
-    return [
-        f"{robot}: {count} rows of {table}{_span(times[robot, table])}"
-        for (robot, table), count in counts.items()
-    ]
+@dataclass(slots=True)
+class Lost:
+    """So many rows, between two times where these are known; ns, UTC."""
+
+    rows: int = 0
+    times_ns: list[int] = field(default_factory=list)  # the first and the last
+
+    def add(self, rows: int, times_ns: Iterable[int]) -> None:
+        """So many more, of these times."""
+        found = [*self.times_ns, *times_ns]
+        self.rows += rows
+        self.times_ns = [min(found), max(found)] if found else []
 
 
-def _span(times: list[int]) -> str:
-    return f", {_time(min(times))} to {_time(max(times))}" if times else ""
+class Losses:
+    """All that was lost and that no event tells yet; a robot "" is nobody knows whose."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, dict[str, Lost]] = defaultdict(lambda: defaultdict(Lost))
+
+    @property
+    def rows(self) -> int:
+        """How many."""
+        return sum(lost.rows for _, _, lost in self.each())
+
+    def add(self, parts: Iterable[Part]) -> None:
+        """These; journals that were not recorded are seen again, and not told."""
+        for part in parts:
+            if isinstance(part, Run):
+                times = (part.stamps_ns + part.utc_offset_ns).tolist()
+                self._found[part.robot][f"telemetry, session {part.session}"].add(len(part), times)
+            elif isinstance(part, Record):
+                robot = str(part.fields.get("robot") or "")
+                utc_ns = part.fields.get("utc")
+                self._found[robot][part.table].add(1, [utc_ns] if isinstance(utc_ns, int) else [])
+
+    def count(self, robot: str, rows: int, utc_ns: int) -> None:
+        """So many of this robot, at about that time; nobody has looked of which table."""
+        if rows:
+            self._found[robot][_ANY].add(rows, [utc_ns])
+
+    def robots(self) -> Iterator[tuple[str, Lost, str]]:
+        """Each robot with all that it has lost, and that in words."""
+        for robot, tables in self._found.items():
+            whole = Lost()
+            for lost in tables.values():
+                whole.add(lost.rows, lost.times_ns)
+            yield robot, whole, "; ".join(_told(table, lost) for table, lost in tables.items())
+
+    def lines(self) -> list[str]:
+        """A line a robot and table."""
+        return [f"{robot or 'no robot'}: {_told(table, lost)}" for robot, table, lost in self.each()]
+
+    def join(self, others: "Losses") -> None:
+        """These too."""
+        for robot, table, lost in others.each():
+            self._found[robot][table].add(lost.rows, lost.times_ns)
+
+    def each(self) -> Iterator[tuple[str, str, Lost]]:
+        """Robot, table, and what is lost of that."""
+        for robot, tables in self._found.items():
+            for table, lost in tables.items():
+                yield robot, table, lost
+
+
+def _told(table: str, lost: Lost) -> str:
+    rows = "1 row" if lost.rows == 1 else f"{lost.rows} rows"
+    of = f" of {table}" if table else ""
+    span = ", {} to {}".format(*map(_time, lost.times_ns)) if lost.times_ns else ""
+    return rows + of + span
 
 
 def _time(utc_ns: int) -> str:

@@ -18,7 +18,7 @@ from server_gui.core.recording.clocks import Moment, Reading
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.gathering import EventKind, Notification
 from server_gui.core.recording.journals import Entry
-from server_gui.core.recording.lost import Part, told
+from server_gui.core.recording.lost import Losses, Part
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.robots import Robots
 from server_gui.core.recording.rows import Record, Run
@@ -116,7 +116,7 @@ class Recorder:
         self._alarms: dict[AlarmKind, Alarm] = {}
         self._recorded = 0
         self._lost = 0
-        self._untold: Counter[str] = Counter()  # rows that were lost, of each robot; "": nobody knows whose
+        self._untold = Losses()  # that no event tells yet
         self._sessions_lost = False  # rows of sessions may be among what was lost: they are written again
         self._commit_s = 0.0
         self._looked_s = -AGAIN_S
@@ -234,6 +234,11 @@ class Recorder:
         lost = self._lost + self._overflowed.total()
         return RecorderState(self._recorded, self._queued_rows, lost, self._commit_s, alarms)
 
+    @property
+    def untold(self) -> int:
+        """How many rows are lost that no event tells; for when it is closed."""
+        return self._untold.rows
+
     def flush(self, timeout_s: float) -> bool:
         """Wait until everything handed in until now has been dealt with; False where that took too long."""
         with self._changed:
@@ -265,7 +270,8 @@ class Recorder:
             try:
                 self._turn(queue, ending)
             except BaseException as error:
-                self._lose(sum(item.rows for item in queue))
+                self._count((item.robot, item.rows) for item in queue)
+                self._write_again()
                 self._break(error)
                 if not isinstance(error, Exception):
                     raise
@@ -301,8 +307,7 @@ class Recorder:
             self._queued_rows = 0
             self._waiting.clear()
             overflowed, self._overflowed = self._overflowed, Counter()
-            self._untold.update(overflowed)
-            self._lost += overflowed.total()
+            self._count(overflowed.items())
             handed, ending = self._handed, self._ending.is_set()
         self._alarm(
             AlarmKind.OVERFLOW,
@@ -324,16 +329,14 @@ class Recorder:
 
     def _keep(self, found: list[Record]) -> None:
         runs = self._robots.runs()
-        rows = sum(map(len, runs)) + len(found)
         if not self._has_room():
+            self._lose([*runs, *found])
             if self._ending.is_set():
-                self._give_up([*runs, *found], f"the disk of {self._spool.folder} is nearly full")
-            else:
-                self._lose(rows)
+                self._give_up(f"the disk of {self._spool.folder} is nearly full")
             return
-        for robot, count in self._untold.items():
-            found += self._robots.lost(count, robot)
-        self._untold.clear()
+        untold, self._untold = self._untold, Losses()
+        for robot, lost, text in untold.robots():
+            found += self._robots.lost(robot, lost, text)
         if self._sessions_lost:
             found = [*self._robots.sessions(), *found]
             self._sessions_lost = False
@@ -353,7 +356,9 @@ class Recorder:
                 self._alarm(AlarmKind.SPOOL_FAILED, str(error))
                 left.append(now)
                 if self._gives_up_within(AGAIN_S):
-                    self._give_up([part for parts in left for part in parts], str(error))
+                    self._untold.join(untold)
+                    self._lose([part for parts in left for part in parts])
+                    self._give_up(str(error))
                     return
 
     def _gives_up_within(self, wait_s: float) -> bool:
@@ -368,10 +373,9 @@ class Recorder:
         self.worker.beat()
         return time.monotonic() >= self._until_s
 
-    def _give_up(self, parts: Sequence[Part], why: str) -> None:
-        """What is lost at the end has no event any more, so the log says by name what that is."""
-        self._lose(sum(map(_rows, parts)))
-        for text in told(parts):
+    def _give_up(self, why: str) -> None:
+        """What is lost at the end has no event any more, so the log says by name all that has none."""
+        for text in self._untold.lines():
             log.error("%s; lost: %s", why, text)
 
     def _append(self, parts: Sequence[Part]) -> None:
@@ -392,13 +396,24 @@ class Recorder:
         if isinstance(part, tuple):
             self._robots.forget(part[0], self._spool.heads)
         self._lost += _rows(part)
-        self._untold[""] += _rows(part)
+        self._untold.add([part])
         self._sessions_lost = True
         self._break(error)
 
-    def _lose(self, rows: int) -> None:
-        self._lost += rows
-        self._untold[""] += rows
+    def _count(self, lost: Iterable[tuple[str, int]]) -> None:
+        """So many rows of each robot are lost, and nobody knows more of them."""
+        now_ns = Moment.now().utc_ns
+        for robot, rows in lost:
+            self._lost += rows
+            self._untold.count(robot, rows, now_ns)
+
+    def _lose(self, parts: Sequence[Part]) -> None:
+        self._lost += sum(map(_rows, parts))
+        self._untold.add(parts)
+        self._write_again()
+
+    def _write_again(self) -> None:
+        """After a loss: what may have been among it, and what is said once."""
         self._sessions_lost = True
         self._robots.heads = dict(self._spool.heads)  # those entries are still to be seen
 

@@ -10,6 +10,7 @@ from server_gui.core.recording import records
 from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.gathering import EventKind, Gathering, Notification
 from server_gui.core.recording.journals import Entry, news
+from server_gui.core.recording.lost import Lost
 from server_gui.core.recording.records import Facts, Session
 from server_gui.core.recording.rows import JournalHead, Record, Run
 
@@ -128,14 +129,13 @@ class Robots:
         if robot in kept:
             self.heads[robot] = kept[robot]
 
-    def lost(self, rows: int, whose: str = "") -> list[Record]:
+    def lost(self, whose: str, lost: Lost, what: str) -> list[Record]:
         """That rows were lost here; of nobody knows whom: told in the recording of every robot there is."""
         now = Moment.now()
-        if whose in self._robots:
-            text = f"this server lost {rows} rows of {whose}"
-            return [self._robots[whose].now(EventKind.LOST, text, now, rows=rows)]
-        text = f"this server lost {rows} rows of all its robots"
-        return [robot.now(EventKind.LOST, text, now, rows=rows) for robot in self._robots.values()]
+        known = [self._robots[whose]] if whose in self._robots else list(self._robots.values())
+        text = f"this server lost rows of {whose or 'all its robots'}: {what}"
+        data = {"rows": lost.rows} | dict(zip(("from", "to"), lost.times_ns, strict=False))
+        return [robot.now(EventKind.LOST, text, now, **data) for robot in known]
 
     def refused(self, robot: str, what: str, why: str) -> list[Record]:
         """That the robot sent what cannot be kept; of each `what` the first time is enough to know it."""

@@ -86,14 +86,21 @@ class Segment:
     """A database of the spool, for one thread at a time.
 
     `writer` is who brings it to the store, by name; None in segments from before they said so.
+
+    Raises:
+        SpoolUnusable: the file cannot be used, or is not there and was `written` before.
+        Damaged: it is no database, or is empty and was `written` before.
+
     """
 
-    def __init__(self, path: Path, number: int) -> None:
+    def __init__(self, path: Path, number: int, *, written: bool = False) -> None:
         self.path = path
         self.number = number
         self.rows = 0
         self._damaged: list[DamagedRun] | None = None  # as far as anybody has looked
         with translated(path):
+            if written and not path.stat().st_size:  # else SQLite would begin it anew
+                raise Damaged(f"the spool's file {path} is damaged: it is empty")
             path.touch(FILE)  # what SQLite puts beside it is as private as this is
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
             try:

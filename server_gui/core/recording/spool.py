@@ -28,7 +28,7 @@ import msgspec
 from ml.store import durable
 from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import PAGE_BYTES, SUFFIXES, Segment
 from server_gui.core.recording.wal import lost_commits
@@ -87,6 +87,7 @@ class Spool:
         self._reserve_bytes = reserve_bytes
         self._keep_bytes = keep_bytes
         self._free_bytes = free_bytes
+        self.missing: str | None = None  # in words, where files that were there are not any more
         self._lock = _take(folder)
         try:
             with _writing(folder):
@@ -95,6 +96,7 @@ class Spool:
                 self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
                 self.receipts = Receipts(folder / RECEIPTS)
                 self._writers = {self.id}
+                self._settled: set[int] = set()  # numbers of which nothing is to be told any more
                 self._look_at_names()
                 self._look_at_logs()
                 self._heads = self._known_heads()
@@ -177,8 +179,20 @@ class Spool:
         return [number for number in self._all(Kept.WAITING) if number < written]
 
     def read(self, number: int) -> Segment:
-        """A frozen segment; close it after use."""
-        return Segment(self._path(number), number)
+        """A frozen segment; close it after use.
+
+        Raises:
+            Damaged: it cannot be read, or holds nothing: one that holds nothing is never frozen.
+
+        """
+        segment = Segment(self._path(number), number, written=True)
+        try:
+            if not (segment.rows or segment.cut_commits):
+                raise Damaged(f"the spool's file {segment.path} is damaged: what was written to it is gone")
+        except BaseException:
+            segment.close()
+            raise
+        return segment
 
     def uploaded(self, number: int) -> None:
         """The segment is in the store, durably, and has its receipt: it may go when room is needed.
@@ -198,6 +212,48 @@ class Spool:
         """Files that were set aside and are still there."""
         wanted = (Kept.DAMAGED, Kept.CUT)
         return [self._path(number, kept) for number, kept in self._segments() if kept in wanted]
+
+    def untold(self) -> dict[int, str]:
+        """Batches that are lost as a whole, in words, and of which there is no receipt: set aside, or gone.
+
+        Numbers are given one after another, and uploaded segments go oldest first: one that is skipped was
+        a batch, unless its receipt says that it was uploaded.
+        """
+        files = self._own()
+        receipt = self.receipts.newest()
+        kept = [number for number, kept in files if kept is not Kept.DAMAGED]
+        first = min([*kept, *([receipt.batch + 1] if receipt else [])], default=0)
+        aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
+        gone = set(range(first, self._current.number)) - {number for number, _ in files}
+        if found := (aside | gone) - self._settled:
+            self._settled |= found & {each.batch for each in self.receipts.all() if isinstance(each, Receipt)}
+        return {
+            number: f"{self._path(number, Kept.DAMAGED)} was set aside: what batch {number} held is lost"
+            if number in aside
+            else f"batch {number} of the spool {self.folder} is gone: its file is not there, and no receipt "
+            "says that it was uploaded"
+            for number in sorted(found - self._settled)
+        }
+
+    def is_aside(self, number: int) -> bool:
+        """Whether the segment was set aside, and is still there."""
+        return self._path(number, Kept.DAMAGED).exists()
+
+    def told(self, number: int) -> None:
+        """The store knows that this batch is lost."""
+        self._settled.add(number)
+
+    def robots_beside(self, number: int) -> set[str]:
+        """Whose rows a batch that is lost may have had: those that the ones before and after it know."""
+        found: set[str] = set()
+        for beside, kept in self._own():
+            if abs(beside - number) == 1 and kept is not Kept.DAMAGED and beside < self._current.number:
+                with (
+                    contextlib.suppress(SpoolUnusable),
+                    contextlib.closing(Segment(self._path(beside, kept), beside, written=True)) as segment,
+                ):
+                    found |= segment.robots()
+        return found
 
     def backlog_bytes(self) -> int:
         """What waits for upload, with what is being written."""
@@ -292,7 +348,7 @@ class Spool:
         lost = lost_commits(copy.with_name(f"{copy.name}-wal"), PAGE_BYTES)
         with (
             contextlib.suppress(Damaged),  # then it is set aside as a whole
-            contextlib.closing(Segment(self._path(number), number)) as segment,
+            contextlib.closing(Segment(self._path(number), number, written=True)) as segment,
         ):
             if not segment.cut_commits:
                 segment.cut(lost)
@@ -304,14 +360,17 @@ class Spool:
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}
         # Each begins with what the ones before it knew; the newest may have been cut off at its making.
-        for number, kept in self._own()[-2:]:
+        newest = self._own()[-2:]
+        for number, kept in newest:
             if kept is not Kept.DAMAGED:
-                heads |= self._heads_of(number, kept)
+                written = (number, kept) != newest[-1] or _has_log(self._path(number, kept))
+                heads |= self._heads_of(number, kept, written=written)
         return heads
 
-    def _heads_of(self, number: int, kept: Kept) -> dict[str, JournalHead]:
+    def _heads_of(self, number: int, kept: Kept, *, written: bool) -> dict[str, JournalHead]:
         try:
-            with contextlib.closing(Segment(self._path(number, kept), number)) as segment:
+            found = Segment(self._path(number, kept), number, written=written)
+            with contextlib.closing(found) as segment:
                 self._writers.add(segment.writer or self.id)
                 return segment.heads()
         except Damaged as error:
@@ -325,7 +384,11 @@ class Spool:
         receipt = self.receipts.newest()
         known = receipt.batch if receipt else 0
         if known > newest:
-            log.error("files are missing in the spool %s: batch %d was uploaded from it", self.folder, known)
+            self.missing = (
+                f"files are missing in the spool {self.folder}: batch {known} was uploaded from it, and the "
+                f"newest there is {newest}. What was not uploaded of them is lost"
+            )
+            log.error("%s", self.missing)
         if kept is not Kept.WAITING or known > newest:
             return self._begin(max(newest, known) + 1)
         segment = self._begin(newest)
@@ -357,6 +420,11 @@ def _writing(folder: Path) -> Iterator[None]:
     except (sqlite3.Error, OSError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SpoolUnusable(f"the spool {folder} cannot be written: {reason}") from error
+
+
+def _has_log(file: Path) -> bool:
+    log_ = file.with_name(f"{file.name}-wal")
+    return log_.exists() and log_.stat().st_size > 0
 
 
 def _take(folder: Path) -> IO[bytes]:

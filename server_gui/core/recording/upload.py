@@ -10,10 +10,11 @@ from typing import Any, Final
 import msgspec
 import pyarrow as pa
 
-from ml.store.errors import NoSuchTable
+from ml.store.errors import NoSuchTable, translated
 from ml.store.store import Store
-from ml.store.tables import SESSIONS, TABLES, TELEMETRY, Table
+from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
 from server_gui.core.recording import lacking
+from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.gathering import EventKind
@@ -24,6 +25,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.tally import Tally, tallied
 
 _CUT: Final = -(1 << 62)  # the number of its event
+_WHOLE: Final = _CUT - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +50,40 @@ def send(spool: Spool, number: int, store: Store) -> None:
     except Damaged as error:
         aside = spool.set_aside(number)
         text = f"{error}; it is kept as {aside.name}, and is not in the store as a whole"
-        spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
+        _tell(spool, number, text, store)
         raise Damaged(text) from error
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
     if sent.is_damaged:
         aside = spool.set_aside(number)
         raise Damaged(f"{'; '.join(sent.lost)}; {aside.name} is kept, and all else of it is in the store")
     spool.uploaded(number)
+
+
+def lost_batches(spool: Spool, store: Store) -> list[str]:
+    """Tell the store which batches are lost as a whole, each once; in words, those that were told now.
+
+    Raises:
+        StoreError: it is not known whether that is in the store.
+
+    """
+    return [text for number, text in spool.untold().items() if _tell(spool, number, text, store)]
+
+
+def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
+    """An event for each robot whose rows may have been in a batch; False where the store has it already.
+
+    One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
+    """
+    lost = _Lost(_WHOLE, text, tuple(sorted(spool.robots_beside(number))), None, None, {"batch": number})
+    origin = {"spool": f"{spool.id}/lost", "batch": number}
+    now_ns = Moment.now().utc_ns
+    rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
+    again = functools.partial(rows.to_reader, None)
+    new = store.append(EVENTS, EVENTS.name, rows.schema, again, f"{spool.id}/lost.{number}", 1)
+    if spool.is_aside(number):
+        spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
+    spool.told(number)
+    return new
 
 
 def upload(segment: Segment, spool: str, store: Store) -> Sent:
@@ -94,11 +123,12 @@ def ahead(spool: Spool, store: Store) -> list[str]:
     Then somebody has put an older copy of the spool in its place. What is recorded now is kept apart.
     """
     found = []
+    writers = spool.earlier_writers() | _openings(spool, store)
     for location in (*TELEMETRY.locations(store.about.shards), SESSIONS.name):
         with contextlib.suppress(NoSuchTable):
             store.mend(location)
             table = store.table(location)
-            newest = max(table.transaction_version(each) or 0 for each in spool.earlier_writers())
+            newest = max(table.transaction_version(each) or 0 for each in writers)
             if newest >= spool.first:
                 found.append(
                     f"{store.url}/{location} has batch {newest} of the spool {spool.folder}, which had only "
@@ -106,6 +136,16 @@ def ahead(spool: Spool, store: Store) -> list[str]:
                     "files were removed. What was not uploaded of them is lost; what is recorded now is not"
                 )
     return found
+
+
+def _openings(spool: Spool, store: Store) -> set[str]:
+    """What other openings of this spool were called, also those after it was copied: each begins sessions."""
+    with contextlib.suppress(NoSuchTable):
+        store.mend(SESSIONS.name)
+        with translated(f"{store.url}/{SESSIONS.name} cannot be read"):
+            names = store.dataset(SESSIONS.name).to_table(columns=["spool"])["spool"].unique().to_pylist()
+        return {name for name in names if name and name.startswith(f"{spool.id}/")} - {spool.writer}
+    return set()
 
 
 def _telemetry(

@@ -14,7 +14,7 @@ from ml.store.store import Store
 from server_gui.core.recording.compacting import Compacting
 from server_gui.core.recording.errors import Damaged, RecordingError
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import ahead, send
+from server_gui.core.recording.upload import ahead, lost_batches, send
 from server_gui.core.watching import Worker
 
 log = logging.getLogger(__name__)
@@ -35,6 +35,7 @@ class UploaderState:
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
+    lost: tuple[str, ...] = ()  # batches that are lost as a whole, in words
     ahead: tuple[str, ...] = ()  # where the store has what this spool has lost, in words
 
 
@@ -53,7 +54,7 @@ class Uploader:
         wanted: Callable[[], bool] = lambda: True,
         compacting: Compacting | None = None,
     ) -> None:
-        self.state = UploaderState()
+        self.state = UploaderState(lost=(spool.missing,) if spool.missing else ())
         self._spool = spool
         self._connect = connect
         self._wanted = wanted
@@ -122,6 +123,10 @@ class Uploader:
         """Upload what waits; False where that failed."""
         waiting = self._spool.waiting()
         self._tell(waiting)
+        try:
+            self._look(told=asked or self._wanted())
+        except Exception as error:  # noqa: BLE001 - as below
+            return self._failed("what is lost is not told in the store yet", error)
         for done, number in enumerate(waiting, 1):
             if self._ending.is_set() or not (asked or self._wanted()):
                 return True
@@ -133,11 +138,7 @@ class Uploader:
                 self._tell(waiting[done:])
                 continue
             except Exception as error:  # noqa: BLE001 - uploading goes on, whatever a library raises
-                self._store = None
-                problem = str(error) if isinstance(error, KNOWN) else _unknown(error)
-                log.warning("batch %d is not in the store yet: %s", number, problem)
-                self.state = replace(self.state, problem=problem)
-                return False
+                return self._failed(f"batch {number} is not in the store yet", error)
             self._tell(waiting[done:])
             log.info(
                 "batch %d is in the store after %.1f s, %d wait",
@@ -146,6 +147,25 @@ class Uploader:
                 len(waiting) - done,
             )
         return True
+
+    def _look(self, *, told: bool) -> None:
+        """Alarm for batches that are lost as a whole, and have them `told` in the store."""
+        lost = self._spool.untold()
+        for text in lost.values():
+            if text not in self.state.lost:
+                log.error("%s", text)
+                self.state = replace(self.state, lost=(*self.state.lost, text))
+        if lost and told:
+            self._store = self._store or self._reach()
+            lost_batches(self._spool, self._store)
+            self.state = replace(self.state, problem=None)
+
+    def _failed(self, what: str, error: Exception) -> bool:
+        self._store = None
+        problem = str(error) if isinstance(error, KNOWN) else _unknown(error)
+        log.warning("%s: %s", what, problem)
+        self.state = replace(self.state, problem=problem)
+        return False
 
     def _upload(self, number: int) -> None:
         began_s = time.monotonic()

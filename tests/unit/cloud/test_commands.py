@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import socketserver
 import threading
 from collections.abc import Iterator
@@ -60,6 +61,27 @@ def test_sessions_are_listed_also_those_that_wait_for_upload(desk: Desk) -> None
     assert first.session not in desk.run("sessions", "ls", "--robot", "*2")
     assert desk.ask("sessions", "ls", "--to", "2020-01-01") == []
     assert len(desk.ask("sessions", "ls", "--from", "2020-01-01T00:00")) == 2
+
+
+@pytest.mark.parametrize("damage", ["a batch", "the folder"])
+def test_sessions_of_the_store_are_listed_where_the_spool_cannot_be_read(
+    desk: Desk, damage: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored, waiting = desk.record(), desk.record("exo-02", sent=False)
+    if damage == "a batch":
+        file = desk.spool / "00000002.db"
+        assert file.exists()
+        file.write_bytes(b"x" * 20_000)
+        told = "00000002.db is damaged: file is not a database; gwrms cloud upload sets it aside; sessions"
+    else:
+        access = os.access
+        monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.R_OK and access(path, mode))
+        told = f"the spool {desk.spool} cannot be read: it belongs to somebody else; sessions"
+    assert main(["sessions", "ls", "--config", str(desk.config)]) == 1
+    said = capsys.readouterr()
+    assert f"{told} that it alone has are not listed" in said.err
+    assert stored.session in said.out
+    assert waiting.session not in said.out
 
 
 def test_sessions_are_listed_before_anything_was_uploaded(desk: Desk) -> None:
@@ -201,14 +223,21 @@ def test_a_spool_that_another_server_owns_is_left_alone(desk: Desk) -> None:
 
 
 @pytest.fixture
-def collector(desk: Desk) -> Iterator[list[bytes]]:
+def problem() -> str | None:
+    """Why the collector could not upload."""
+    return None
+
+
+@pytest.fixture
+def collector(desk: Desk, problem: str | None) -> Iterator[list[bytes]]:
     """Answers as one that runs on the spool would; what it was asked."""
     asked: list[bytes] = []
+    status = json.dumps({"version": "1", "uploader": {"uploaded": 0, "problem": problem}}).encode() + b"\n"
 
     class Handler(socketserver.StreamRequestHandler):
         def handle(self) -> None:
             asked.append(self.rfile.readline())
-            self.wfile.write(b"3\n")
+            self.wfile.write(b"3\n" if b"upload" in asked[-1] else status)
 
     desk.spool.mkdir(exist_ok=True)
     with socketserver.UnixStreamServer(str(desk.spool / NAME), Handler) as server:
@@ -221,8 +250,17 @@ def collector(desk: Desk) -> Iterator[list[bytes]]:
 
 def test_a_collector_that_runs_is_asked_to_upload(desk: Desk, collector: list[bytes]) -> None:
     assert desk.ask("cloud", "upload") == {"uploaded": 0, "waiting": 3}
-    assert collector == [b'{"ask":"upload"}\n']
+    assert collector == [b'{"ask":"upload"}\n', b'{"ask":"status"}\n']
     assert "owns the spool" in desk.run("cloud", "upload", desk.url, status=1)
+
+
+@pytest.mark.parametrize("problem", ["Permission denied"])
+@pytest.mark.parametrize("command", [("cloud", "upload"), ("collect", "--upload")])
+@pytest.mark.usefixtures("collector")
+def test_a_collector_that_cannot_upload_is_told_with_the_exit_status(
+    desk: Desk, command: tuple[str, ...]
+) -> None:
+    assert "could not the last time: Permission denied" in desk.run(*command, status=1)
 
 
 def test_a_store_moves_to_another_url_and_back_in_parts(desk: Desk, tmp_path: Path) -> None:

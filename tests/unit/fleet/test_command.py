@@ -1,5 +1,8 @@
 """`gwrms collect` as a command: what it refuses, what it says, and that it needs no window."""
 
+import contextlib
+import gc
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +17,7 @@ from server_gui.core.fleet.statistics import LinkStatistics
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings import Upload
+from server_gui.terminal.ending import Ended
 
 HEAVY = ("PySide6", "pyqtgraph", "sklearn", "duckdb")
 
@@ -99,3 +103,32 @@ def test_a_status_says_what_people_ask_first() -> None:
         "exo-01: the link is idle",
     ):
         assert words in text
+
+
+@pytest.mark.parametrize(("untold", "status"), [(0, 0), (7, 1)])
+def test_rows_that_are_lost_and_no_event_tells_are_in_the_exit_status(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    untold: int,
+    status: int,
+) -> None:
+    class Lossy(contextlib.AbstractContextManager["Lossy"]):
+        hangs = False
+
+        def __init__(self, *_: object) -> None:
+            self.untold = untold
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def wait(self, _within_s: float) -> None:
+            raise Ended(signal.SIGTERM)
+
+    monkeypatch.setattr("server_gui.commands.collect.Collector", Lossy)
+    monkeypatch.setattr("server_gui.commands.collect._log_to_stderr", lambda: None)
+    monkeypatch.setattr(gc, "freeze", lambda: None)
+    file = tmp_path / "server.toml"
+    file.write_text(f'[recorder]\nspool = "{tmp_path / "spool"}"\n')
+    assert main.main(["collect", "--config", str(file), "--robot", "exo-01=127.0.0.1:1"]) == status
+    assert ("7 rows are lost, and no event tells of them" in caplog.text) == bool(status)

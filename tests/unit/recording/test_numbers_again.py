@@ -19,6 +19,7 @@ from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, send, upload
+from server_gui.core.recording.uploader import Uploader
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
@@ -106,6 +107,39 @@ def test_an_older_copy_of_a_spool_is_told_and_what_is_recorded_into_it_arrives(
     assert send_all(spool, store) == []
     assert found(store) == Counter([0, 1, 2, *range(10, 15)])
     assert len(set(names(store))) == len(names(store))
+
+
+def test_an_older_copy_is_told_also_where_what_it_lacks_was_recorded_by_a_later_opening(
+    tmp_path: Path, folder_url: str
+) -> None:
+    spool, copy, store = tmp_path / "spool", tmp_path / "copy", Store(folder_url)
+    record(spool, range(3))
+    assert send_all(spool, store) == []
+    shutil.copytree(spool, copy)
+    for first in (3, 6):
+        record(spool, range(first, first + 3))
+    assert send_all(spool, store) == []
+    shutil.rmtree(spool)
+    copy.rename(spool)
+    with Spool(spool, reserve_bytes=0) as opened, Recorder(opened) as recorder:
+        uploader = Uploader(opened, lambda: Store(folder_url))
+        recorder.record("exo-01", 1, batch(20))
+        recorder.cut(lambda: None)
+        assert recorder.flush(30)
+        assert uploader._empty(asked=True)
+        assert f"{HERE} has batch 3 of the spool {spool}, which had only 1" in uploader.state.ahead[0]
+        assert uploader.state.lost == ()
+    assert found(store) == Counter([*range(9), 20])
+
+
+def test_files_that_are_missing_are_an_alarm_of_the_uploader(tmp_path: Path, folder_url: str) -> None:
+    record(tmp_path, range(3))
+    send_all(tmp_path, Store(folder_url))
+    for file in tmp_path.glob("*.db*"):
+        file.unlink()
+    with Spool(tmp_path, reserve_bytes=0) as opened:
+        [told] = Uploader(opened, lambda: Store(folder_url)).state.lost
+    assert f"files are missing in the spool {tmp_path}: batch 1 was uploaded from it" in told
 
 
 def test_a_damaged_batch_that_is_repaired_and_named_back_arrives(tmp_path: Path, folder_url: str) -> None:

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -208,7 +209,7 @@ def test_nobody_waits_for_the_disk_and_an_overflow_is_counted_told_and_recorded(
         assert [alarm.kind for alarm in alarms] == [AlarmKind.OVERFLOW]
         assert len(rows(kept(spool)[0])) == 101
         (event,) = events(spool, "lost")
-        assert json.loads(str(event["data"])) == {"rows": 50}
+        assert json.loads(str(event["data"]))["rows"] == 50
 
 
 def test_however_full_the_queue_is_rows_stay_with_their_session_and_labels_and_events_are_kept(
@@ -290,6 +291,7 @@ def test_a_nearly_full_disk_stops_recording_with_an_alarm_and_it_goes_on_when_th
 ) -> None:
     monkeypatch.setattr("server_gui.core.recording.recorder.AGAIN_S", 0.0)
     free = collections.deque([0])
+    before_ns = time.time_ns() - 10**9  # a row without a clock is taken to have come without delay
     alarms: list[Alarm] = []
     with Spool(tmp_path, reserve_bytes=10, free_bytes=lambda folder: free[0]) as spool:
         with Recorder(spool, alarms.append) as recorder:
@@ -304,11 +306,51 @@ def test_a_nearly_full_disk_stops_recording_with_an_alarm_and_it_goes_on_when_th
         assert [alarm.kind for alarm in alarms] == [AlarmKind.DISK_FULL]
         runs, records = kept(spool)
         assert [row[3] for row in rows(runs)] == [1]
-        assert json.loads(str(events(spool, "lost")[0]["data"])) == {"rows": 2}
+        [event] = events(spool, "lost")
+        data = json.loads(str(event["data"]))
+        assert data["rows"] == 2
+        assert before_ns <= data["from"] <= data["to"] <= time.time_ns()
+        assert f"1 row of telemetry, session {event['session']}, 20" in str(event["text"])
+        assert "1 row of sessions, 20" in str(event["text"])
         # The session that began while nothing was kept is written again, before its first row and its end.
         told = [record.fields for record in records if record.table == "sessions"]
         assert [each["session"] for each in told] == [runs[0].session] * 2
         assert [each["ended"] is None for each in told] == [True, False]
+
+
+def test_where_there_is_never_room_the_log_says_at_the_end_all_that_was_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("server_gui.core.recording.recorder.AGAIN_S", 0.0)
+    with Spool(tmp_path, reserve_bytes=10, free_bytes=lambda folder: 0) as spool:
+        with Recorder(spool) as recorder:
+            for seq in range(9):
+                recorder.record("exo-01", 1, batch(seq, 3))
+                assert recorder.flush(WAIT_S)
+        assert recorder.untold == recorder.state.lost > 27
+    said = [text for text in caplog.messages if "is nearly full; lost: exo-01: " in text]
+    assert any("27 rows of telemetry, session " in text for text in said)
+
+
+def test_what_an_event_of_a_loss_was_to_tell_is_named_where_that_is_lost_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("server_gui.core.recording.recorder.AGAIN_S", 0.0)
+    monkeypatch.setattr("server_gui.core.recording.recorder.LAST_S", 0.0)
+    free = collections.deque([0])
+    with Spool(tmp_path, reserve_bytes=10, free_bytes=lambda folder: free[0]) as spool:
+        with Recorder(spool) as recorder:
+            recorder.record("exo-01", 1, batch(0, 3))
+            assert recorder.flush(WAIT_S)
+            monkeypatch.setattr(spool, "append", _refuses)
+            free[0] = 10
+            recorder.record("exo-01", 1, batch(1, 4))
+        assert recorder.untold >= 7
+    assert any("the disk refuses; lost: exo-01: 7 rows of telemetry" in text for text in caplog.messages)
+
+
+def _refuses(*_: object) -> None:
+    raise SpoolUnusable("the disk refuses")
 
 
 def test_a_batch_is_frozen_when_it_is_long_enough(spool: Spool) -> None:
@@ -464,5 +506,5 @@ def test_the_flood_of_one_robot_takes_no_room_from_another_and_is_told_in_its_ow
             spool.let_go.set()
             assert recorder.flush(WAIT_S)
         (event,) = events(spool, "lost")
-        assert (event["robot"], json.loads(str(event["data"]))) == ("bad", {"rows": 450})
+        assert (event["robot"], json.loads(str(event["data"]))["rows"]) == ("bad", 450)
         assert len(rows(kept(spool)[0])) == 100
