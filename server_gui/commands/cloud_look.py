@@ -84,7 +84,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     except NoSuchTable as error:
         if not (sent := checks.sent_to(url(arguments), mine)):
             raise
-        return _verdict(arguments, 0, [f"{error}, but {sent} batches of the spool {mine} went there"], "")
+        return _verdict(arguments, [f"{error}, but {sent} batches of the spool {mine} went there"])
     found = checks.whole(
         store,
         mine,
@@ -92,15 +92,36 @@ def _verify(arguments: argparse.Namespace) -> int:
         values=not arguments.quick,
         deep=arguments.deep,
     )
-    return _verdict(arguments, len(found.files), found.problems, f"{store.url} is whole: {found.text}\n")
+    return _verdict(arguments, found.problems, found, f"{store.url} is whole: {found.text}\n")
 
 
-def _verdict(arguments: argparse.Namespace, files: int, problems: Sequence[str], whole: str) -> int:
+def _verdict(
+    arguments: argparse.Namespace,
+    problems: Sequence[str],
+    found: checks.Verdict | None = None,
+    whole: str = "",
+) -> int:
     if arguments.json:
-        say_json({"files": files, "problems": problems, "looked": True})
+        say_json({"problems": problems, "looked": True} | _counts(found))
     else:
-        say("".join(f"{problem}\n" for problem in problems) or whole)
+        more = () if found is None else filter(None, (*found.notes, found.unproven))
+        say("".join(f"{each}\n" for each in problems) or whole)
+        say("".join(f"{each}\n" for each in more))
     return NOT_WHOLE if problems else 0
+
+
+def _counts(found: checks.Verdict | None) -> dict[str, object]:
+    """How much was looked at, and how much of that is proven."""
+    if found is None:
+        return {"files": 0, "rows": 0, "rows_proven": 0, "batches": 0, "receipts": 0, "notes": ()}
+    return {
+        "files": len(found.files),
+        "rows": found.rows,
+        "rows_proven": found.proof.rows,
+        "batches": found.proof.batches,
+        "receipts": found.proof.here,
+        "notes": found.notes,
+    }
 
 
 def _show(

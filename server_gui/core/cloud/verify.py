@@ -1,6 +1,6 @@
 """Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
 
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -31,11 +31,23 @@ class Verdict:
     files: Sequence[DataFile]
     proof: Proof
     problems: Sequence[str]
+    notes: Sequence[str] = ()  # what is not wrong, and worth knowing
+
+    @property
+    def rows(self) -> int:
+        """In the newest versions of the tables."""
+        return sum(file.rows for file in self.files)
+
+    @property
+    def unproven(self) -> str:
+        """How many rows no receipt speaks of, in words; nothing where there is none."""
+        rows = self.rows - self.proof.rows
+        return f"{rows} of {self.rows} rows are proven by no receipt here" if rows > 0 else ""
 
     @property
     def text(self) -> str:
         """What is whole, and how far that is proven."""
-        rows = sum(file.rows for file in self.files)
+        rows = self.rows
         size_bytes = sum(file.size_bytes for file in self.files)
         told = [f"{len(self.files)} files with {rows} rows, {size(size_bytes)}"]
         if self.proof.batches:
@@ -141,14 +153,17 @@ def _decoded(store: Store, file: DataFile) -> int:
 
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
-    """The spool's batches that were set aside, are nowhere, or are marked as uploaded and not in the store.
+    """The spool's batches that were set aside, are nowhere, or have no receipt though they were uploaded.
 
     Of those with a receipt `prove` knows more.
     """
     receipts = [each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt)]
     yield from _set_aside(spool, receipts)
+    copies, problems = _copies(spool, {(each.writer, each.batch) for each in receipts})
     yield from _nowhere(spool, receipts)
-    yield from _unknown(store, spool, {(each.writer, each.batch) for each in receipts})
+    yield from problems
+    yield from _without_receipt(spool, copies)
+    yield from _unknown(store, spool, copies)
 
 
 def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
@@ -162,21 +177,64 @@ def _nowhere(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
     """Numbers are given one after another: one that is skipped was a batch."""
     there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
     known = there | {each.batch for each in receipts}
-    first = min((each.batch for each in receipts), default=0)
+    if not receipts and there and min(there) > 1 and _has_name(spool, min(there)):
+        yield (
+            f"{spool / RECEIPTS} is not there, though the spool had {told_batches(range(1, min(there)))}: "
+            "bring it back from a copy; without it nobody can say whether their rows are in the store"
+        )
+    first = min((each.batch for each in receipts), default=min(there, default=1))
     for number in sorted(set(range(first, max(known, default=0))) - known):
         yield f"batch {number} of the spool {spool} is nowhere: no receipt says that it was uploaded"
 
 
-def _unknown(store: Store, spool: Path, known_batches: Set[tuple[str, int]]) -> Iterator[str]:
-    known: dict[tuple[str, str], int] = {}
+def _has_name(spool: Path, number: int) -> bool:
+    """Whether a batch was made since there are receipts."""
+    try:
+        return spooled.writer(spool, number) != spooled.identity(spool)
+    except SpoolUnusable:
+        return False
+
+
+def _copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
+    """The second copies that have no receipt, and which cannot be read."""
+    found, problems = [], []
     for number in spooled.uploaded(spool):
         try:
             batch = spooled.batch(spool, number)
         except SpoolUnusable as error:
-            yield str(error)
+            problems.append(str(error))
             continue
-        if (batch.writer, batch.number) in known_batches:
-            continue
+        if (batch.writer, batch.number) not in known:
+            found.append(batch)
+    return found, problems
+
+
+def _without_receipt(spool: Path, copies: Sequence[spooled.Batch]) -> Iterator[str]:
+    """Each had one before it was called uploaded; but for those from before there were any."""
+    own = spooled.identity(spool)
+    numbers = [batch.number for batch in copies if batch.writer != own]
+    if numbers:
+        yield (
+            f"{spool / RECEIPTS} has no receipt of {told_batches(numbers)}, which went to a store: "
+            "bring that file back from a copy, or end the collector and run gwrms cloud mend"
+        )
+
+
+def told_batches(numbers: Iterable[int]) -> str:
+    """Numbers of batches in words, those that follow each other together."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    told = ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs)
+    return f"batch {told}" if len(runs) == 1 and len(runs[0]) == 1 else f"the batches {told}"
+
+
+def _unknown(store: Store, spool: Path, copies: Sequence[spooled.Batch]) -> Iterator[str]:
+    known: dict[tuple[str, str], int] = {}
+    for batch in copies:
         for location in _locations(store, batch):
             if (location, batch.writer) not in known:
                 known[location, batch.writer] = _newest(store, location, batch.writer)

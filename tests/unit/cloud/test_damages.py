@@ -7,6 +7,7 @@ import sqlite3
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -49,6 +50,16 @@ class Place:
         """The exit status, and all that was said of problems."""
         status = main(["cloud", "verify", "--json", *words, "--config", str(self._config)])
         return status, "\n".join(json.loads(self._capsys.readouterr().out)["problems"])
+
+    def ask(self) -> dict[str, Any]:
+        main(["cloud", "verify", "--json", "--config", str(self._config)])
+        found: dict[str, Any] = json.loads(self._capsys.readouterr().out)
+        return found
+
+    def told(self, *words: str) -> str:
+        main(["cloud", *(words or ("verify",)), "--config", str(self._config)])
+        said = self._capsys.readouterr()
+        return said.out + said.err
 
     def files(self, location: str = "telemetry/000") -> list[Path]:
         return sorted((self.store / location).rglob("*.parquet"))
@@ -161,6 +172,26 @@ def receipt_removed(place: Place) -> None:
     file.write_text("".join(lines[:1] + lines[2:]))
 
 
+def receipts_cut_off(place: Place) -> None:
+    file = place.spool / RECEIPTS
+    file.write_text("".join(file.read_text().splitlines(keepends=True)[:1]))
+
+
+def receipts_deleted(place: Place) -> None:
+    (place.spool / RECEIPTS).unlink()
+
+
+def receipts_and_second_copies_deleted(place: Place) -> None:
+    receipts_deleted(place)
+    for file in place.spool.glob("0*.uploaded.db*"):
+        file.unlink()
+
+
+def receipts_deleted_and_collected_on(place: Place) -> None:
+    receipts_deleted(place)
+    record(place.url, place.spool)
+
+
 def segment_damaged(place: Place) -> None:
     with Spool(place.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:
@@ -200,6 +231,10 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (store_missing, "3 batches of the spool"),
     (receipt_altered, f"line 1 of the spool's {RECEIPTS} is not as it was written"),
     (receipt_removed, f"line 2 of the spool's {RECEIPTS} is not as it was written"),
+    (receipts_cut_off, f"{RECEIPTS} has no receipt of the batches 2 to 3, which went to a store"),
+    (receipts_deleted, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
+    (receipts_and_second_copies_deleted, f"{RECEIPTS} is not there, though the spool had the batches 1 to 3"),
+    (receipts_deleted_and_collected_on, f"{RECEIPTS} has no receipt of the batches 1 to 3"),
     (segment_damaged, "00000004.damaged.db was set aside: 5 rows of exo-01, stream 1 from notification 7 on"),
     (segment_unreadable, "00000004.damaged.db was set aside: what batch 4 held is not in the store"),
     (segment_removed, "batch 4 of the spool"),
@@ -212,6 +247,20 @@ def test_each_damage_is_found_and_named(place: Place, damage: Callable[[Place], 
     status, problems = place.verify()
     assert status == 1
     assert told in problems
+
+
+def test_there_is_no_batch_0(place: Place) -> None:
+    receipts_and_second_copies_deleted(place)
+    assert "batch 0 " not in place.verify()[1]
+
+
+def test_what_no_receipt_proves_is_counted_on_a_line_of_its_own(place: Place) -> None:
+    shutil.rmtree(place.spool)
+    record(place.url, place.spool)
+    told = place.ask()
+    assert (told["problems"], told["batches"], told["receipts"]) == ([], 1, 1)
+    assert (told["rows"], told["rows_proven"]) == (420, 105)
+    assert place.told().splitlines()[-1] == "315 of 420 rows are proven by no receipt here"
 
 
 def test_a_store_is_whole_however_its_files_were_put_together(place: Place) -> None:
