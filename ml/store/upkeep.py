@@ -104,9 +104,24 @@ def unpin(store: Store, location: str, version: int, by: str) -> None:
 
 
 def pins(store: Store) -> list[Pin]:
-    """Every version that somebody names."""
-    found = (store.objects.read(name) for name in store.objects.names(_PINS))
-    return [msgspec.json.decode(data, type=Pin) for data in found if data is not None]
+    """Every version that somebody names.
+
+    Raises:
+        StoreError: one of these objects cannot be read, so nobody knows which version it keeps.
+
+    """
+    found = ((name, store.objects.read(name)) for name in store.objects.names(_PINS))
+    return [_pin(store, name, data) for name, data in found if data is not None]
+
+
+def _pin(store: Store, name: str, data: bytes) -> Pin:
+    try:
+        return msgspec.json.decode(data, type=Pin)
+    except msgspec.DecodeError as error:
+        raise StoreError(
+            f"{store.url}/{name} is damaged: bring it back from a copy of the store; it says which version "
+            "of a table a model needs"
+        ) from error
 
 
 def compact(

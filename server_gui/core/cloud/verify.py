@@ -12,10 +12,11 @@ import pyarrow.parquet as pq
 from gateway.cli.text import size
 from ml.store import reading
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
-from ml.store.fragments import DataFile
+from ml.store.fragments import DataFile, data_files
 from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
+from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.proving import Advance, Proof, prove
 from server_gui.core.recording.errors import SpoolUnusable
@@ -82,8 +83,12 @@ def whole(
         Receipts(spool / RECEIPTS).all()
     )  # before the files: what is sent meanwhile is not missed
     found, problems = _look(store)
-    with expect(2 * len(found)) as advance:
+    pinned, unreadable = _pinned(store, found)
+    problems += unreadable
+    with expect(2 * len(found) + len(pinned)) as advance:
         problems += damages(store, found, advance, deep=deep)
+        for named, files_ in pinned.items():
+            problems += (f"{each} ({_needed(named)})" for each in damages(store, files_, advance, deep=deep))
         proof = prove(store, receipts, found, advance, values=values)
     problems += proof.problems
     if proof.here or not proof.elsewhere:
@@ -109,6 +114,37 @@ def _look(store: Store) -> tuple[list[DataFile], list[str]]:
         except StoreError as error:
             problems.append(str(error))
     return found, problems
+
+
+def _pinned(store: Store, newest: Sequence[DataFile]) -> tuple[dict[Pin, list[DataFile]], list[str]]:
+    """The files that only a pinned version needs, and which of these cannot be read."""
+    known = {(file.location, file.path) for file in newest}
+    found: dict[Pin, list[DataFile]] = {}
+    problems = []
+    try:
+        all_pins = pins(store)
+    except (StoreUnreachable, StoreRefused):
+        raise
+    except StoreError as error:
+        return {}, [str(error)]
+    for named in all_pins:
+        try:
+            delta = store.table(named.location, named.version)
+            mine = [
+                file for file in data_files(delta, named.location) if (file.location, file.path) not in known
+            ]
+        except (StoreUnreachable, StoreRefused):
+            raise
+        except StoreError as error:
+            problems.append(f"{error} ({_needed(named)})")
+            continue
+        known |= {(file.location, file.path) for file in mine}
+        found[named] = mine
+    return found, problems
+
+
+def _needed(named: Pin) -> str:
+    return f"needed by version {named.version}, which {named.by} names"
 
 
 def files(store: Store) -> list[DataFile]:

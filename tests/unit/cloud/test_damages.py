@@ -17,7 +17,7 @@ import pytest
 from gateway.main import main
 from ml.store import Store
 from ml.store.tables import RESOURCES, TABLES, TELEMETRY
-from ml.store.upkeep import compact, retain, vacuum
+from ml.store.upkeep import compact, pin, retain, vacuum
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.recorder import Recorder
@@ -172,6 +172,27 @@ def receipt_removed(place: Place) -> None:
     file.write_text("".join(lines[:1] + lines[2:]))
 
 
+def pinned_file_deleted(place: Place) -> None:
+    store = Store(place.url)
+    pin(store, "events", store.table("events").version(), "walking-1")
+    [only, *_] = place.files("events")
+    compact(store)
+    only.unlink()
+
+
+def pin_damaged(place: Place) -> None:
+    store = Store(place.url)
+    pin(store, "telemetry/000", 1, "walking-1")
+    [file] = (place.store / "pins").iterdir()
+    file.write_text("{")
+
+
+def pinned_version_gone(place: Place) -> None:
+    (place.store / "pins").mkdir()
+    named = {"location": "telemetry/000", "version": 77, "by": "walking-1"}
+    (place.store / "pins" / "1.json").write_text(json.dumps(named))
+
+
 def receipts_cut_off(place: Place) -> None:
     file = place.spool / RECEIPTS
     file.write_text("".join(file.read_text().splitlines(keepends=True)[:1]))
@@ -231,6 +252,9 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (store_missing, "3 batches of the spool"),
     (receipt_altered, f"line 1 of the spool's {RECEIPTS} is not as it was written"),
     (receipt_removed, f"line 2 of the spool's {RECEIPTS} is not as it was written"),
+    (pinned_file_deleted, "is not there: 2 rows are lost (needed by version 3, which walking-1 names)"),
+    (pinned_version_gone, "(needed by version 77, which walking-1 names)"),
+    (pin_damaged, "is damaged: bring it back from a copy of the store"),
     (receipts_cut_off, f"{RECEIPTS} has no receipt of the batches 2 to 3, which went to a store"),
     (receipts_deleted, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
     (receipts_and_second_copies_deleted, f"{RECEIPTS} is not there, though the spool had the batches 1 to 3"),
