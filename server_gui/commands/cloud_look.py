@@ -81,10 +81,10 @@ def _verify(arguments: argparse.Namespace) -> int:
     mine = spool(arguments)
     try:
         store = reach(arguments)
-    except NoSuchTable as error:
-        if not (sent := checks.sent_to(url(arguments), mine)):
+    except NoSuchTable:
+        if not checks.sent_to(url(arguments), mine):
             raise
-        return _verdict(arguments, [f"{error}, but {sent} batches of the spool {mine} went there"])
+        return _verdict(arguments, [checks.no_store(url(arguments), mine)])
     found = checks.whole(
         store,
         mine,

@@ -1,5 +1,6 @@
 """Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
@@ -10,7 +11,7 @@ from typing import Final
 import pyarrow.parquet as pq
 
 from gateway.cli.text import size
-from ml.store import reading
+from ml.store import mending, reading
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
 from ml.store.fragments import DataFile, data_files
 from ml.store.sessions import footer
@@ -18,7 +19,7 @@ from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spooled
-from server_gui.core.cloud.proving import Advance, Proof, prove
+from server_gui.core.cloud.proving import Advance, Batch, Proof, prove
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 
@@ -79,10 +80,8 @@ def whole(
         StoreUnreachable, StoreRefused: it could not be looked.
 
     """
-    receipts = list(
-        Receipts(spool / RECEIPTS).all()
-    )  # before the files: what is sent meanwhile is not missed
-    found, problems = _look(store)
+    receipts = list(Receipts(spool / RECEIPTS).all())  # before the files: what is sent meanwhile counts
+    found, problems = look(store)
     pinned, unreadable = _pinned(store, found)
     problems += unreadable
     with expect(2 * len(found) + len(pinned)) as advance:
@@ -93,7 +92,31 @@ def whole(
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
-    return Verdict(found, proof, list(dict.fromkeys(problems)))
+    return Verdict(found, proof, list(dict.fromkeys(problems)), [*_notes(store, spool, proof)])
+
+
+def _notes(store: Store, spool: Path, proof: Proof) -> Iterator[str]:
+    """What can be done about it, and what was done."""
+    again = [number for number, batch in second_copies(spool).items() if batch in proof.lacking]
+    if again:
+        yield (
+            f"the spool still has a second copy of {told_batches(again)}: end the collector and run gwrms "
+            "cloud mend, which brings what is missing of it"
+        )
+    if gone := mending.taken_out(store):
+        yield (
+            f"{sum(each.rows for each in gone)} rows in {len(gone)} files were taken out of tables by gwrms "
+            f"cloud mend ({store.url}/mended says which); what receipts here prove is there again"
+        )
+
+
+def second_copies(spool: Path) -> dict[int, Batch]:
+    """By which name the spool's second copies went to the store; without those that cannot be read."""
+    found = {}
+    for number in spooled.uploaded(spool):
+        with contextlib.suppress(SpoolUnusable):
+            found[number] = (spooled.writer(spool, number), number)
+    return found
 
 
 def sent_to(url: str, spool: Path) -> int:
@@ -102,7 +125,16 @@ def sent_to(url: str, spool: Path) -> int:
     return len({(each.writer, each.batch) for each in known if each.url == url})
 
 
-def _look(store: Store) -> tuple[list[DataFile], list[str]]:
+def no_store(url: str, spool: Path) -> str:
+    """That a store is no more to which batches of the spool went."""
+    return (
+        f"there is no store at {url} any more, though {sent_to(url, spool)} batches of the spool {spool} "
+        "went there: bring it back (its store.json too), or end the collector and run gwrms cloud mend: "
+        "that makes it anew of the spool's second copies"
+    )
+
+
+def look(store: Store) -> tuple[list[DataFile], list[str]]:
     """Every file of the newest versions, and which tables' logs cannot be read."""
     found: list[DataFile] = []
     problems = []
@@ -157,6 +189,16 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
 
     Each file's footer is read, and with `deep` every value.
     """
+    return filter(None, _each(store, wanted, advance, deep=deep))
+
+
+def broken(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> list[DataFile]:
+    """Which of these files are absent, cut off or unreadable."""
+    told = _each(store, wanted, advance, deep=deep)
+    return [file for file, problem in zip(wanted, told, strict=True) if problem]
+
+
+def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> Iterator[str | None]:
     sizes = {found.path: found.size_bytes for found in store.objects.listing()}
 
     def check(file: DataFile) -> str | None:
@@ -165,13 +207,13 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
         return problem
 
     with ThreadPoolExecutor(AT_ONCE, "verify") as pool:
-        yield from filter(None, pool.map(check, wanted))
+        yield from pool.map(check, wanted)
 
 
 def _damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) -> str | None:
     name = f"{store.url}/{file.location}/{file.path}"
     if size_bytes is None:
-        return f"{name} is not there: {file.rows} rows are lost"
+        return f"{name} is not there, with {file.rows} rows"
     if size_bytes != file.size_bytes:
         return f"{name} has {size_bytes} bytes instead of {file.size_bytes}"
     try:
@@ -195,11 +237,11 @@ def batches_missing(store: Store, spool: Path) -> Iterator[str]:
     """
     receipts = [each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt)]
     yield from _set_aside(spool, receipts)
-    copies, problems = _copies(spool, {(each.writer, each.batch) for each in receipts})
+    unproven, problems = copies(spool, {(each.writer, each.batch) for each in receipts})
     yield from _nowhere(spool, receipts)
     yield from problems
-    yield from _without_receipt(spool, copies)
-    yield from _unknown(store, spool, copies)
+    yield from _without_receipt(spool, unproven)
+    yield from _unknown(store, spool, unproven)
 
 
 def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
@@ -231,7 +273,7 @@ def _has_name(spool: Path, number: int) -> bool:
         return False
 
 
-def _copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
+def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
     """The second copies that have no receipt, and which cannot be read."""
     found, problems = [], []
     for number in spooled.uploaded(spool):
@@ -245,10 +287,10 @@ def _copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batc
     return found, problems
 
 
-def _without_receipt(spool: Path, copies: Sequence[spooled.Batch]) -> Iterator[str]:
+def _without_receipt(spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
     """Each had one before it was called uploaded; but for those from before there were any."""
     own = spooled.identity(spool)
-    numbers = [batch.number for batch in copies if batch.writer != own]
+    numbers = [batch.number for batch in unproven if batch.writer != own]
     if numbers:
         yield (
             f"{spool / RECEIPTS} has no receipt of {told_batches(numbers)}, which went to a store: "
@@ -268,9 +310,9 @@ def told_batches(numbers: Iterable[int]) -> str:
     return f"batch {told}" if len(runs) == 1 and len(runs[0]) == 1 else f"the batches {told}"
 
 
-def _unknown(store: Store, spool: Path, copies: Sequence[spooled.Batch]) -> Iterator[str]:
+def _unknown(store: Store, spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
     known: dict[tuple[str, str], int] = {}
-    for batch in copies:
+    for batch in unproven:
         for location in _locations(store, batch):
             if (location, batch.writer) not in known:
                 known[location, batch.writer] = _newest(store, location, batch.writer)

@@ -236,7 +236,7 @@ def segment_removed(place: Place) -> None:
 
 
 DAMAGES: list[tuple[Callable[[Place], None], str]] = [
-    (file_deleted, "is not there: 100 rows are lost"),
+    (file_deleted, "is not there, with 100 rows"),
     (file_cut_off, "bytes instead of"),
     (file_doubled, "100 rows more than the 100 that were sent: doubled (batch"),
     (row_removed, "1 of 100 rows are missing (batch 3 of "),
@@ -252,7 +252,7 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (store_missing, "3 batches of the spool"),
     (receipt_altered, f"line 1 of the spool's {RECEIPTS} is not as it was written"),
     (receipt_removed, f"line 2 of the spool's {RECEIPTS} is not as it was written"),
-    (pinned_file_deleted, "is not there: 2 rows are lost (needed by version 3, which walking-1 names)"),
+    (pinned_file_deleted, "is not there, with 2 rows (needed by version 3, which walking-1 names)"),
     (pinned_version_gone, "(needed by version 77, which walking-1 names)"),
     (pin_damaged, "is damaged: bring it back from a copy of the store"),
     (receipts_cut_off, f"{RECEIPTS} has no receipt of the batches 2 to 3, which went to a store"),
