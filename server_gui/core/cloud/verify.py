@@ -81,14 +81,18 @@ def whole(
 
     """
     receipts = list(Receipts(spool / RECEIPTS).all())  # before the files: what is sent meanwhile counts
-    found, problems = look(store)
-    pinned, unreadable = _pinned(store, found)
-    problems += unreadable
+    found, unreadable = look(store)
+    problems = list(unreadable.values())
+    pinned, gone = _pinned(store, found)
+    problems += gone
     with expect(2 * len(found) + len(pinned)) as advance:
-        problems += damages(store, found, advance, deep=deep)
+        told = list(_each(store, found, advance, deep=deep))
+        problems += filter(None, told)
         for named, files_ in pinned.items():
             problems += (f"{each} ({_needed(named)})" for each in damages(store, files_, advance, deep=deep))
-        proof = prove(store, receipts, found, advance, values=values)
+        sound = [file for file, problem in zip(found, told, strict=True) if problem is None]
+        advance(len(found) - len(sound))
+        proof = prove(store, receipts, sound, advance, values=values, unknown=unreadable.keys())
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
@@ -134,17 +138,19 @@ def no_store(url: str, spool: Path) -> str:
     )
 
 
-def look(store: Store) -> tuple[list[DataFile], list[str]]:
-    """Every file of the newest versions, and which tables' logs cannot be read."""
+def look(store: Store) -> tuple[list[DataFile], dict[str, str]]:
+    """Every file of the newest versions; which tables' logs cannot be read, and why."""
     found: list[DataFile] = []
-    problems = []
-    for table in TABLES.values():
+    problems = {}
+    for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
         try:
-            found += reading.files(store, table)
+            found += data_files(store.table(location), location)
         except (StoreUnreachable, StoreRefused):
             raise
+        except NoSuchTable:
+            continue
         except StoreError as error:
-            problems.append(str(error))
+            problems[location] = str(error)
     return found, problems
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import shutil
 import sqlite3
 from collections.abc import Callable
@@ -60,6 +61,11 @@ class Place:
         main(["cloud", *(words or ("verify",)), "--config", str(self._config)])
         said = self._capsys.readouterr()
         return said.out + said.err
+
+    def rename_back(self, *batches: str) -> None:
+        """As if they had not been uploaded yet."""
+        for batch_ in batches:
+            (self.spool / f"{batch_}.uploaded.db").rename(self.spool / f"{batch_}.db")
 
     def files(self, location: str = "telemetry/000") -> list[Path]:
         return sorted((self.store / location).rglob("*.parquet"))
@@ -146,6 +152,14 @@ def log_rolled_back(place: Place) -> None:
 
 def log_entry_missing(place: Place) -> None:
     place.log()[1].unlink()
+
+
+def first_log_entry_missing(place: Place) -> None:
+    place.log()[0].unlink()
+
+
+def log_missing(place: Place) -> None:
+    shutil.rmtree(place.log()[0].parent)
 
 
 def table_missing(place: Place) -> None:
@@ -247,6 +261,11 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (event_altered, "/events: the 2 rows are not as they were sent: altered (batch"),
     (log_rolled_back, "/telemetry/000: 100 of 100 rows are missing (batch 3 of "),
     (log_entry_missing, "/telemetry/000"),
+    (
+        first_log_entry_missing,
+        "00000000000000000000.json is missing, and was whole once: bring this file back",
+    ),
+    (log_missing, "/telemetry/000 has files and no _delta_log"),
     (table_missing, "/labels: 1 of 1 rows are missing (batch 1 of "),
     (table_begun_anew, "/telemetry/000: 100 of 100 rows are missing (batch 2 of "),
     (store_missing, "3 batches of the spool"),
@@ -271,6 +290,20 @@ def test_each_damage_is_found_and_named(place: Place, damage: Callable[[Place], 
     status, problems = place.verify()
     assert status == 1
     assert told in problems
+
+
+@pytest.mark.parametrize("damage", [log_entry_missing, first_log_entry_missing, log_missing])
+def test_where_a_log_is_damaged_the_log_alone_is_named(place: Place, damage: Callable[[Place], None]) -> None:
+    damage(place)
+    assert len(place.verify()[1].splitlines()) == 1
+    assert "telemetry/000" in place.told("compact")
+    assert "telemetry/000" in place.told("upload") or place.verify()[0] == 1
+
+
+def test_a_missing_file_is_named_once(place: Place) -> None:
+    file_deleted(place)
+    name = place.verify()[1].partition(" is not there")[0].rpartition("/")[2]
+    assert place.verify()[1].count(name) == 1
 
 
 def test_there_is_no_batch_0(place: Place) -> None:
@@ -341,3 +374,34 @@ def test_where_nobody_can_look_the_exit_status_says_so(place: Place, tmp_path: P
     assert main(["cloud", "verify", "--config", str(tmp_path / "nothing.toml")]) == 2
     (place.store / "store.json").write_text("{")
     assert place.verify()[0] == 2
+
+
+def test_vacuum_tells_of_files_that_were_there_and_are_not(place: Place) -> None:
+    store = Store(place.url)
+    compact(store)
+    [gone, *_] = [file for file in place.files("events") if len(pq.read_table(file, partitioning=None)) == 2]
+    gone.unlink()
+    before = set(store.objects.names(""))
+    told = vacuum(store, grace=timedelta(0), dry_run=True)
+    assert vacuum(store, grace=timedelta(0)) == told
+    parquet = {name for name in before - set(store.objects.names("")) if name.endswith(".parquet")}
+    assert parquet == set(told) != set()
+
+
+def test_whoever_meets_a_missing_file_is_told_what_helps(place: Place) -> None:
+    file_deleted(place)
+    said = place.told("compact") + place.told("mend", "--dry-run")
+    place.rename_back("00000001", "00000002", "00000003")
+    upload = place.told("upload")
+    assert "is not there; bring it back from a copy, or let gwrms cloud mend take it out" in upload
+    assert "errno" not in said + upload
+    place.told("mend")
+    assert "nothing waits" in place.told("upload")
+    assert place.verify() == (0, "")
+
+
+def test_a_store_that_cannot_be_written_is_refused_in_words(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert "cannot be written: run this as whom it belongs to" in place.told("compact")
