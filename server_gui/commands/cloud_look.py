@@ -20,7 +20,7 @@ VERIFY: Final = (
     "sent is there once and as it was sent."
 )
 VERIFY_EPILOG: Final = """Exit status 0: whole. 1: not whole, and each line names what is missing, doubled
-or altered. 2: it could not be looked: no store there, or not reached. What was sent is known from the spool's
+or altered. 2: it could not look: no store there, or not reached. What was sent is known from the spool's
 receipts; where there are none, files alone are checked, and it says so. It reads all that has a receipt."""
 NOT_WHOLE: Final = 1
 NOT_LOOKED: Final = 2
@@ -67,6 +67,7 @@ def verify(argv: list[str]) -> int:
     how = made.add_mutually_exclusive_group()
     how.add_argument("--quick", action="store_true", help="count the rows, and compare no values")
     how.add_argument("--deep", action="store_true", help="read every value, also of what has no receipt here")
+    made.add_argument("--quiet", action="store_true", help="say nothing where it is whole, as for cron")
     arguments = made.parse_args(argv)
     try:
         return _verify(arguments)
@@ -103,7 +104,7 @@ def _verdict(
 ) -> int:
     if arguments.json:
         say_json({"problems": problems, "looked": True} | _counts(found))
-    else:
+    elif problems or not arguments.quiet:
         more = () if found is None else filter(None, (*found.notes, found.unproven))
         say("".join(f"{each}\n" for each in problems) or whole)
         say("".join(f"{each}\n" for each in more))

@@ -5,6 +5,7 @@ import functools
 from collections.abc import Sequence
 from pathlib import Path
 
+from gateway.cli.reach import ask
 from gateway.cli.text import say, say_json, warn
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore
 from ml.store.objects import Objects
@@ -25,6 +26,9 @@ it held. Then each batch of which rows are missing, or that has no receipt, is b
 copy; what is there already stays as it is. Where the whole store is gone, it is made anew. Interrupted, the
 same command goes on.
 
+With --accept-loss what then is still missing, doubled or altered is told no more: new receipts say what is
+there. The old ones stay.
+
 Exit status 0: all of it done, gwrms cloud verify tells whether the store is whole then. 1: rows are still
 missing, and it says of which batches."""
 
@@ -37,6 +41,8 @@ def mend(argv: list[str]) -> int:
     made.add_argument(
         "--alone", action="store_true", help="no other server runs: for a store that keeps no two apart"
     )
+    made.add_argument("--accept-loss", action="store_true", help="then count what is there as what was sent")
+    made.add_argument("--yes", action="store_true", help="do not ask")
     arguments = made.parse_args(argv)
     folder = load(arguments.config).recorder.spool
     if not folder.is_dir():
@@ -48,6 +54,12 @@ def mend(argv: list[str]) -> int:
         if not arguments.dry_run:
             with progress("mending", len(found.files) + len(found.batches)) as advance:
                 problems = mending.mend(store, spool, found, advance)
+            if arguments.accept_loss and ask(
+                "count what is there as what was sent, also where rows are missing, doubled or altered?",
+                yes=arguments.yes,
+            ):
+                mending.accept(store, spool, functools.partial(progress, "looking"))
+                problems = []
     return _tell(arguments, found, problems)
 
 

@@ -9,11 +9,13 @@ import uuid
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 
 import pyarrow as pa
 
-from ml.store import mending
+from ml.store import durable, mending
 from ml.store.fragments import DataFile
+from ml.store.private import FILE
 from ml.store.store import Batches, Store
 from ml.store.tables import Table
 from server_gui.core.cloud import verify
@@ -55,7 +57,7 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
         StoreError: it could not be looked, or a table's log is damaged.
 
     """
-    receipts = list(Receipts(spool.folder / RECEIPTS).all())
+    receipts = verify.receipts_of(spool.folder)
     found = verify.files(store)
     with expect(2 * len(found)) as advance:
         broken = verify.broken(store, found, advance, deep=True)
@@ -90,12 +92,49 @@ def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object
     return problems
 
 
+def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> None:
+    """From now on what is there counts as what was sent; what was said before is kept beside.
+
+    Raises:
+        StoreError: a table's log is damaged, so nobody can say what is there.
+
+    """
+    receipts = verify.receipts_of(spool.folder)
+    found = verify.files(store)
+    with expect(2 * len(found)) as advance:
+        broken = verify.broken(store, found, advance, deep=False)
+        gone = {(file.location, file.path) for file in broken}
+        sound = [file for file in found if (file.location, file.path) not in gone]
+        proof = prove(store, receipts, sound, advance)
+    whole = [each for each in receipts if isinstance(each, Receipt)]
+    if len(whole) < len(receipts):
+        _rewrite(spool.folder / RECEIPTS, whole)
+    for (writer, number), parts in sorted(proof.wrong.items()):
+        spool.receipts.add(
+            Receipt(writer, number, store.url, parts, ("what was missing of it was accepted",))
+        )
+    for number in verify.nowhere(spool.folder, whole):
+        spool.receipts.add(Receipt(spool.id, number, store.url, (), ("that it is nowhere was accepted",)))
+
+
+def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
+    """The file with these alone; as it was it stays beside."""
+    draft = file.with_name(f"{file.name}.draft")
+    draft.unlink(missing_ok=True)
+    draft.touch(FILE)
+    for each in receipts:
+        Receipts(draft).add(each)
+    file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.damaged").hardlink_to(file)
+    draft.replace(file)
+    durable.synchronise([file])
+
+
 def _bring(store: Again, spool: Spool, number: int) -> None:
     """What the store lacks of a second copy, and its receipt where there is none."""
     file = spool.folder / f"{number:08}.uploaded.db"
     with contextlib.closing(Segment(file, number)) as segment:
         sent = upload(segment, spool.id, store)
-    if sent.is_damaged and (sent.writer, number) in _known(list(spool.receipts.all())):
+    if sent.is_damaged and (sent.writer, number) in _known(verify.receipts_of(spool.folder)):
         raise Damaged("; ".join(sent.lost))  # what its receipt says of the whole batch still counts
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
 

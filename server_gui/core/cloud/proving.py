@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -50,6 +51,7 @@ class Proof:
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
     lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
+    wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
 
 
 def prove(
@@ -98,6 +100,8 @@ def prove(
         else:
             proof.rows += claim.rows
             proof.retained += claim.part.rows - claim.rows
+    for batch in wrong:
+        proof.wrong[batch] = tuple(_found(claim) for claim in claims if claim.batch == batch)
     proof.here, proof.batches = len(newest), len(newest) - len(wrong)
     return proof
 
@@ -240,6 +244,11 @@ def _seen(claims: Mapping[Batch, _Claim], batch: pa.RecordBatch, values: bool) -
         if name in claims:
             found[name].append(total)
     return [(claims[name], len(mine), sum(mine)) for name, mine in found.items()]
+
+
+def _found(claim: _Claim) -> Part:
+    """What is there of a claim, as its receipt would say it."""
+    return msgspec.structs.replace(claim.part, rows=claim.rows, sum=sums.told(claim.sum))
 
 
 def _first(claim: _Claim) -> int:

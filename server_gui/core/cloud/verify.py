@@ -21,7 +21,7 @@ from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.proving import Advance, Batch, Proof, prove
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
 
 AT_ONCE: Final = 4  # files
 
@@ -80,7 +80,7 @@ def whole(
         StoreUnreachable, StoreRefused: it could not be looked.
 
     """
-    receipts = list(Receipts(spool / RECEIPTS).all())  # before the files: what is sent meanwhile counts
+    receipts = receipts_of(spool)  # before the files: what is sent meanwhile counts
     found, unreadable = look(store)
     problems = list(unreadable.values())
     pinned, gone = _pinned(store, found)
@@ -96,11 +96,39 @@ def whole(
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
-    return Verdict(found, proof, list(dict.fromkeys(problems)), [*_notes(store, spool, proof)])
+    return Verdict(found, proof, list(dict.fromkeys(problems)), [*_notes(store, spool, proof, receipts)])
 
 
-def _notes(store: Store, spool: Path, proof: Proof) -> Iterator[str]:
-    """What can be done about it, and what was done."""
+def receipts_of(spool: Path) -> list[Receipt | Altered]:
+    """The spool's receipts, oldest first.
+
+    Raises:
+        SpoolUnusable: they are there, and cannot be read.
+
+    """
+    file = spool / RECEIPTS
+    try:
+        return list(Receipts(file).all())
+    except OSError as error:
+        raise SpoolUnusable(
+            f"the spool's receipts {file} cannot be read: {error.strerror or error}; run this as whom the "
+            "spool belongs to"
+        ) from error
+
+
+def _known(spool: Path) -> list[Receipt]:
+    return [each for each in receipts_of(spool) if isinstance(each, Receipt)]
+
+
+def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
+    """What can be done about it, what was done, and what is still to come."""
+    if any(isinstance(each, Altered) for each in receipts):
+        yield (
+            f"bring {spool / RECEIPTS} back from a copy; without one, gwrms cloud mend --accept-loss goes on "
+            "with the lines that are whole"
+        )
+    if waiting := [number for number in spooled.waiting(spool) if not spooled.is_empty(spool, number)]:
+        yield f"not uploaded yet, and not looked at: {told_batches(waiting)} of the spool {spool}"
     again = [number for number, batch in second_copies(spool).items() if batch in proof.lacking]
     if again:
         yield (
@@ -125,8 +153,7 @@ def second_copies(spool: Path) -> dict[int, Batch]:
 
 def sent_to(url: str, spool: Path) -> int:
     """How many batches of the spool went to the store of this URL."""
-    known = (each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt))
-    return len({(each.writer, each.batch) for each in known if each.url == url})
+    return len({(each.writer, each.batch) for each in _known(spool) if each.url == url})
 
 
 def no_store(url: str, spool: Path) -> str:
@@ -241,7 +268,7 @@ def batches_missing(store: Store, spool: Path) -> Iterator[str]:
 
     Of those with a receipt `prove` knows more.
     """
-    receipts = [each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt)]
+    receipts = _known(spool)
     yield from _set_aside(spool, receipts)
     unproven, problems = copies(spool, {(each.writer, each.batch) for each in receipts})
     yield from _nowhere(spool, receipts)
@@ -260,15 +287,21 @@ def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
 def _nowhere(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
     """Numbers are given one after another: one that is skipped was a batch."""
     there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
-    known = there | {each.batch for each in receipts}
     if not receipts and there and min(there) > 1 and _has_name(spool, min(there)):
         yield (
             f"{spool / RECEIPTS} is not there, though the spool had {told_batches(range(1, min(there)))}: "
             "bring it back from a copy; without it nobody can say whether their rows are in the store"
         )
-    first = min((each.batch for each in receipts), default=min(there, default=1))
-    for number in sorted(set(range(first, max(known, default=0))) - known):
+    for number in nowhere(spool, receipts):
         yield f"batch {number} of the spool {spool} is nowhere: no receipt says that it was uploaded"
+
+
+def nowhere(spool: Path, receipts: Sequence[Receipt]) -> list[int]:
+    """Numbers of batches that neither a file nor a receipt has."""
+    there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
+    known = there | {each.batch for each in receipts}
+    first = min((each.batch for each in receipts), default=min(there, default=1))
+    return sorted(set(range(first, max(known, default=0))) - known)
 
 
 def _has_name(spool: Path, number: int) -> bool:

@@ -14,7 +14,15 @@ from server_gui.core.cloud import mend, verify
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.spool import Spool
 from tests.unit.cloud.recordings import record
-from tests.unit.cloud.test_damages import Place
+from tests.unit.cloud.test_damages import (
+    Place,
+    altered,
+    file_doubled,
+    of_file,
+    receipt_altered,
+    receipt_removed,
+    row_removed,
+)
 
 KEYS = ("robot", "session", "connection", "stream", "seq", "row")
 
@@ -54,6 +62,11 @@ def everything_gone(place: Place) -> None:
 
 def about_gone(place: Place) -> None:
     (place.store / "store.json").unlink()
+
+
+def second_copies_gone(place: Place) -> None:
+    for file in (*place.spool.glob("0*.uploaded.db*"), *place.files()):
+        file.unlink()
 
 
 def receipts_gone(place: Place) -> None:
@@ -177,3 +190,33 @@ def test_while_a_listing_is_late_nothing_is_taken_out(place: Place, monkeypatch:
         mending.take_out(store, [wanted], lambda _: None)
     moved.rename(file)
     assert len(rows(place.url)) == 300
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [row_removed, of_file(altered), file_doubled, receipt_altered, receipt_removed, second_copies_gone],
+)
+def test_a_loss_that_is_accepted_is_told_no_more(place: Place, damage: Callable[[Place], None]) -> None:
+    damage(place)
+    for copy in place.spool.glob("0*.uploaded.db*"):
+        copy.unlink()
+    assert place.verify()[0] == 1
+    assert "mend" in place.told("mend", "--accept-loss", "--yes") or place.verify() == (0, "")
+    assert place.verify() == (0, "")
+    record(place.url, place.spool)
+    assert place.verify() == (0, "")
+
+
+def test_receipts_that_were_altered_stay_beside(place: Place) -> None:
+    receipt_altered(place)
+    known = (place.spool / RECEIPTS).read_text()
+    assert f"bring {place.spool / RECEIPTS} back from a copy" in place.told()
+    place.told("mend", "--accept-loss", "--yes")
+    [beside] = place.spool.glob(f"{RECEIPTS}.*.damaged")
+    assert beside.read_text().startswith(known)
+
+
+def test_what_waits_is_mentioned_and_cron_hears_nothing(place: Place) -> None:
+    record(place.url, place.spool, sent=False)
+    assert "not uploaded yet, and not looked at: batch 4 of the spool" in place.told()
+    assert place.told("verify", "--quiet") == ""
