@@ -80,6 +80,15 @@ class Objects:
             except (NotFoundError, FileNotFoundError):
                 return None
 
+    def find(self, path: str) -> Object | None:
+        """What is said of an object, without a listing, which may be late; None where it is not there."""
+        with translated(f"{self.url}/{path} cannot be read"):
+            try:
+                found = obstore.head(self._objects(), path)
+            except (NotFoundError, FileNotFoundError):
+                return None
+            return Object(path, found["size"], found["last_modified"], (found["e_tag"] or "").strip('"'))
+
     def names(self, folder: str) -> list[str]:
         """Every object below a folder."""
         return sorted(found.path for found in self.listing(folder))

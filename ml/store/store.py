@@ -27,7 +27,14 @@ from deltalake.transaction import AddAction
 from pyarrow.fs import FileSystem
 
 from ml.store import durable, torn, writing
-from ml.store.errors import NoSuchTable, StoreError, UnsafeStore, translated
+from ml.store.errors import (
+    NoSuchTable,
+    StoreError,
+    StoreRefused,
+    StoreUnreachable,
+    UnsafeStore,
+    translated,
+)
 from ml.store.files import filesystem
 from ml.store.fragments import as_dataset
 from ml.store.objects import RETRIES, Objects, s3_options
@@ -165,6 +172,16 @@ class Store:
         try:
             with translated(f"{self.url}/{location}"):
                 return DeltaTable(self._uri(location), version=version, storage_options=self._options())
+        except (StoreUnreachable, StoreRefused):
+            raise
+        except NoSuchTable:
+            if self._has_lost_its_log(location):
+                raise StoreError(
+                    f"{self.url}/{location} has files and no {durable.LOG}, which says which of them count: "
+                    "bring that back from a copy of the store; without one, move the table elsewhere, and "
+                    "gwrms cloud mend begins it anew with what the spool still has"
+                ) from None
+            raise
         except StoreError:
             found = None if self.folder is None else torn.find(self.folder / location)
             if found is None:
@@ -249,6 +266,13 @@ class Store:
         if about.format != FORMAT:
             raise StoreError(f"the store {self.url} has format {about.format}; this GWRMS reads {FORMAT}")
         return about
+
+    def _has_lost_its_log(self, location: str) -> bool:
+        """Whether there are files of rows; a table's log is made before them."""
+        names = [found.path for found in self.objects.listing(location)]
+        return not any(f"/{durable.LOG}/" in name for name in names) and any(
+            name.endswith(".parquet") for name in names
+        )
 
     def _uri(self, location: str) -> str:
         return f"{self.url}/{location}"

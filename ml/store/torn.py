@@ -59,7 +59,9 @@ class Torn:
 
 def find(table: Path) -> Torn | None:
     """What keeps the table from being read, or makes what is read wrong."""
-    return next(itertools.chain(_end(table), _checkpoint(table), _hint(table), _earlier(table)), None)
+    return next(
+        itertools.chain(*(look(table) for look in (_end, _checkpoint, _hint, _earlier, _beginning))), None
+    )
 
 
 def set_aside(table: Path) -> list[Path]:
@@ -182,6 +184,14 @@ def _earlier(table: Path) -> Iterator[Torn]:
             list(durable.read(file))
         except ValueError:
             yield Torn(file, spare=False)
+
+
+def _beginning(table: Path) -> Iterator[Torn]:
+    """The entry before the oldest one, where that has none before it, and no checkpoint stands for them."""
+    oldest = min(map(_version, _entries(table)), default=0)
+    checkpoints = (table / durable.LOG).glob(_CHECKPOINTS)
+    if oldest and not any(_version(file) >= oldest - 1 for file in checkpoints):
+        yield Torn(durable.log_entry(table, oldest - 1), spare=False)
 
 
 # --- inside

@@ -4,10 +4,12 @@ import contextlib
 import functools
 import hashlib
 import itertools
+import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Final, TypeVar
 from urllib.parse import unquote
 
@@ -19,7 +21,7 @@ from deltalake.exceptions import CommitFailedError
 
 from ml.store import reading
 from ml.store.alone import alone
-from ml.store.errors import NoSuchTable, StoreError, translated
+from ml.store.errors import NoSuchTable, StoreError, StoreRefused, translated
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table
 
@@ -104,9 +106,24 @@ def unpin(store: Store, location: str, version: int, by: str) -> None:
 
 
 def pins(store: Store) -> list[Pin]:
-    """Every version that somebody names."""
-    found = (store.objects.read(name) for name in store.objects.names(_PINS))
-    return [msgspec.json.decode(data, type=Pin) for data in found if data is not None]
+    """Every version that somebody names.
+
+    Raises:
+        StoreError: one of these objects cannot be read, so nobody knows which version it keeps.
+
+    """
+    found = ((name, store.objects.read(name)) for name in store.objects.names(_PINS))
+    return [_pin(store, name, data) for name, data in found if data is not None]
+
+
+def _pin(store: Store, name: str, data: bytes) -> Pin:
+    try:
+        return msgspec.json.decode(data, type=Pin)
+    except msgspec.DecodeError as error:
+        raise StoreError(
+            f"{store.url}/{name} is damaged: bring it back from a copy of the store; it says which version "
+            "of a table a model needs"
+        ) from error
 
 
 def compact(
@@ -199,7 +216,7 @@ def vacuum(
         with translated(f"{store.url}/{location} cannot be cleaned"):
             versions = sorted(kept.get(location, []))
             work = functools.partial(_vacuum, store, location, grace, versions, dry_run=dry_run)
-            gone += [f"{location}/{unquote(name)}" for name in _again(store, location, work)]
+            gone += _again(store, location, work)
     return gone
 
 
@@ -207,6 +224,7 @@ def _vacuum(
     store: Store, location: str, grace: timedelta, versions: list[int], *, dry_run: bool
 ) -> list[str]:
     delta = store.table(location)
+    there = set(store.objects.names(location))
     with store.unfinished(location):
         if not dry_run:  # nothing goes before what stands for it lasts
             store.make_last(location, delta)
@@ -220,7 +238,9 @@ def _vacuum(
         if not dry_run:
             delta.update_incremental()
             store.make_last(location, delta)
-    return gone
+    above = "" if store.folder is None else f"{store.folder / location}/"
+    named = {f"{location}/{name.removeprefix(above)}" for name in gone}
+    return sorted(name for name in there if name in named or name in map(unquote, named))
 
 
 def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
@@ -257,7 +277,17 @@ def _put_together(store: Store, location: str) -> Compacted:
 
 def _mend(store: Store, tables: Sequence[Table]) -> None:
     for location in (location for table in tables for location in table.locations(store.about.shards)):
+        if store.folder is not None and (store.folder / location).is_dir():
+            _check_writable(store.folder / location)
         store.mend(location)
+
+
+def _check_writable(folder: Path) -> None:
+    """Before the table format's library panics."""
+    if not os.access(folder, os.W_OK):
+        raise StoreRefused(
+            f"{folder} cannot be written: run this as whom it belongs to, on a disk for writing"
+        )
 
 
 def _locations(store: Store, tables: Sequence[Table]) -> list[str]:

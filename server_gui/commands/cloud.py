@@ -6,6 +6,7 @@ from typing import Final
 from gateway.cli.reach import choose
 from ml.store.private import private_files
 from server_gui.commands.cloud_look import du, ls, verify
+from server_gui.commands.cloud_mend import mend
 from server_gui.commands.cloud_move import download, upload
 from server_gui.commands.cloud_upkeep import compact, retain, vacuum
 
@@ -14,6 +15,7 @@ USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
   ls          tables, or with --path the files below one
   du          who takes how much: tables and robots
   verify      is every file there and whole, and every row that the spool has sent
+  mend        what verify found: missing files taken out, their rows brought again from the spool
   upload      what waits in the spool, now; or with --from a whole store
   download    a store, or some robots or sessions of it, into a folder
   compact     put small files together
@@ -27,6 +29,7 @@ COMMANDS: Final[dict[str, Callable[[list[str]], int]]] = {
     "ls": ls,
     "du": du,
     "verify": verify,
+    "mend": mend,
     "upload": upload,
     "download": download,
     "compact": compact,

@@ -20,7 +20,7 @@ VERIFY: Final = (
     "sent is there once and as it was sent."
 )
 VERIFY_EPILOG: Final = """Exit status 0: whole. 1: not whole, and each line names what is missing, doubled
-or altered. 2: it could not be looked: no store there, or not reached. What was sent is known from the spool's
+or altered. 2: it could not look: no store there, or not reached. What was sent is known from the spool's
 receipts; where there are none, files alone are checked, and it says so. It reads all that has a receipt."""
 NOT_WHOLE: Final = 1
 NOT_LOOKED: Final = 2
@@ -67,6 +67,7 @@ def verify(argv: list[str]) -> int:
     how = made.add_mutually_exclusive_group()
     how.add_argument("--quick", action="store_true", help="count the rows, and compare no values")
     how.add_argument("--deep", action="store_true", help="read every value, also of what has no receipt here")
+    made.add_argument("--quiet", action="store_true", help="say nothing where it is whole, as for cron")
     arguments = made.parse_args(argv)
     try:
         return _verify(arguments)
@@ -81,10 +82,10 @@ def _verify(arguments: argparse.Namespace) -> int:
     mine = spool(arguments)
     try:
         store = reach(arguments)
-    except NoSuchTable as error:
-        if not (sent := checks.sent_to(url(arguments), mine)):
+    except NoSuchTable:
+        if not checks.sent_to(url(arguments), mine):
             raise
-        return _verdict(arguments, 0, [f"{error}, but {sent} batches of the spool {mine} went there"], "")
+        return _verdict(arguments, [checks.no_store(url(arguments), mine)])
     found = checks.whole(
         store,
         mine,
@@ -92,15 +93,36 @@ def _verify(arguments: argparse.Namespace) -> int:
         values=not arguments.quick,
         deep=arguments.deep,
     )
-    return _verdict(arguments, len(found.files), found.problems, f"{store.url} is whole: {found.text}\n")
+    return _verdict(arguments, found.problems, found, f"{store.url} is whole: {found.text}\n")
 
 
-def _verdict(arguments: argparse.Namespace, files: int, problems: Sequence[str], whole: str) -> int:
+def _verdict(
+    arguments: argparse.Namespace,
+    problems: Sequence[str],
+    found: checks.Verdict | None = None,
+    whole: str = "",
+) -> int:
     if arguments.json:
-        say_json({"files": files, "problems": problems, "looked": True})
-    else:
-        say("".join(f"{problem}\n" for problem in problems) or whole)
+        say_json({"problems": problems, "looked": True} | _counts(found))
+    elif problems or not arguments.quiet:
+        more = () if found is None else filter(None, (*found.notes, found.unproven))
+        say("".join(f"{each}\n" for each in problems) or whole)
+        say("".join(f"{each}\n" for each in more))
     return NOT_WHOLE if problems else 0
+
+
+def _counts(found: checks.Verdict | None) -> dict[str, object]:
+    """How much was looked at, and how much of that is proven."""
+    if found is None:
+        return {"files": 0, "rows": 0, "rows_proven": 0, "batches": 0, "receipts": 0, "notes": ()}
+    return {
+        "files": len(found.files),
+        "rows": found.rows,
+        "rows_proven": found.proof.rows,
+        "batches": found.proof.batches,
+        "receipts": found.proof.here,
+        "notes": found.notes,
+    }
 
 
 def _show(

@@ -1,12 +1,13 @@
 """Whether what receipts say is in the store: each batch's rows once, and as they were sent."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -25,7 +26,7 @@ ORIGIN: Final = ("spool", "batch")
 _OWN: Final = {each.name: each.type for each in TELEMETRY.schema}
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
-_Batch = tuple[str, int]  # writer, number
+Batch = tuple[str, int]  # its writer and number
 _Whose = tuple[str, str | None, str | None]  # location, robot, session
 
 
@@ -33,7 +34,7 @@ _Whose = tuple[str, str | None, str | None]  # location, robot, session
 class _Claim:
     """What a receipt says of rows in a table, and what is found of them."""
 
-    batch: _Batch
+    batch: Batch
     part: Part
     rows: int = 0
     sum: int = 0
@@ -49,6 +50,8 @@ class Proof:
     retained: int = 0  # rows of them that were removed because they were old
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
+    lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
+    wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
 
 
 def prove(
@@ -58,8 +61,11 @@ def prove(
     advance: Advance,
     *,
     values: bool = True,
+    unknown: Collection[str] = (),
 ) -> Proof:
     """Look for the rows of each receipt in these files, the store's; with `values` whether they are as sent.
+
+    Of the locations that are `unknown`, because nobody can say which files they have, nothing is proven.
 
     The receipts are older than the list of files: what they speak of was in the store by then.
 
@@ -68,7 +74,7 @@ def prove(
 
     """
     proof, here = Proof(), _here(store)
-    newest: dict[_Batch, Receipt] = {}
+    newest: dict[Batch, Receipt] = {}
     for found in receipts:
         if isinstance(found, Altered):
             proof.problems.append(f"line {found.line} of the spool's {RECEIPTS} {found.text}")
@@ -84,12 +90,18 @@ def prove(
     wrong = set()
     for claim in claims:
         problem = _problem(claim, retained[claim.part.location], values=values)
-        if problem:
+        if claim.part.location in unknown:
             wrong.add(claim.batch)
+        elif problem:
+            wrong.add(claim.batch)
+            if claim.rows < claim.part.rows:
+                proof.lacking.add(claim.batch)
             proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
         else:
             proof.rows += claim.rows
             proof.retained += claim.part.rows - claim.rows
+    for batch in wrong:
+        proof.wrong[batch] = tuple(_found(claim) for claim in claims if claim.batch == batch)
     proof.here, proof.batches = len(newest), len(newest) - len(wrong)
     return proof
 
@@ -112,7 +124,7 @@ def _count(
 ) -> list[str]:
     """Count what is there of each claim; which files cannot be read."""
     streams: dict[_Whose, list[_Claim]] = defaultdict(list)
-    others: dict[str, dict[_Batch, _Claim]] = defaultdict(dict)
+    others: dict[str, dict[Batch, _Claim]] = defaultdict(dict)
     for claim in claims:
         part, whose = claim.part, claim.part.stream
         if whose is None:
@@ -223,15 +235,20 @@ def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> sums.Sums:
     return sums.of_numbers(pa.record_batch(columns, names=names), same)
 
 
-def _seen(claims: Mapping[_Batch, _Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
+def _seen(claims: Mapping[Batch, _Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
     """What these rows of another table are of each claim."""
     each = sums.of_rows(pa.Table.from_batches([batch])).tolist() if values else [0] * batch.num_rows
     names = zip(batch["spool"].to_pylist(), batch["batch"].to_pylist(), strict=True)
-    found: dict[_Batch, list[int]] = defaultdict(list)
+    found: dict[Batch, list[int]] = defaultdict(list)
     for name, total in zip(names, each, strict=True):
         if name in claims:
             found[name].append(total)
     return [(claims[name], len(mine), sum(mine)) for name, mine in found.items()]
+
+
+def _found(claim: _Claim) -> Part:
+    """What is there of a claim, as its receipt would say it."""
+    return msgspec.structs.replace(claim.part, rows=claim.rows, sum=sums.told(claim.sum))
 
 
 def _first(claim: _Claim) -> int:

@@ -47,6 +47,14 @@ def waiting(spool: Path) -> list[int]:
     return sorted(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.db"))
 
 
+def is_empty(spool: Path, number: int) -> bool:
+    """Whether nothing has been recorded into it yet; not where that cannot be read."""
+    try:
+        return not any(_read(spool, number, f"SELECT 1 FROM {table} LIMIT 1") for table in ("run", "record"))
+    except SpoolUnusable:
+        return False
+
+
 def kept(spool: Path) -> list[int]:
     """These, and those that are still here after they were uploaded; oldest first."""
     return sorted({*waiting(spool), *(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.uploaded.db"))})

@@ -1,6 +1,7 @@
 """Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
 
-from collections.abc import Callable, Iterator, Sequence, Set
+import contextlib
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -10,16 +11,17 @@ from typing import Final
 import pyarrow.parquet as pq
 
 from gateway.cli.text import size
-from ml.store import reading
+from ml.store import mending, reading
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
-from ml.store.fragments import DataFile
+from ml.store.fragments import DataFile, data_files
 from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
+from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spooled
-from server_gui.core.cloud.proving import Advance, Proof, prove
+from server_gui.core.cloud.proving import Advance, Batch, Proof, prove
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
 
 AT_ONCE: Final = 4  # files
 
@@ -31,11 +33,23 @@ class Verdict:
     files: Sequence[DataFile]
     proof: Proof
     problems: Sequence[str]
+    notes: Sequence[str] = ()  # what is not wrong, and worth knowing
+
+    @property
+    def rows(self) -> int:
+        """In the newest versions of the tables."""
+        return sum(file.rows for file in self.files)
+
+    @property
+    def unproven(self) -> str:
+        """How many rows no receipt speaks of, in words; nothing where there is none."""
+        rows = self.rows - self.proof.rows
+        return f"{rows} of {self.rows} rows are proven by no receipt here" if rows > 0 else ""
 
     @property
     def text(self) -> str:
         """What is whole, and how far that is proven."""
-        rows = sum(file.rows for file in self.files)
+        rows = self.rows
         size_bytes = sum(file.size_bytes for file in self.files)
         told = [f"{len(self.files)} files with {rows} rows, {size(size_bytes)}"]
         if self.proof.batches:
@@ -66,37 +80,136 @@ def whole(
         StoreUnreachable, StoreRefused: it could not be looked.
 
     """
-    receipts = list(
-        Receipts(spool / RECEIPTS).all()
-    )  # before the files: what is sent meanwhile is not missed
-    found, problems = _look(store)
-    with expect(2 * len(found)) as advance:
-        problems += damages(store, found, advance, deep=deep)
-        proof = prove(store, receipts, found, advance, values=values)
+    receipts = receipts_of(spool)  # before the files: what is sent meanwhile counts
+    found, unreadable = look(store)
+    problems = list(unreadable.values())
+    pinned, gone = _pinned(store, found)
+    problems += gone
+    with expect(2 * len(found) + len(pinned)) as advance:
+        told = list(_each(store, found, advance, deep=deep))
+        problems += filter(None, told)
+        for named, files_ in pinned.items():
+            problems += (f"{each} ({_needed(named)})" for each in damages(store, files_, advance, deep=deep))
+        sound = [file for file, problem in zip(found, told, strict=True) if problem is None]
+        advance(len(found) - len(sound))
+        proof = prove(store, receipts, sound, advance, values=values, unknown=unreadable.keys())
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
-    return Verdict(found, proof, list(dict.fromkeys(problems)))
+    return Verdict(found, proof, list(dict.fromkeys(problems)), [*_notes(store, spool, proof, receipts)])
+
+
+def receipts_of(spool: Path) -> list[Receipt | Altered]:
+    """The spool's receipts, oldest first.
+
+    Raises:
+        SpoolUnusable: they are there, and cannot be read.
+
+    """
+    file = spool / RECEIPTS
+    try:
+        return list(Receipts(file).all())
+    except OSError as error:
+        raise SpoolUnusable(
+            f"the spool's receipts {file} cannot be read: {error.strerror or error}; run this as whom the "
+            "spool belongs to"
+        ) from error
+
+
+def _known(spool: Path) -> list[Receipt]:
+    return [each for each in receipts_of(spool) if isinstance(each, Receipt)]
+
+
+def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
+    """What can be done about it, what was done, and what is still to come."""
+    if any(isinstance(each, Altered) for each in receipts):
+        yield (
+            f"bring {spool / RECEIPTS} back from a copy; without one, gwrms cloud mend --accept-loss goes on "
+            "with the lines that are whole"
+        )
+    if waiting := [number for number in spooled.waiting(spool) if not spooled.is_empty(spool, number)]:
+        yield f"not uploaded yet, and not looked at: {told_batches(waiting)} of the spool {spool}"
+    again = [number for number, batch in second_copies(spool).items() if batch in proof.lacking]
+    if again:
+        yield (
+            f"the spool still has a second copy of {told_batches(again)}: end the collector and run gwrms "
+            "cloud mend, which brings what is missing of it"
+        )
+    if gone := mending.taken_out(store):
+        yield (
+            f"{sum(each.rows for each in gone)} rows in {len(gone)} files were taken out of tables by gwrms "
+            f"cloud mend ({store.url}/mended says which); what receipts here prove is there again"
+        )
+
+
+def second_copies(spool: Path) -> dict[int, Batch]:
+    """By which name the spool's second copies went to the store; without those that cannot be read."""
+    found = {}
+    for number in spooled.uploaded(spool):
+        with contextlib.suppress(SpoolUnusable):
+            found[number] = (spooled.writer(spool, number), number)
+    return found
 
 
 def sent_to(url: str, spool: Path) -> int:
     """How many batches of the spool went to the store of this URL."""
-    known = (each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt))
-    return len({(each.writer, each.batch) for each in known if each.url == url})
+    return len({(each.writer, each.batch) for each in _known(spool) if each.url == url})
 
 
-def _look(store: Store) -> tuple[list[DataFile], list[str]]:
-    """Every file of the newest versions, and which tables' logs cannot be read."""
+def no_store(url: str, spool: Path) -> str:
+    """That a store is no more to which batches of the spool went."""
+    return (
+        f"there is no store at {url} any more, though {sent_to(url, spool)} batches of the spool {spool} "
+        "went there: bring it back (its store.json too), or end the collector and run gwrms cloud mend: "
+        "that makes it anew of the spool's second copies"
+    )
+
+
+def look(store: Store) -> tuple[list[DataFile], dict[str, str]]:
+    """Every file of the newest versions; which tables' logs cannot be read, and why."""
     found: list[DataFile] = []
-    problems = []
-    for table in TABLES.values():
+    problems = {}
+    for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
         try:
-            found += reading.files(store, table)
+            found += data_files(store.table(location), location)
+        except (StoreUnreachable, StoreRefused):
+            raise
+        except NoSuchTable:
+            continue
+        except StoreError as error:
+            problems[location] = str(error)
+    return found, problems
+
+
+def _pinned(store: Store, newest: Sequence[DataFile]) -> tuple[dict[Pin, list[DataFile]], list[str]]:
+    """The files that only a pinned version needs, and which of these cannot be read."""
+    known = {(file.location, file.path) for file in newest}
+    found: dict[Pin, list[DataFile]] = {}
+    problems = []
+    try:
+        all_pins = pins(store)
+    except (StoreUnreachable, StoreRefused):
+        raise
+    except StoreError as error:
+        return {}, [str(error)]
+    for named in all_pins:
+        try:
+            delta = store.table(named.location, named.version)
+            mine = [
+                file for file in data_files(delta, named.location) if (file.location, file.path) not in known
+            ]
         except (StoreUnreachable, StoreRefused):
             raise
         except StoreError as error:
-            problems.append(str(error))
+            problems.append(f"{error} ({_needed(named)})")
+            continue
+        known |= {(file.location, file.path) for file in mine}
+        found[named] = mine
     return found, problems
+
+
+def _needed(named: Pin) -> str:
+    return f"needed by version {named.version}, which {named.by} names"
 
 
 def files(store: Store) -> list[DataFile]:
@@ -109,6 +222,16 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
 
     Each file's footer is read, and with `deep` every value.
     """
+    return filter(None, _each(store, wanted, advance, deep=deep))
+
+
+def broken(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> list[DataFile]:
+    """Which of these files are absent, cut off or unreadable."""
+    told = _each(store, wanted, advance, deep=deep)
+    return [file for file, problem in zip(wanted, told, strict=True) if problem]
+
+
+def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> Iterator[str | None]:
     sizes = {found.path: found.size_bytes for found in store.objects.listing()}
 
     def check(file: DataFile) -> str | None:
@@ -117,13 +240,13 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
         return problem
 
     with ThreadPoolExecutor(AT_ONCE, "verify") as pool:
-        yield from filter(None, pool.map(check, wanted))
+        yield from pool.map(check, wanted)
 
 
 def _damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) -> str | None:
     name = f"{store.url}/{file.location}/{file.path}"
     if size_bytes is None:
-        return f"{name} is not there: {file.rows} rows are lost"
+        return f"{name} is not there, with {file.rows} rows"
     if size_bytes != file.size_bytes:
         return f"{name} has {size_bytes} bytes instead of {file.size_bytes}"
     try:
@@ -141,14 +264,17 @@ def _decoded(store: Store, file: DataFile) -> int:
 
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
-    """The spool's batches that were set aside, are nowhere, or are marked as uploaded and not in the store.
+    """The spool's batches that were set aside, are nowhere, or have no receipt though they were uploaded.
 
     Of those with a receipt `prove` knows more.
     """
-    receipts = [each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt)]
+    receipts = _known(spool)
     yield from _set_aside(spool, receipts)
+    unproven, problems = copies(spool, {(each.writer, each.batch) for each in receipts})
     yield from _nowhere(spool, receipts)
-    yield from _unknown(store, spool, {(each.writer, each.batch) for each in receipts})
+    yield from problems
+    yield from _without_receipt(spool, unproven)
+    yield from _unknown(store, spool, unproven)
 
 
 def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
@@ -161,22 +287,71 @@ def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
 def _nowhere(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
     """Numbers are given one after another: one that is skipped was a batch."""
     there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
-    known = there | {each.batch for each in receipts}
-    first = min((each.batch for each in receipts), default=0)
-    for number in sorted(set(range(first, max(known, default=0))) - known):
+    if not receipts and there and min(there) > 1 and _has_name(spool, min(there)):
+        yield (
+            f"{spool / RECEIPTS} is not there, though the spool had {told_batches(range(1, min(there)))}: "
+            "bring it back from a copy; without it nobody can say whether their rows are in the store"
+        )
+    for number in nowhere(spool, receipts):
         yield f"batch {number} of the spool {spool} is nowhere: no receipt says that it was uploaded"
 
 
-def _unknown(store: Store, spool: Path, known_batches: Set[tuple[str, int]]) -> Iterator[str]:
-    known: dict[tuple[str, str], int] = {}
+def nowhere(spool: Path, receipts: Sequence[Receipt]) -> list[int]:
+    """Numbers of batches that neither a file nor a receipt has."""
+    there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
+    known = there | {each.batch for each in receipts}
+    first = min((each.batch for each in receipts), default=min(there, default=1))
+    return sorted(set(range(first, max(known, default=0))) - known)
+
+
+def _has_name(spool: Path, number: int) -> bool:
+    """Whether a batch was made since there are receipts."""
+    try:
+        return spooled.writer(spool, number) != spooled.identity(spool)
+    except SpoolUnusable:
+        return False
+
+
+def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
+    """The second copies that have no receipt, and which cannot be read."""
+    found, problems = [], []
     for number in spooled.uploaded(spool):
         try:
             batch = spooled.batch(spool, number)
         except SpoolUnusable as error:
-            yield str(error)
+            problems.append(str(error))
             continue
-        if (batch.writer, batch.number) in known_batches:
-            continue
+        if (batch.writer, batch.number) not in known:
+            found.append(batch)
+    return found, problems
+
+
+def _without_receipt(spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
+    """Each had one before it was called uploaded; but for those from before there were any."""
+    own = spooled.identity(spool)
+    numbers = [batch.number for batch in unproven if batch.writer != own]
+    if numbers:
+        yield (
+            f"{spool / RECEIPTS} has no receipt of {told_batches(numbers)}, which went to a store: "
+            "bring that file back from a copy, or end the collector and run gwrms cloud mend"
+        )
+
+
+def told_batches(numbers: Iterable[int]) -> str:
+    """Numbers of batches in words, those that follow each other together."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    told = ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs)
+    return f"batch {told}" if len(runs) == 1 and len(runs[0]) == 1 else f"the batches {told}"
+
+
+def _unknown(store: Store, spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
+    known: dict[tuple[str, str], int] = {}
+    for batch in unproven:
         for location in _locations(store, batch):
             if (location, batch.writer) not in known:
                 known[location, batch.writer] = _newest(store, location, batch.writer)

@@ -2,11 +2,13 @@
 
 import contextlib
 import json
+import os
 import shutil
 import sqlite3
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -16,7 +18,7 @@ import pytest
 from gateway.main import main
 from ml.store import Store
 from ml.store.tables import RESOURCES, TABLES, TELEMETRY
-from ml.store.upkeep import compact, retain, vacuum
+from ml.store.upkeep import compact, pin, retain, vacuum
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.recorder import Recorder
@@ -49,6 +51,21 @@ class Place:
         """The exit status, and all that was said of problems."""
         status = main(["cloud", "verify", "--json", *words, "--config", str(self._config)])
         return status, "\n".join(json.loads(self._capsys.readouterr().out)["problems"])
+
+    def ask(self) -> dict[str, Any]:
+        main(["cloud", "verify", "--json", "--config", str(self._config)])
+        found: dict[str, Any] = json.loads(self._capsys.readouterr().out)
+        return found
+
+    def told(self, *words: str) -> str:
+        main(["cloud", *(words or ("verify",)), "--config", str(self._config)])
+        said = self._capsys.readouterr()
+        return said.out + said.err
+
+    def rename_back(self, *batches: str) -> None:
+        """As if they had not been uploaded yet."""
+        for batch_ in batches:
+            (self.spool / f"{batch_}.uploaded.db").rename(self.spool / f"{batch_}.db")
 
     def files(self, location: str = "telemetry/000") -> list[Path]:
         return sorted((self.store / location).rglob("*.parquet"))
@@ -137,6 +154,14 @@ def log_entry_missing(place: Place) -> None:
     place.log()[1].unlink()
 
 
+def first_log_entry_missing(place: Place) -> None:
+    place.log()[0].unlink()
+
+
+def log_missing(place: Place) -> None:
+    shutil.rmtree(place.log()[0].parent)
+
+
 def table_missing(place: Place) -> None:
     shutil.rmtree(place.store / "labels")
 
@@ -159,6 +184,47 @@ def receipt_removed(place: Place) -> None:
     file = place.spool / RECEIPTS
     lines = file.read_text().splitlines(keepends=True)
     file.write_text("".join(lines[:1] + lines[2:]))
+
+
+def pinned_file_deleted(place: Place) -> None:
+    store = Store(place.url)
+    pin(store, "events", store.table("events").version(), "walking-1")
+    [only, *_] = place.files("events")
+    compact(store)
+    only.unlink()
+
+
+def pin_damaged(place: Place) -> None:
+    store = Store(place.url)
+    pin(store, "telemetry/000", 1, "walking-1")
+    [file] = (place.store / "pins").iterdir()
+    file.write_text("{")
+
+
+def pinned_version_gone(place: Place) -> None:
+    (place.store / "pins").mkdir()
+    named = {"location": "telemetry/000", "version": 77, "by": "walking-1"}
+    (place.store / "pins" / "1.json").write_text(json.dumps(named))
+
+
+def receipts_cut_off(place: Place) -> None:
+    file = place.spool / RECEIPTS
+    file.write_text("".join(file.read_text().splitlines(keepends=True)[:1]))
+
+
+def receipts_deleted(place: Place) -> None:
+    (place.spool / RECEIPTS).unlink()
+
+
+def receipts_and_second_copies_deleted(place: Place) -> None:
+    receipts_deleted(place)
+    for file in place.spool.glob("0*.uploaded.db*"):
+        file.unlink()
+
+
+def receipts_deleted_and_collected_on(place: Place) -> None:
+    receipts_deleted(place)
+    record(place.url, place.spool)
 
 
 def segment_damaged(place: Place) -> None:
@@ -184,7 +250,7 @@ def segment_removed(place: Place) -> None:
 
 
 DAMAGES: list[tuple[Callable[[Place], None], str]] = [
-    (file_deleted, "is not there: 100 rows are lost"),
+    (file_deleted, "is not there, with 100 rows"),
     (file_cut_off, "bytes instead of"),
     (file_doubled, "100 rows more than the 100 that were sent: doubled (batch"),
     (row_removed, "1 of 100 rows are missing (batch 3 of "),
@@ -195,11 +261,23 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (event_altered, "/events: the 2 rows are not as they were sent: altered (batch"),
     (log_rolled_back, "/telemetry/000: 100 of 100 rows are missing (batch 3 of "),
     (log_entry_missing, "/telemetry/000"),
+    (
+        first_log_entry_missing,
+        "00000000000000000000.json is missing, and was whole once: bring this file back",
+    ),
+    (log_missing, "/telemetry/000 has files and no _delta_log"),
     (table_missing, "/labels: 1 of 1 rows are missing (batch 1 of "),
     (table_begun_anew, "/telemetry/000: 100 of 100 rows are missing (batch 2 of "),
     (store_missing, "3 batches of the spool"),
     (receipt_altered, f"line 1 of the spool's {RECEIPTS} is not as it was written"),
     (receipt_removed, f"line 2 of the spool's {RECEIPTS} is not as it was written"),
+    (pinned_file_deleted, "is not there, with 2 rows (needed by version 3, which walking-1 names)"),
+    (pinned_version_gone, "(needed by version 77, which walking-1 names)"),
+    (pin_damaged, "is damaged: bring it back from a copy of the store"),
+    (receipts_cut_off, f"{RECEIPTS} has no receipt of the batches 2 to 3, which went to a store"),
+    (receipts_deleted, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
+    (receipts_and_second_copies_deleted, f"{RECEIPTS} is not there, though the spool had the batches 1 to 3"),
+    (receipts_deleted_and_collected_on, f"{RECEIPTS} has no receipt of the batches 1 to 3"),
     (segment_damaged, "00000004.damaged.db was set aside: 5 rows of exo-01, stream 1 from notification 7 on"),
     (segment_unreadable, "00000004.damaged.db was set aside: what batch 4 held is not in the store"),
     (segment_removed, "batch 4 of the spool"),
@@ -212,6 +290,34 @@ def test_each_damage_is_found_and_named(place: Place, damage: Callable[[Place], 
     status, problems = place.verify()
     assert status == 1
     assert told in problems
+
+
+@pytest.mark.parametrize("damage", [log_entry_missing, first_log_entry_missing, log_missing])
+def test_where_a_log_is_damaged_the_log_alone_is_named(place: Place, damage: Callable[[Place], None]) -> None:
+    damage(place)
+    assert len(place.verify()[1].splitlines()) == 1
+    assert "telemetry/000" in place.told("compact")
+    assert "telemetry/000" in place.told("upload") or place.verify()[0] == 1
+
+
+def test_a_missing_file_is_named_once(place: Place) -> None:
+    file_deleted(place)
+    name = place.verify()[1].partition(" is not there")[0].rpartition("/")[2]
+    assert place.verify()[1].count(name) == 1
+
+
+def test_there_is_no_batch_0(place: Place) -> None:
+    receipts_and_second_copies_deleted(place)
+    assert "batch 0 " not in place.verify()[1]
+
+
+def test_what_no_receipt_proves_is_counted_on_a_line_of_its_own(place: Place) -> None:
+    shutil.rmtree(place.spool)
+    record(place.url, place.spool)
+    told = place.ask()
+    assert (told["problems"], told["batches"], told["receipts"]) == ([], 1, 1)
+    assert (told["rows"], told["rows_proven"]) == (420, 105)
+    assert place.told().splitlines()[-1] == "315 of 420 rows are proven by no receipt here"
 
 
 def test_a_store_is_whole_however_its_files_were_put_together(place: Place) -> None:
@@ -268,3 +374,34 @@ def test_where_nobody_can_look_the_exit_status_says_so(place: Place, tmp_path: P
     assert main(["cloud", "verify", "--config", str(tmp_path / "nothing.toml")]) == 2
     (place.store / "store.json").write_text("{")
     assert place.verify()[0] == 2
+
+
+def test_vacuum_tells_of_files_that_were_there_and_are_not(place: Place) -> None:
+    store = Store(place.url)
+    compact(store)
+    [gone, *_] = [file for file in place.files("events") if len(pq.read_table(file, partitioning=None)) == 2]
+    gone.unlink()
+    before = set(store.objects.names(""))
+    told = vacuum(store, grace=timedelta(0), dry_run=True)
+    assert vacuum(store, grace=timedelta(0)) == told
+    parquet = {name for name in before - set(store.objects.names("")) if name.endswith(".parquet")}
+    assert parquet == set(told) != set()
+
+
+def test_whoever_meets_a_missing_file_is_told_what_helps(place: Place) -> None:
+    file_deleted(place)
+    said = place.told("compact") + place.told("mend", "--dry-run")
+    place.rename_back("00000001", "00000002", "00000003")
+    upload = place.told("upload")
+    assert "is not there; bring it back from a copy, or let gwrms cloud mend take it out" in upload
+    assert "errno" not in said + upload
+    place.told("mend")
+    assert "nothing waits" in place.told("upload")
+    assert place.verify() == (0, "")
+
+
+def test_a_store_that_cannot_be_written_is_refused_in_words(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert "cannot be written: run this as whom it belongs to" in place.told("compact")

@@ -43,7 +43,7 @@ def test_a_file_that_has_gone_is_named(store_url: str, tmp_path: Path) -> None:
     recorded = record(store_url, tmp_path / "spool")
     path, _ = telemetry(recorded.store)
     recorded.store.objects.remove(path)
-    assert problems(recorded.store) == [f"{recorded.store.url}/{path} is not there: 100 rows are lost"]
+    assert problems(recorded.store) == [f"{recorded.store.url}/{path} is not there, with 100 rows"]
 
 
 def test_a_file_that_was_cut_off_is_named(store_url: str, tmp_path: Path) -> None:
@@ -86,7 +86,8 @@ def test_a_batch_that_never_arrived_is_named(store_url: str, tmp_path: Path) -> 
             recorder.record("exo-01", 1, batch(1, 5))
         [number] = spool.waiting()
         spool.uploaded(number)  # as if it were in the store
-    missing = list(verify.batches_missing(recorded.store, recorded.spool))
+    unproven, *missing = verify.batches_missing(recorded.store, recorded.spool)
+    assert f"has no receipt of batch {number}, which went to a store" in unproven
     assert [text.partition(" is not in ")[2] for text in missing] == [
         f"{recorded.store.url}/{table}" for table in ("sessions", "telemetry/000")
     ]
