@@ -101,7 +101,7 @@ def _remove(labelling: Labelling, labels: Sequence[Label], *, as_json: bool) -> 
     if as_json:
         say_json({"removed": len(labels), "where": kept.where.value})
     else:
-        say(f"{_counted(len(labels))} taken back\n")
+        say(f"{len(labels)} taken back\n")
     return 0
 
 
