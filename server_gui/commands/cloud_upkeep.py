@@ -1,6 +1,7 @@
 """`gwrms cloud compact | retain | vacuum`: fewer files; old rows and files gone, but what a model names."""
 
 import argparse
+import math
 from datetime import UTC, datetime, timedelta
 
 from gateway.cli.reach import ask
@@ -90,9 +91,12 @@ def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
 
 
 def _days(text: str) -> float:
-    days = float(text)
+    try:
+        days = float(text)
+    except ValueError:
+        days = math.nan
     if not 0 <= days <= MOST_DAYS:
-        raise argparse.ArgumentTypeError(f"{text} days: write a number from 0 to {MOST_DAYS}")
+        raise argparse.ArgumentTypeError(f"{text!r} days: write a number from 0 to {MOST_DAYS}")
     return days
 
 

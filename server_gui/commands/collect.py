@@ -156,7 +156,7 @@ def status_text(report: CollectorReport) -> str:
     recorder, uploader = report.recorder, report.uploader
     rows = f"{recorder.recorded} rows since then, {recorder.waiting} wait for the disk, {recorder.lost} lost"
     batches = (
-        f"{uploader.uploaded} batches uploaded, {uploader.waiting} wait (upload = {report.upload.value})"
+        f"{_batches(uploader.uploaded)} uploaded, {uploader.waiting} wait (upload = {report.upload.value})"
     )
     lines = [
         f"collecting since {_instant(report.began_utc_s)} (process {report.pid}, gwrms {report.version})",
@@ -177,6 +177,10 @@ def status_text(report: CollectorReport) -> str:
         f"{name}: {plain(reason)}\n" for name, link in robots for reason in link.quality.reasons
     )
     return "\n".join([*lines, "", links, *([problems] if problems else []), *_predicted(report.prediction)])
+
+
+def _batches(count: int) -> str:
+    return "1 batch" if count == 1 else f"{count} batches"
 
 
 def _predicted(state: PredictingState | None) -> list[str]:

@@ -40,6 +40,16 @@ _DEFECTS: Final[dict[str, Defect]] = {
         "rows send unit",
         "another unit",
     ),
+    "empty-uploaded": Defect(
+        "a batch that was emptied as it waited counts as uploaded",
+        "rows cut spoil",
+        "a batch is lost as a whole",
+    ),
+    "gone-unseen": Defect(
+        "nobody sees that a batch has gone as it waited",
+        "rows cut spoil",
+        "a batch is lost as a whole",
+    ),
     "order-by-utc": Defect(
         "an export goes by UTC: a clock that is set back changes the order of rows",
         "rows turn clock export",

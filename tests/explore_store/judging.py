@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import Any
 
+import msgspec
+
 from ml.store import NoSuchTable, Store, StoreError, reading, sessions
 from ml.store.labels import holding, utc_ns
 from ml.store.snapshot import Snapshot
@@ -73,8 +75,9 @@ def judge(world: World) -> None:
             "rows are missing, and nobody tells of it",
             lacks,
         )
-    for server in world.servers.values():
+    for name, server in world.servers.items():
         _losses(server, world, store)
+        _spoilt(server, store, problems[name])
     _records(world, store)
     _sessions(world, store)
     for server in world.servers.values():
@@ -193,6 +196,17 @@ def _times(known: Mapping[int, Row], found: Mapping[int, list[dict[str, Any]]]) 
 def _tells(line: Mapping[str, Any], server: Server) -> bool:
     """Whether an event tells of a loss of this server."""
     return line["kind"] in TOLD and spool_of(line) == _identity(server)
+
+
+def _spoilt(server: Server, store: Store, problems: list[str]) -> None:
+    """Batches that were lost as they waited are told by an event each, and verify says so too."""
+    told = {
+        msgspec.json.decode(line["data"]).get("batch")
+        for line in rows_of(store, EVENTS)
+        if _tells(line, server)
+    }
+    check(server.spoilt <= told, "a batch is lost as a whole, and no event tells of it", server.spoilt - told)
+    check(bool(problems) or not server.spoilt, "a batch is lost as a whole, and verify says nothing of it")
 
 
 def _losses(server: Server, world: World, store: Store) -> None:

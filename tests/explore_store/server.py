@@ -75,6 +75,7 @@ class Server:
         self.walls_ns = [times.wall_ns]  # what its clock has added to the true time; the last one does now
         self.folder = disk.root / f"spool-{name}"
         self.damaged = False  # somebody has flipped a bit in its spool
+        self.spoilt: set[int] = set()  # batches that somebody has emptied, cut off or removed as they waited
         self.rolled_back = False  # somebody has put an older copy of it in its place
         self.copied: dict[str, bytes] = {}
         self.life = 0

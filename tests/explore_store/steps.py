@@ -13,6 +13,7 @@ from typing import Final, Self
 from ml.store import NoSuchTable, Store, StoreError, upkeep
 from ml.store.query import query
 from ml.store.tables import TELEMETRY
+from server_gui.core.cloud import spooled
 from tests.explore_store import judging
 from tests.explore_store.damages import DAMAGES
 from tests.explore_store.disk import Ended
@@ -200,6 +201,26 @@ def _flip(world: World, s: int, file: int, seed: int) -> None:
         server.damaged = True
 
 
+def _spoil(world: World, s: int, file: int, how: int) -> None:
+    """A batch that waits is emptied, cut off, or, where there is one before it, removed."""
+    server = world.servers[SERVERS[s]]
+    world.end(SERVERS[s], 0, power=False)
+    waiting = spooled.waiting(server.folder)
+    files = [server.folder / f"{number:08}.db" for number in waiting[how == 2 : -1]]
+    files = [each for each in files if not each.with_name(f"{each.name}-wal").exists()]
+    if not files:
+        return
+    spoilt = files[file % len(files)]
+    with world.disk.unseen():
+        if how == 2:
+            spoilt.unlink()
+        else:
+            spoilt.write_bytes(spoilt.read_bytes()[: how * spoilt.stat().st_size // 2])
+        world.disk.sync()
+    server.damaged = True
+    server.spoilt.add(int(spoilt.stem))
+
+
 def _copy(world: World, s: int, *_: int) -> None:
     """Somebody copies the spool's folder, while nobody records."""
     server = world.servers[SERVERS[s]]
@@ -215,6 +236,7 @@ def _roll_back(world: World, s: int, *_: int) -> None:
     if not server.folder.is_dir():
         return
     server.rolled_back = True
+    server.spoilt.clear()
     judging.roll_back(world, server)
     with world.disk.unseen():
         for path in server.folder.iterdir():
@@ -313,6 +335,7 @@ KINDS: Final = {
     "s3": Kind(_s3, (3, 12), 3),
     "fails": Kind(_fails, (2, 3), 2),
     "flip": Kind(_flip, (2, 4, 10_000), 1),
+    "spoil": Kind(_spoil, (2, 4, 3), 1),
     "copy": Kind(_copy, (2,), 1),
     "roll-back": Kind(_roll_back, (2,), 1),
     "damage": Kind(_damage, (len(DAMAGES),), 2),

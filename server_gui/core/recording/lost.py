@@ -80,9 +80,10 @@ class Losses:
 def _told(table: str, lost: Lost) -> str:
     rows = "1 row" if lost.rows == 1 else f"{lost.rows} rows"
     of = f" of {table}" if table else ""
-    span = ", {} to {}".format(*map(_time, lost.times_ns)) if lost.times_ns else ""
+    span = ", {} to {}".format(*map(told_time, lost.times_ns)) if lost.times_ns else ""
     return rows + of + span
 
 
-def _time(utc_ns: int) -> str:
+def told_time(utc_ns: int) -> str:
+    """A time for people, in UTC."""
     return f"{datetime.fromtimestamp(utc_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S.%f}Z"

@@ -228,7 +228,8 @@ class Spool:
         if found := (aside | gone) - self._settled:
             self._settled |= found & {each.batch for each in self.receipts.all() if isinstance(each, Receipt)}
         return {
-            number: f"{self._path(number, Kept.DAMAGED)} was set aside: what batch {number} held is lost"
+            number: f"batch {number} of the spool {self.folder} cannot be read, and what it held is lost: "
+            f"its file is kept as {self._path(number, Kept.DAMAGED).name}"
             if number in aside
             else f"batch {number} of the spool {self.folder} is gone: its file is not there, and no receipt "
             "says that it was uploaded"

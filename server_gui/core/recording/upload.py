@@ -18,6 +18,7 @@ from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.lost import told_time
 from server_gui.core.recording.receipts import Part, Receipt
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
@@ -102,7 +103,7 @@ def upload(segment: Segment, spool: str, store: Store) -> Sent:
     parts: list[Part] = []
     for location, robots in _robots(segment, store).items():
         parts += _telemetry(segment, writer, store, location, robots)
-    lost = [*map(_run_lost, segment.damaged()), *map(_record_lost, segment.damaged_records())]
+    lost = [*map(_run_lost, segment.damaged()), *_records_lost(segment)]
     is_damaged = bool(lost)
     lost += _commits_lost(segment)
     found: dict[str, list[dict[str, Any]]] = defaultdict(list)
@@ -234,11 +235,19 @@ def _run_lost(lost: DamagedRun) -> _Lost:
     return _Lost(-2 * lost.number, text, (lost.robot,), lost.session, lost.connection, data)
 
 
-def _record_lost(lost: DamagedRecord) -> _Lost:
+def _records_lost(segment: Segment) -> Iterator[_Lost]:
+    damaged = segment.damaged_records()
+    times = [(number, record.fields.get("utc")) for number, record in segment.numbered()] if damaged else []
+    for lost in damaged:
+        near = [(abs(number - lost.number), utc_ns) for number, utc_ns in times if isinstance(utc_ns, int)]
+        yield _record_lost(lost, segment.number, min(near, default=(0, segment.began_utc_ns))[1])
+
+
+def _record_lost(lost: DamagedRecord, batch: int, about_ns: int) -> _Lost:
     whose = lost.robots[0] if len(lost.robots) == 1 else f"one of {', '.join(lost.robots) or 'no robot'}"
     text = (
-        f"row {lost.number} of a batch, of {whose} (a session, label, event or the like), "
-        "was damaged in the spool and is not in the store"
+        f"row {lost.number} of batch {batch}, of {whose}, from about {told_time(about_ns)} (a session, "
+        "label, event or the like), was damaged in the spool and is not in the store"
     )
     return _Lost(-2 * lost.number - 1, text, lost.robots, None, None, {"rows": 1})
 

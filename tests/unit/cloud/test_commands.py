@@ -212,8 +212,10 @@ def test_the_store_is_browsed(desk: Desk) -> None:
 def test_what_waits_is_uploaded_once(desk: Desk) -> None:
     recorded = desk.record(sent=False)
     assert desk.ask("cloud", "upload") == {"uploaded": 1, "waiting": 0}
+    desk.record(sent=False)
+    assert "1 batch uploaded to" in desk.run("cloud", "upload")
     assert desk.ask("cloud", "upload") == {"uploaded": 0, "waiting": 0}
-    assert recorded.store.dataset("telemetry/000").count_rows() == ROWS
+    assert recorded.store.dataset("telemetry/000").count_rows() == 2 * ROWS
 
 
 def test_a_spool_that_another_server_owns_is_left_alone(desk: Desk) -> None:
@@ -276,7 +278,9 @@ def test_a_store_moves_to_another_url_and_back_in_parts(desk: Desk, tmp_path: Pa
     assert desk.run("cloud", "verify", moved).startswith(f"{moved} is whole")
 
 
-def test_upkeep_tells_what_it_would_do_and_leaves_what_a_model_names(desk: Desk) -> None:
+def test_upkeep_tells_what_it_would_do_and_leaves_what_a_model_names(
+    desk: Desk, capsys: pytest.CaptureFixture[str]
+) -> None:
     recorded = desk.record()
     desk.record()
     version = recorded.store.table("events").version()
@@ -292,6 +296,7 @@ def test_upkeep_tells_what_it_would_do_and_leaves_what_a_model_names(desk: Desk)
     for days in ("-1", "nan", "1e9", "week"):
         with pytest.raises(SystemExit):
             desk.run("cloud", "retain", "--days", days)
+        assert f"{days!r} days: write a number from 0 to" in capsys.readouterr().err
     assert "there is no terminal to ask on" in desk.run("cloud", "retain", "--days", "0", status=1)
     assert desk.ask("cloud", "retain", "--days", "0", "--dry-run") == {"telemetry/000": 2 * ROWS}
     assert desk.ask("cloud", "retain", "--days", "0", "--yes") == {"telemetry/000": 2 * ROWS}

@@ -185,6 +185,7 @@ def until_it_answers(settings: ServerSettings, collector: Collector) -> None:
             "lies outside the session .* goes from 2027-01-15 08:00:00.000 to .*08:01:00.000",
         ),
         (label(end=61.0), "lies outside the session"),
+        (label(begin=70.0, end=70.0), "lies outside the session"),
         (label("left_heel_strike"), "this happens at one instant"),
         (label("sit", 15, 25), r"sit from .* contradicts walk from .* by the same author"),
         (label("  "), "'  ' is no name"),

@@ -75,7 +75,7 @@ def test_a_batch_that_is_lost_while_it_waits_is_told_by_exit_status_event_and_ve
     assert main(["cloud", "upload", "--config", str(config)]) == 1
     said = capsys.readouterr()
     assert f"{number:08}" in said.err or f"batch {number} of the spool" in said.err
-    assert said.out.startswith(f"{len(list(spool.glob('*.uploaded.db')))} batches uploaded")
+    assert said.out.startswith(f"{len(list(spool.glob('*.uploaded.db')))} batches uploaded to")
     store = Store(folder_url)
     assert told(store) == [("exo-01", number)]
     assert store.dataset(HERE).count_rows() == 2

@@ -207,7 +207,7 @@ def test_a_damaged_batch_keeps_none_after_it_from_the_store(
     seqs = sorted(Store(folder_url).dataset(HERE).to_table()["seq"].to_pylist())
     lost, rows, kept = {
         "header": (["the spool's file "], ["0", "2"], [0, 2]),
-        "record": (["row 0 of a batch, of exo-01"], ["0", "2"], [0, 1, 2]),
+        "record": (["row 0 of batch 2, of exo-01, from about 20"], ["0", "2"], [0, 1, 2]),
         "run": (["1 rows of exo-01, stream 7 from notification 1 on, were"], ["0", "1", "2"], [0, 2]),
     }[part]
     assert (sorted(text for text in texts if len(text) == 1), seqs) == (rows, kept)
