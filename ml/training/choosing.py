@@ -59,7 +59,7 @@ def held_out(groups: Iterable[str], wanted: Sequence[str] = (), others: int = 0)
             chosen -= {max(chosen, key=_place)}
     if not chosen or len(known) - len(chosen) + others < 2:
         raise UnusableData(
-            f"there are {len(known)} wearers or sessions with labels ({', '.join(known) or 'none'}): "
+            f"labels are of {len(known)} wearers or sessions ({', '.join(known) or 'none'}): "
             "it takes two to learn from and one to judge by"
         )
     return chosen

@@ -5,13 +5,14 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
-from gateway.cli.text import say, say_json, size, warn
+from gateway.cli.text import counted, say, say_json, size, warn
 from ml.store import sessions
 from ml.store.errors import StoreError
+from ml.store.objects import Objects
 from ml.store.sessions import Session
-from ml.store.store import Store, checked_url
+from ml.store.store import ABOUT, Store, checked_url
 from server_gui.commands.cloud_reach import add_url, parser, progress, reach, url
-from server_gui.core.cloud import parts, transfer
+from server_gui.core.cloud import parts, transfer, verify
 from server_gui.core.fleet.door import NobodyCollects, ask
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
@@ -67,6 +68,9 @@ def upload(argv: list[str]) -> int:
 def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     """Upload it here and now."""
     settings = load(arguments.config).store
+    wanted = checked_url(arguments.url or settings.url)
+    if Objects(wanted).read(ABOUT) is None and verify.sent_to(wanted, folder):
+        raise StoreError(verify.no_store(wanted, folder))
     store = (
         Store(settings.url, settings.shards, settings.several_writers)
         if arguments.url is None
@@ -87,7 +91,7 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     uploaded = len(waiting) - len(damaged)
     _tell(
         arguments,
-        f"{uploaded} batches uploaded to {store.url}; nothing waits",
+        f"{counted(uploaded, 'batch', 'batches')} uploaded to {store.url}; nothing waits",
         uploaded=uploaded,
         waiting=0,
     )

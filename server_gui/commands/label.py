@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from gateway.cli.text import NONE, say, say_json, table, warn
+from gateway.cli.text import NONE, counted, say, say_json, table, warn
 from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
 from ml.store.private import private_files
@@ -110,7 +110,7 @@ def _tell(kept: Kept, *, as_json: bool) -> int:
         say_json(msgspec.to_builtins(kept))
         return 0
     already = f", {kept.known} were so already" if kept.known else ""
-    say(f"{kept.new} labels kept in the {kept.where.value}{already}\n")
+    say(f"{counted(kept.new, 'label')} kept in the {kept.where.value}{already}\n")
     if kept.problem:
         warn("label", f"they wait in the spool: {kept.problem}")
     return 0

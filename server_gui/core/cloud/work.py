@@ -8,7 +8,7 @@ from typing import Final
 
 import pyarrow as pa
 
-from gateway.cli.text import size
+from gateway.cli.text import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
 from server_gui.core.cloud import parts, transfer, verify
@@ -57,7 +57,7 @@ def upload(settings: ServerSettings) -> Work:
             for number in waiting:
                 send(spool, number, store)
                 job.advance(1)
-        return f"{len(waiting)} batches uploaded to {settings.store.url}; nothing waits"
+        return f"{counted(len(waiting), 'batch', 'batches')} uploaded to {settings.store.url}; nothing waits"
 
     return work
 

@@ -159,7 +159,7 @@ def test_the_command_labels_lists_and_takes_back(config: str, capsys: pytest.Cap
         assert main.main(["label", SESSION[:8], "--config", config, *arguments]) == 0
         return capsys.readouterr().out
 
-    assert run("walk", "--from", "1", "--to", "2027-01-15T08:00:02") == "1 labels kept in the store\n"
+    assert run("walk", "--from", "1", "--to", "2027-01-15T08:00:02") == "1 label kept in the store\n"
     assert "1 were so already" in run("walk", "--from", "1", "--to", "2")
     run("--wearer", "P03")
     (wearer, walk) = msgspec.json.decode(run("--ls", "--json"), type=list[Label])

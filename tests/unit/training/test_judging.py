@@ -130,7 +130,7 @@ def test_different_wearers_stay_different_people() -> None:
 @pytest.mark.parametrize(
     ("groups", "wanted", "words"),
     [
-        (["P1", "P2"], [], r"there are 2 wearers or sessions with labels \(P1, P2\): it takes two to learn"),
+        (["P1", "P2"], [], r"labels are of 2 wearers or sessions \(P1, P2\): it takes two to learn"),
         ([], [], r"with labels \(none\)"),
         (["P1", "P2", "P3"], ["P1", "P2"], "it takes two to learn from and one to judge by"),
         (["P1", "P2", "P3"], ["P9"], "nobody is called 'P9'; there are P1, P2, P3"),
