@@ -100,9 +100,8 @@ def _tell(arguments: argparse.Namespace, found: mending.Plan, problems: Sequence
         rows = sum(file.rows for file in found.files)
         lines = [f"{file.location}/{file.path}: {file.rows} rows" for file in found.files]
         if found.files:
-            lines.append(
-                f"{counted(len(found.files), 'file')} with {counted(rows, 'row')} {would}taken out of the store"
-            )
+            files = counted(len(found.files), "file")
+            lines.append(f"{files} with {counted(rows, 'row')} {would}taken out of the store")
         if found.batches:
             lines.append(f"{verify.told_batches(found.batches)} {would}brought again from the spool")
         if not (lines or problems):
