@@ -139,7 +139,7 @@ def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt |
     if gone := mending.taken_out(store):
         yield (
             f"{sum(each.rows for each in gone)} rows in {counted(len(gone), 'file')} were taken out of tables "
-            f"by gwrms cloud mend ({store.url}/mended says which); what receipts here prove is there again"
+            f"by gwrms cloud mend ({store.url}/mended says which); what receipts here prove is back"
         )
 
 
