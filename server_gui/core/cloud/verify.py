@@ -34,6 +34,7 @@ class Verdict:
     proof: Proof
     problems: Sequence[str]
     notes: Sequence[str] = ()  # what is not wrong, and worth knowing
+    rows_unproven: int = 0  # of the files that are whole, rows that no receipt here speaks of
 
     @property
     def rows(self) -> int:
@@ -43,7 +44,7 @@ class Verdict:
     @property
     def unproven(self) -> str:
         """How many rows no receipt speaks of, in words; nothing where there is none."""
-        rows = self.rows - self.proof.rows
+        rows = self.rows_unproven
         return f"{rows} of {self.rows} rows are proven by no receipt here" if rows > 0 else ""
 
     @property
@@ -97,7 +98,9 @@ def whole(
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
-    return Verdict(found, proof, list(dict.fromkeys(problems)), [*_notes(store, spool, proof, receipts)])
+    notes = [*_notes(store, spool, proof, receipts)]
+    unproven = sum(file.rows for file in sound) - proof.seen
+    return Verdict(found, proof, list(dict.fromkeys(problems)), notes, unproven)
 
 
 def receipts_of(spool: Path) -> list[Receipt | Altered]:
@@ -138,7 +141,7 @@ def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt |
         )
     if gone := mending.taken_out(store):
         yield (
-            f"{sum(each.rows for each in gone)} rows in {counted(len(gone), 'file')} were taken out of tables "
+            f"{sum(each.rows for each in gone)} rows in {counted(len(gone), 'file')} were taken out "
             f"by gwrms cloud mend ({store.url}/mended says which); what receipts here prove is back"
         )
 

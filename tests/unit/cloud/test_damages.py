@@ -320,6 +320,12 @@ def test_what_no_receipt_proves_is_counted_on_a_line_of_its_own(place: Place) ->
     assert place.told().splitlines()[-1] == "315 of 420 rows are proven by no receipt here"
 
 
+def test_what_is_missing_or_altered_is_not_called_unproven(place: Place) -> None:
+    file_deleted(place)
+    event_altered(place)
+    assert "no receipt here" not in place.told()
+
+
 def test_a_store_is_whole_however_its_files_were_put_together(place: Place) -> None:
     assert place.verify() == (0, "")
     store = Store(place.url)
