@@ -150,12 +150,12 @@ def check(new: Sequence[Label], known: Iterable[Label], session: Session) -> Non
     """Raise `BadLabel` where a new label cannot be so."""
     begins, ends = span(session)
     for label in new:
-        _check(label)
         if label.began_utc_ns < begins or label.ended_utc_ns > ends:
             raise BadLabel(
                 f"{_told(label)} lies outside the session {session.session}, "
                 f"which goes from {_time(begins)} to {_time(ends)}"
             )
+        _check(label)
     for one, other in _contradictions([*known, *new], set(new)):
         raise BadLabel(f"{_told(one)} contradicts {_told(other)} by the same author; take one of them back")
 

@@ -236,3 +236,12 @@ def test_days_that_are_none_are_refused_in_words(place: Place, capsys: pytest.Ca
     with pytest.raises(SystemExit):
         place.told("retain", "--days", "x")
     assert "'x' is no number of days: write a number from 0 to" in capsys.readouterr().err
+
+
+def test_what_waits_to_be_uploaded_again_is_not_called_lost(place: Place) -> None:
+    for file in place.files():
+        file.unlink()
+    place.rename_back("00000002")
+    assert "second copy" not in place.told("mend")
+    assert "1 batch uploaded" in place.told("upload")
+    assert place.verify() == (0, "")
