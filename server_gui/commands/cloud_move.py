@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gateway.cli.text import counted, say, say_json, size, warn
 from ml.store import sessions
-from ml.store.errors import StoreError
+from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.objects import Objects
 from ml.store.sessions import Session
 from ml.store.store import ABOUT, Store, checked_url
@@ -78,24 +78,28 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     )
     with Spool(folder) as spool:
         waiting = spool.waiting()
-        damaged = []
+        damaged, waits = [], []
         with progress("batches", len(waiting)) as advance:
             for number in waiting:
                 try:
                     send(spool, number, store)
                 except Damaged as error:
                     damaged.append(str(error))
+                except (StoreUnreachable, StoreRefused):
+                    raise
+                except StoreError as error:  # as where a file of the table is gone that this one is in
+                    waits.append(f"batch {number} waits: {error}")
                 advance(1)
-    for problem in damaged:
+    for problem in (*damaged, *waits):
         warn("cloud", problem)
-    uploaded = len(waiting) - len(damaged)
+    uploaded = len(waiting) - len(damaged) - len(waits)
     _tell(
         arguments,
-        f"{counted(uploaded, 'batch', 'batches')} uploaded to {store.url}; nothing waits",
+        f"{counted(uploaded, 'batch', 'batches')} uploaded to {store.url}; {len(waits) or 'nothing'} waits",
         uploaded=uploaded,
-        waiting=0,
+        waiting=len(waits),
     )
-    return 1 if damaged else 0
+    return 1 if damaged or waits else 0
 
 
 def download(argv: list[str]) -> int:

@@ -398,7 +398,9 @@ def test_whoever_meets_a_missing_file_is_told_what_helps(place: Place) -> None:
     file_deleted(place)
     said = place.told("compact") + place.told("mend", "--dry-run")
     place.rename_back("00000001", "00000002", "00000003")
+    record(place.url, place.spool, sent=False)
     upload = place.told("upload")
+    assert (place.spool / "00000004.uploaded.db").exists()
     assert "is not there; bring it back from a copy, or let gwrms cloud mend take it out" in upload
     assert "errno" not in said + upload
     place.told("mend")
