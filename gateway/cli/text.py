@@ -48,6 +48,11 @@ def warn(command: str, text: str) -> None:
     sys.stderr.write(f"gwrms {command}: {shown}\n")
 
 
+def counted(count: int, one: str, more: str = "") -> str:
+    """So many of something, in words."""
+    return f"{count} {one if count == 1 else more or f'{one}s'}"
+
+
 def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
     """A channel's value: a state as its word, a number with few decimals, a dash where there is none."""
     if value is None:

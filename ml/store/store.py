@@ -262,7 +262,10 @@ class Store:
         try:
             about = msgspec.json.decode(data, type=About)
         except msgspec.DecodeError as error:
-            raise StoreError(f"{self.url}/{ABOUT} is damaged: {error}") from error
+            raise StoreError(
+                f"{self.url}/{ABOUT} is damaged: {error}; bring it back from a copy of the store, or write "
+                '{"format":1,"shards":N,"several_writers":true} into it, N for the folders in telemetry'
+            ) from error
         if about.format != FORMAT:
             raise StoreError(f"the store {self.url} has format {about.format}; this GWRMS reads {FORMAT}")
         return about

@@ -63,15 +63,23 @@ def pin(store: Store, location: str, version: int, by: str) -> None:
     """
     named = Pin(location, version, by)
     delta, path = store.table(location, version), _path(named)
+    _check_whole(store, location, delta)
     new = store.objects.create(path, msgspec.json.encode(named))  # a vacuum that begins now knows of it
+    try:
+        _check_whole(store, location, delta)
+    except NoSuchTable:
+        if new:
+            store.objects.remove(path)
+        raise
+
+
+def _check_whole(store: Store, location: str, delta: DeltaTable) -> None:
     there = set(store.objects.names(location))
     gone = _gone(location, delta, there)
     if gone:
-        if new:
-            store.objects.remove(path)
         raise NoSuchTable(
-            f"{store.url}/{location} has {gone} of the files of version {version} no more: old ones were "
-            f"removed (gwrms cloud vacuum): {_can_be_pinned(store, location, there)}"
+            f"{store.url}/{location} has {gone} of the files of version {delta.version()} no more: old ones "
+            f"were removed (gwrms cloud vacuum): {_can_be_pinned(store, location, there)}"
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gateway.cli.reach import ask
-from gateway.cli.text import say, say_json, warn
+from gateway.cli.text import counted, say, say_json, warn
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore
 from ml.store.objects import Objects
 from ml.store.tables import TELEMETRY
@@ -100,7 +100,8 @@ def _tell(arguments: argparse.Namespace, found: mending.Plan, problems: Sequence
         rows = sum(file.rows for file in found.files)
         lines = [f"{file.location}/{file.path}: {file.rows} rows" for file in found.files]
         if found.files:
-            lines.append(f"{len(found.files)} files with {rows} rows {would}taken out of the store")
+            files = counted(len(found.files), "file")
+            lines.append(f"{files} with {counted(rows, 'row')} {would}taken out of the store")
         if found.batches:
             lines.append(f"{verify.told_batches(found.batches)} {would}brought again from the spool")
         if not (lines or problems):

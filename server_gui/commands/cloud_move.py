@@ -5,13 +5,14 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
-from gateway.cli.text import say, say_json, size, warn
+from gateway.cli.text import counted, say, say_json, size, warn
 from ml.store import sessions
-from ml.store.errors import StoreError
+from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
+from ml.store.objects import Objects
 from ml.store.sessions import Session
-from ml.store.store import Store, checked_url
+from ml.store.store import ABOUT, Store, checked_url
 from server_gui.commands.cloud_reach import add_url, parser, progress, reach, url
-from server_gui.core.cloud import parts, transfer
+from server_gui.core.cloud import parts, transfer, verify
 from server_gui.core.fleet.door import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.spool import Spool
@@ -72,6 +73,9 @@ def upload(argv: list[str]) -> int:
 def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     """Upload it here and now."""
     settings = load(arguments.config).store
+    wanted = checked_url(arguments.url or settings.url)
+    if Objects(wanted).read(ABOUT) is None and verify.sent_to(wanted, folder):
+        raise StoreError(verify.no_store(wanted, folder))
     store = (
         Store(settings.url, settings.shards, settings.several_writers)
         if arguments.url is None
@@ -82,7 +86,7 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
             warn("cloud", problem)
         damaged = lost_batches(spool, store)
         waiting = spool.waiting()
-        uploaded = 0
+        uploaded, waits = 0, []
         with progress("batches", len(waiting)) as advance:
             for number in waiting:
                 try:
@@ -90,16 +94,20 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
                     uploaded += 1
                 except Damaged as error:
                     damaged.append(str(error))
+                except (StoreUnreachable, StoreRefused):
+                    raise
+                except StoreError as error:  # as where a file of the table is gone that this one is in
+                    waits.append(f"batch {number} waits: {error}")
                 advance(1)
-    for problem in damaged:
+    for problem in (*damaged, *waits):
         warn("cloud", problem)
     _tell(
         arguments,
-        f"{uploaded} {'batch' if uploaded == 1 else 'batches'} uploaded to {store.url}; nothing waits",
+        f"{counted(uploaded, 'batch', 'batches')} uploaded to {store.url}; {len(waits) or 'nothing'} waits",
         uploaded=uploaded,
-        waiting=0,
+        waiting=len(waits),
     )
-    return 1 if damaged else 0
+    return 1 if damaged or waits else 0
 
 
 def download(argv: list[str]) -> int:

@@ -5,7 +5,7 @@ import math
 from datetime import UTC, datetime, timedelta
 
 from gateway.cli.reach import ask
-from gateway.cli.text import say, say_json, table
+from gateway.cli.text import counted, say, say_json, table
 from ml.store import TABLES, TELEMETRY, Store, UnsafeStore, upkeep
 from ml.store.tables import RESOURCES
 from server_gui.commands.cloud_reach import add_url, parser, reach, when
@@ -76,7 +76,7 @@ def vacuum(argv: list[str]) -> int:
         kept = "".join(
             f"kept for {pin.by}: {pin.location}, version {pin.version}\n" for pin in upkeep.pins(store)
         )
-        say("".join(f"{name}\n" for name in gone) + f"{len(gone)} files {went}\n" + kept)
+        say("".join(f"{name}\n" for name in gone) + f"{counted(len(gone), 'file')} {went}\n" + kept)
     return 0
 
 
@@ -96,7 +96,9 @@ def _days(text: str) -> float:
     except ValueError:
         days = math.nan
     if not 0 <= days <= MOST_DAYS:
-        raise argparse.ArgumentTypeError(f"{text!r} days: write a number from 0 to {MOST_DAYS}")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number of days: write a number from 0 to {MOST_DAYS}"
+        )
     return days
 
 

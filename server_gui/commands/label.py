@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from gateway.cli.text import NONE, say, say_json, table, warn
+from gateway.cli.text import NONE, counted, say, say_json, table, warn
 from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
 from ml.store.private import private_files
@@ -105,16 +105,12 @@ def _remove(labelling: Labelling, labels: Sequence[Label], *, as_json: bool) -> 
     return 0
 
 
-def _counted(labels: int) -> str:
-    return "1 label" if labels == 1 else f"{labels} labels"
-
-
 def _tell(kept: Kept, *, as_json: bool) -> int:
     if as_json:
         say_json(msgspec.to_builtins(kept))
         return 0
     already = f", {kept.known} {'was' if kept.known == 1 else 'were'} so already" if kept.known else ""
-    say(f"{_counted(kept.new)} kept in the {kept.where.value}{already}\n")
+    say(f"{counted(kept.new, 'label')} kept in the {kept.where.value}{already}\n")
     if kept.problem:
         warn("label", f"they wait in the spool: {kept.problem}")
     return 0

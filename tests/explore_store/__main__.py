@@ -52,10 +52,17 @@ def _search(seconds: float, seed: int, words: list[str], saying: str) -> int:
     from tests.explore_store.searching import search, told
     from tests.explore_store.steps import KINDS
 
+    if unknown := set(words) - set(KINDS):
+        _say(f"there is no step {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
+        return 2
     found = search(seconds, seed, words or tuple(KINDS), saying)
     _say(
         f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended"
-        + (f"; {found.known} plays ended in what is known" if found.known else "")
+        + (
+            f"; {found.known} plays ended in what is not mended yet (KNOWN in searching.py)"
+            if found.known
+            else ""
+        )
     )
     if found.wrong is None:
         return 0
@@ -70,8 +77,13 @@ def _replay(text: str) -> int:
     from tests.explore_store.steps import Script
 
     try:
+        script = Script.parsed(text)
+    except (ValueError, LookupError) as error:
+        _say(str(error))
+        return 2
+    try:
         with S3() as s3:
-            points = played(Script.parsed(text), s3)
+            points = played(script, s3)
     except Exception as error:  # noqa: BLE001 - that is what it is for
         _say(told(error))
         return 1

@@ -1,6 +1,6 @@
 """What somebody may do to a store whose rows are all there: `gwrms cloud verify` must find each."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -8,6 +8,8 @@ from deltalake import DeltaTable, write_deltalake
 
 from ml.store import NoSuchTable, Store
 from ml.store.tables import TELEMETRY
+from ml.store.upkeep import pins
+from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 from tests.explore_store.robots import COUNT
 
 
@@ -59,9 +61,39 @@ DAMAGES: Final[tuple[Callable[[DeltaTable, Path], None], ...]] = (
 )
 
 
-def do(store: Store, which: int) -> bool:
-    """Damage its telemetry; False where there is none, or nothing that this could be done to."""
+def _receipts_cut_off(spools: Sequence[Path]) -> bool:
+    """The newest receipt goes, of a batch that has no other and is still beside it."""
+    for spool in spools:
+        known = [each for each in Receipts(spool / RECEIPTS).all() if isinstance(each, Receipt)]
+        if not known or not known[-1].parts:
+            continue
+        names = [(each.writer, each.batch) for each in known]
+        if (spool / f"{names[-1][1]:08}.uploaded.db").exists() and names.count(names[-1]) == 1:
+            lines = (spool / RECEIPTS).read_bytes().splitlines(keepends=True)
+            (spool / RECEIPTS).write_bytes(b"".join(lines[:-1]))
+            return True
+    return False
+
+
+def _pinned_gone(store: Store) -> bool:
+    """A file goes that a pinned version needs, and the newest one does not."""
+    for pin in pins(store):
+        folder = Path(store.folder or "") / pin.location
+        needed = set(_files(store.table(pin.location, pin.version), folder))
+        for file in sorted(needed - set(_files(store.table(pin.location), folder))):
+            file.unlink()
+            return True
+    return False
+
+
+NAMES: Final = (*(each.__name__ for each in DAMAGES), "_receipts_cut_off", "_pinned_gone")
+
+
+def do(store: Store, which: int, spools: Sequence[Path]) -> bool:
+    """Damage its telemetry or what else proves it; False where there is nothing to do this to."""
     assert store.folder is not None
+    if which >= len(DAMAGES):
+        return _receipts_cut_off(spools) if which == len(DAMAGES) else _pinned_gone(store)
     for location in TELEMETRY.locations(store.about.shards):
         try:
             table = store.table(location)

@@ -91,11 +91,13 @@ def judge(world: World) -> None:
         world.damage is not None
         and not world.retained
         and world.s3 is None
-        and damages.do(Store.existing(world.url), world.damage)
+        and damages.do(
+            Store.existing(world.url), world.damage, [server.folder for server in world.servers.values()]
+        )
     ):
         store = Snapshot.existing(world.url)
         seen = [problem for server in world.servers.values() for problem in verified(store, server)]
-        check(bool(seen), "verify does not find a damage", damages.DAMAGES[world.damage].__name__)
+        check(bool(seen), "verify does not find a damage", damages.NAMES[world.damage])
 
 
 def verified(store: Store, server: Server) -> list[str]:

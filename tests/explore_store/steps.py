@@ -15,7 +15,7 @@ from ml.store.query import query
 from ml.store.tables import TELEMETRY
 from server_gui.core.cloud import spooled
 from tests.explore_store import judging
-from tests.explore_store.damages import DAMAGES
+from tests.explore_store.damages import NAMES
 from tests.explore_store.disk import Ended
 from tests.explore_store.s3 import S3, Fault
 from tests.explore_store.server import PEOPLE, flip
@@ -338,7 +338,7 @@ KINDS: Final = {
     "spoil": Kind(_spoil, (2, 4, 3), 1),
     "copy": Kind(_copy, (2,), 1),
     "roll-back": Kind(_roll_back, (2,), 1),
-    "damage": Kind(_damage, (len(DAMAGES),), 2),
+    "damage": Kind(_damage, (len(NAMES),), 2),
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
     "vacuum": Kind(_kept_up(lambda store: upkeep.vacuum(store, grace=timedelta(0))), (), 1),
     "retain": Kind(_retain, (6,), 1),
@@ -377,6 +377,13 @@ class Script:
     def parsed(cls, text: str) -> Self:
         """What `str` has made."""
         first, *words = (step.split() for step in text.split(";") if step.strip())
+        unknown = [word for word, *_ in words if word not in KINDS]
+        if first[:1] != ["at"] or len(first) != 2 or unknown:
+            places = ", ".join(each.value for each in Place)
+            raise ValueError(
+                f"{text!r} is no play: it begins with 'at', a place ({places}) and a semicolon; steps are "
+                f"{', '.join(KINDS)}"
+            )
         return cls(Place(first[1]), tuple(Step(word, tuple(map(int, numbers))) for word, *numbers in words))
 
 

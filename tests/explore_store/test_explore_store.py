@@ -55,3 +55,18 @@ def test_a_defect_put_back_is_found_and_its_play_can_be_played_again() -> None:
 def test_a_play_is_played_anywhere(place: str, play: str) -> None:
     done = _explore("--replay", f"at {place}; {play}")
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    "options", [("--words", "nosuch"), ("--replay", "at folder; foo 1"), ("--replay", "x")]
+)
+def test_what_is_no_step_is_said_with_those_that_there_are(options: tuple[str, ...]) -> None:
+    done = _explore(*options)
+    assert (done.returncode, done.stderr) == (2, "")
+    assert "roll-back" in done.stdout
+
+
+def test_receipts_cut_off_and_a_pinned_file_removed_are_found() -> None:
+    sent = "rows 0 0 3; send 0; rows 0 0 3; send 0; "
+    assert _explore("--replay", f"at folder; {sent}damage 8").returncode == 0
+    assert _explore("--replay", f"at folder; {sent}pin 0; compact; damage 9").returncode == 0

@@ -67,7 +67,8 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
     copies = verify.second_copies(spool.folder)
     unproven = {batch.number for batch in verify.copies(spool.folder, _known(receipts))[0]}
     again = {number for number, batch in copies.items() if batch in proof.lacking} | unproven
-    nowhere = sorted(number for _, number in proof.lacking - set(copies.values()))
+    waiting = spool.waiting()  # the next upload brings these
+    nowhere = sorted(number for _, number in proof.lacking - set(copies.values()) if number not in waiting)
     lost = (
         [f"the spool has no second copy of {verify.told_batches(nowhere)}: bring one back"] if nowhere else []
     )

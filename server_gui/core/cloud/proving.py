@@ -47,6 +47,7 @@ class Proof:
     here: int = 0  # batches with a receipt of this store
     batches: int = 0  # of them, those that were found as they were sent
     rows: int = 0  # of them
+    seen: int = 0  # rows that receipts speak of, as they were sent or not
     retained: int = 0  # rows of them that were removed because they were old
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
@@ -89,6 +90,7 @@ def prove(
     retained = {location: upkeep.retained(store, location) for location in {c.part.location for c in claims}}
     wrong = set()
     for claim in claims:
+        proof.seen += claim.rows
         problem = _problem(claim, retained[claim.part.location], values=values)
         if claim.part.location in unknown:
             wrong.add(claim.batch)

@@ -10,7 +10,7 @@ from typing import Final
 
 import pyarrow.parquet as pq
 
-from gateway.cli.text import size
+from gateway.cli.text import counted, size
 from ml.store import mending, reading
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
 from ml.store.fragments import DataFile, data_files
@@ -34,6 +34,7 @@ class Verdict:
     proof: Proof
     problems: Sequence[str]
     notes: Sequence[str] = ()  # what is not wrong, and worth knowing
+    rows_unproven: int = 0  # of the files that are whole, rows that no receipt here speaks of
 
     @property
     def rows(self) -> int:
@@ -43,7 +44,7 @@ class Verdict:
     @property
     def unproven(self) -> str:
         """How many rows no receipt speaks of, in words; nothing where there is none."""
-        rows = self.rows - self.proof.rows
+        rows = self.rows_unproven
         return f"{rows} of {self.rows} rows are proven by no receipt here" if rows > 0 else ""
 
     @property
@@ -52,8 +53,9 @@ class Verdict:
         rows = self.rows
         size_bytes = sum(file.size_bytes for file in self.files)
         told = [f"{len(self.files)} files with {rows} rows, {size(size_bytes)}"]
+        batches = counted(self.proof.batches, "batch", "batches")
         if self.proof.batches:
-            told.append(f"all {self.proof.rows} rows of {self.proof.batches} batches by their receipts")
+            told.append(f"all {self.proof.rows} rows of {batches} by their receipts")
         else:
             told.append("no receipts of it here, so nobody can say whether rows are missing")
         if self.proof.retained:
@@ -96,7 +98,9 @@ def whole(
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
-    return Verdict(found, proof, list(dict.fromkeys(problems)), [*_notes(store, spool, proof, receipts)])
+    notes = [*_notes(store, spool, proof, receipts)]
+    unproven = sum(file.rows for file in sound) - proof.seen
+    return Verdict(found, proof, list(dict.fromkeys(problems)), notes, unproven)
 
 
 def receipts_of(spool: Path) -> list[Receipt | Altered]:
@@ -137,8 +141,8 @@ def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt |
         )
     if gone := mending.taken_out(store):
         yield (
-            f"{sum(each.rows for each in gone)} rows in {len(gone)} files were taken out of tables by gwrms "
-            f"cloud mend ({store.url}/mended says which); what receipts here prove is there again"
+            f"{sum(each.rows for each in gone)} rows in {counted(len(gone), 'file')} were taken out "
+            f"by gwrms cloud mend ({store.url}/mended says which); what receipts here prove is back"
         )
 
 
@@ -158,8 +162,9 @@ def sent_to(url: str, spool: Path) -> int:
 
 def no_store(url: str, spool: Path) -> str:
     """That a store is no more to which batches of the spool went."""
+    sent = counted(sent_to(url, spool), "batch", "batches")
     return (
-        f"there is no store at {url} any more, though {sent_to(url, spool)} batches of the spool {spool} "
+        f"there is no store at {url} any more, though {sent} of the spool {spool} "
         "went there: bring it back (its store.json too), or end the collector and run gwrms cloud mend: "
         "that makes it anew of the spool's second copies"
     )

@@ -8,7 +8,7 @@ from typing import Final
 
 import pyarrow as pa
 
-from gateway.cli.text import size
+from gateway.cli.text import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
 from server_gui.core.cloud import parts, transfer, verify
@@ -61,8 +61,7 @@ def upload(settings: ServerSettings) -> Work:
                 job.advance(1)
         if lost:
             raise Damaged("; ".join(lost))
-        batches = "1 batch" if len(waiting) == 1 else f"{len(waiting)} batches"
-        return f"{batches} uploaded to {settings.store.url}; nothing waits"
+        return f"{counted(len(waiting), 'batch', 'batches')} uploaded to {settings.store.url}; nothing waits"
 
     return work
 

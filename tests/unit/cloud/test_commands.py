@@ -203,7 +203,7 @@ def test_the_store_is_browsed(desk: Desk) -> None:
     assert recorded.session in desk.run("cloud", "ls", "--path", "telemetry/000")
     first = desk.ask("cloud", "du")["tables"][0]
     assert (first["table"], first["robot"], first["rows"]) == ("telemetry", "exo-01", ROWS)
-    assert desk.run("cloud", "verify").endswith("all 105 rows of 1 batches by their receipts\n")
+    assert desk.run("cloud", "verify").endswith("all 105 rows of 1 batch by their receipts\n")
     [file] = Path(desk.url.removeprefix("file://"), "telemetry/000").rglob("*.parquet")
     file.unlink()
     assert "with 100 rows" in desk.ask("cloud", "verify", status=1)["problems"][0]

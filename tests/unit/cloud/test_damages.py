@@ -320,6 +320,12 @@ def test_what_no_receipt_proves_is_counted_on_a_line_of_its_own(place: Place) ->
     assert place.told().splitlines()[-1] == "315 of 420 rows are proven by no receipt here"
 
 
+def test_what_is_missing_or_altered_is_not_called_unproven(place: Place) -> None:
+    file_deleted(place)
+    event_altered(place)
+    assert "no receipt here" not in place.told()
+
+
 def test_a_store_is_whole_however_its_files_were_put_together(place: Place) -> None:
     assert place.verify() == (0, "")
     store = Store(place.url)
@@ -392,7 +398,9 @@ def test_whoever_meets_a_missing_file_is_told_what_helps(place: Place) -> None:
     file_deleted(place)
     said = place.told("compact") + place.told("mend", "--dry-run")
     place.rename_back("00000001", "00000002", "00000003")
+    record(place.url, place.spool, sent=False)
     upload = place.told("upload")
+    assert (place.spool / "00000004.uploaded.db").exists()
     assert "is not there; bring it back from a copy, or let gwrms cloud mend take it out" in upload
     assert "errno" not in said + upload
     place.told("mend")

@@ -124,7 +124,7 @@ def test_what_is_still_there_of_a_damaged_file_is_kept_and_noted(place: Place) -
     assert (kept.name, kept.read_bytes()) == (damaged.name, content)
     [note] = mending.taken_out(Store(place.url))
     assert (note.rows, note.robot) == (100, "exo-01")
-    assert "100 rows in 1 files were taken out" in place.told()
+    assert "100 rows in 1 file were taken out" in place.told()
 
 
 def test_cut_off_anywhere_it_goes_on(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,3 +220,28 @@ def test_what_waits_is_mentioned_and_cron_hears_nothing(place: Place) -> None:
     record(place.url, place.spool, sent=False)
     assert "not uploaded yet, and not looked at: batch 4 of the spool" in place.told()
     assert place.told("verify", "--quiet") == ""
+
+
+def test_an_upload_begins_no_store_anew_in_the_place_of_one_that_is_gone(place: Place) -> None:
+    record(place.url, place.spool, sent=False)
+    everything_gone(place)
+    assert "though 3 batches of the spool" in place.told("upload")
+    assert not place.store.exists()
+    place.told("mend")
+    assert "1 batch uploaded" in place.told("upload")
+    assert place.verify() == (0, "")
+
+
+def test_days_that_are_none_are_refused_in_words(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        place.told("retain", "--days", "x")
+    assert "'x' is no number of days: write a number from 0 to" in capsys.readouterr().err
+
+
+def test_what_waits_to_be_uploaded_again_is_not_called_lost(place: Place) -> None:
+    for file in place.files():
+        file.unlink()
+    place.rename_back("00000002")
+    assert "second copy" not in place.told("mend")
+    assert "1 batch uploaded" in place.told("upload")
+    assert place.verify() == (0, "")

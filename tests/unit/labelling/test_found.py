@@ -177,6 +177,7 @@ def test_the_command_labels_lists_and_takes_back(config: str, capsys: pytest.Cap
         (["--from", "1"], 2, "say LABEL and --from, or one of"),
         (["walk", "--from", "soon"], 2, "'soon' is no time"),
         (["walk", "--from", "1", "--to", "100"], 1, "lies outside the session"),
+        (["walk", "--from", "100"], 1, "lies outside the session"),
         (["walk", "--from", "1"], 1, "has no length"),
         (["walk", "--from", "1", "--to", "2", "--remove"], 1, "is no label of"),
         (["wlak", "--from", "1", "--to", "2"], 0, "no model learns from 'wlak'"),
