@@ -16,7 +16,7 @@ from drivers.urgency import make_urgent
 from gateway import wire
 from gateway.acceptor import Acceptor
 from gateway.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
-from gateway.loop import HANGUP, READ, Loop
+from gateway.loop import HANGUP, READ, Loop, Timer
 from gateway.registry import StopNow
 from gateway.sharing import TimeSharing
 from gateway.stop_lines import StopSplitter
@@ -78,6 +78,14 @@ class Pace(TimeSharing):
     def __init__(self, front: Loop) -> None:
         super().__init__(front, TURN_NS)
         self.resting = 0  # clients that are left alone just now
+        self._known_turn, self._known_until_ns = -1, 0
+
+    def has_time_for_known(self) -> bool:
+        """Of this turn: of its own, so that neither takes it from the others."""
+        now_ns = time.monotonic_ns()
+        if self._known_turn != self._loop.turns:
+            self._known_turn, self._known_until_ns = self._loop.turns, now_ns + TURN_NS
+        return now_ns < self._known_until_ns
 
     def rest_s(self, spent_ns: int) -> float:
         """How long who has cost so much is left alone."""
@@ -110,6 +118,8 @@ class Inlet:
         self._finished = finished
         self._pace = pace
         self._rests = False
+        self._timer: Timer | None = None  # until it is read again
+        self._waits = False  # for its turn
         self._bad = 0  # lines that are no requests, whatever is in them
         self._splitter = StopSplitter()
         self._began = self._ended = self._closed = False
@@ -178,11 +188,13 @@ class Inlet:
         if self._ended:
             if events & HANGUP:
                 self._end("it has gone", Heard())
-        elif self._is_known:
+        elif self._is_known and self._pace.has_time_for_known():
             self._receive(RECEIVE_BYTES)
         else:
-            self._front.watch(self.socket, HANGUP, self._on_ready)
-            self._pace.add(self.address, self._take_turn)
+            self._front.watch(self.socket, 0, self._on_ready)
+            if not self._waits:
+                self._waits = True
+                self._pace.add(self.address, self._take_turn)
 
     @property
     def address(self) -> str:
@@ -196,7 +208,8 @@ class Inlet:
         return self._began and not self._owed_ns
 
     def _take_turn(self) -> None:
-        """Of those that are not known: so all of them together keep no other client waiting."""
+        """Of those that are not known, or had no time: together they keep nobody else waiting."""
+        self._waits = False
         if not (self._ended or self._closed):
             self._front.watch(self.socket, READ, self._on_ready)
             self._receive(UNKNOWN_BYTES)
@@ -255,24 +268,30 @@ class Inlet:
     def _rest(self, seconds: float) -> None:
         """Leave it alone for a while."""
         self._front.watch(self.socket, HANGUP, self._on_ready)
-        self._front.call_later(seconds, self._go_on)
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._front.call_later(seconds, self._go_on)
         self._pace.resting += not self._rests
         self._rests = True
 
     def _wake(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
         self._pace.resting -= self._rests
         self._rests = False
 
     def _end(self, lost: str | None, heard: Heard) -> None:
         """The end of what the client says, or of the client: `lost` says why."""
         self._ended = heard.ended = True
+        self._wake()
         heard.lost = lost
         self._front.watch(self.socket, HANGUP if lost is None else 0, self._on_ready)
         self._hand_over(heard)
 
     def _go_on(self) -> None:
         self._wake()
-        if not (self._ended or self._closed):
+        if not (self._ended or self._closed or self._waits):
             self._front.watch(self.socket, READ, self._on_ready)
 
     def _hand_over(self, heard: Heard) -> None:

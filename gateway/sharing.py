@@ -74,6 +74,8 @@ class TimeSharing:
             if runs:
                 self._waiting[address] = runs  # behind the others
             due -= 1
+            if self._waiting:
+                self._post()  # before it, which may raise
             run()
         if self._waiting:
             self._post()

@@ -540,6 +540,37 @@ def test_who_has_just_come_is_read_in_turn_and_only_a_little(turned: Turned) -> 
     assert turned.inlet.received_bytes == intake.UNKNOWN_BYTES
 
 
+def test_beyond_a_turns_time_also_those_that_are_known_take_turns(
+    turned: Turned, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fifty that each send a little at the same moment would keep the next one's stop waiting for all."""
+    turned.says(CLOCK % 1)
+    monkeypatch.setattr(intake, "TURN_NS", 0)
+    turned.client.sendall(STOP % b"in turn")
+    turned.inlet._on_ready(READ)
+    assert turned.asked == []
+    turned.inlet._take_turn()
+    assert turned.asked == ["in turn"]
+
+
+def test_who_has_gone_while_it_waits_has_one_turn(turned: Turned) -> None:
+    for _ in range(10):
+        turned.inlet._on_ready(HANGUP)
+    assert [len(runs) for runs in turned.inlet._pace._waiting.values()] == [1]
+    turned.inlet._go_on()  # a rest that ends meanwhile
+    assert turned.accepted.fileno() not in turned.front._watched
+
+
+def test_a_rest_is_the_last_one_that_was_said(turned: Turned) -> None:
+    turned.inlet._rest(0.0)
+    turned.inlet._rest(1000.0)
+    turned.front.call_later(0.0, lambda: None)
+    turned.front._turn()
+    assert turned.inlet._rests
+    turned.inlet._end("gone", Heard())
+    assert turned.inlet._pace.resting == 0
+
+
 def test_who_costs_something_takes_turns_again(turned: Turned) -> None:
     turned.says(CLOCK % 1)
     assert turned.inlet._is_known

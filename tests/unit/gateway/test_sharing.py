@@ -1,4 +1,4 @@
-"""What a gateway's clients share: here the log."""
+"""What a gateway's clients share: the loop's time, and the log."""
 
 import contextlib
 
@@ -22,3 +22,13 @@ def test_the_log_tells_of_an_address_that_attacks_but_not_each_time(
     monkeypatch.setattr(sharing, "COMPLAIN_S", 0.0)
     shared.complain("10.0.0.1", "floods")
     assert caplog.text.count("10.0.0.1 floods") == 2
+
+
+def test_one_whose_turn_raises_keeps_nobody_else_from_theirs() -> None:
+    with contextlib.closing(Loop()) as loop:
+        shared, ran = Sharing(loop), list[str]()
+        shared.add("a", lambda: 1 // 0)
+        shared.add("b", lambda: ran.append("b"))
+        while loop._patience_s() == 0.0:
+            loop._turn()
+    assert ran == ["b"]
