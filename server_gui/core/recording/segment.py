@@ -18,6 +18,7 @@ from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
 
 SCHEMA: Final = """
+BEGIN; -- one commit, so that a power cut leaves all of it or nothing
 CREATE TABLE IF NOT EXISTS layout (id INTEGER PRIMARY KEY, robot TEXT NOT NULL, description BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS run (
     robot TEXT NOT NULL, connection TEXT NOT NULL, stream INTEGER NOT NULL,
@@ -32,6 +33,7 @@ CREATE TABLE IF NOT EXISTS record (
 );
 CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL);
+COMMIT;
 """
 ROWS_AT_ONCE: Final = 20_000  # that are in memory as columns
 PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hardly one
