@@ -8,7 +8,7 @@ import msgspec
 
 from gateway.cli.plain import json_plain, plain
 from gateway.coding import text as digits
-from gateway.messages import BudgetInfo, ChannelInfo
+from gateway.wire.messages import BudgetInfo, ChannelInfo
 
 NONE = "–"
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole

@@ -8,7 +8,7 @@ from drivers.imu.can_device import CanImu
 from drivers.imu.device import Imu
 from drivers.imu.inclinometer import Inclinometer
 from gateway import config as configs
-from gateway.modules.assembly import assemble
+from gateway.modules.component.assembly import assemble
 
 BUS = '[robot]\nname = "x"\n[can.main]\ninterface = "virtual"\nchannel = "imu settings"\n[imu.trunk]\n'
 JOINT = """
