@@ -13,11 +13,7 @@ from gateway.wire.messages import (
     ParameterValues,
     ResourceSnapshot,
     Snapshot,
-    Stopped,
-    Written,
 )
-
-STOP = "STOP"  # what a stop that failed is called
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,24 +76,10 @@ class Journalled:
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
-    """A write was done and read back."""
-
-    written: Written
-
-
-@dataclass(frozen=True, slots=True)
 class Costs:
     """What monitoring costs the robot, client by client."""
 
     cost: GatewayCost
-
-
-@dataclass(frozen=True, slots=True)
-class StopAnswered:
-    """What the drives said to a stop."""
-
-    stopped: Stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,18 +95,7 @@ class Refused(Failed):
     """The robot sent what cannot be kept: it was told to nobody."""
 
 
-Event = (
-    LinkChanged
-    | Described
-    | Telemetry
-    | Looked
-    | Resources
-    | Costs
-    | Journalled
-    | Changed
-    | StopAnswered
-    | Failed
-)
+Event = LinkChanged | Described | Telemetry | Looked | Resources | Costs | Journalled | Failed
 
 
 def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[float | None]]) -> Telemetry:
