@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from gateway.cli.plain import json_plain, plain
 from gateway.coding import text as digits
 from gateway.messages import BudgetInfo, ChannelInfo
+from gateway.plain import json_plain, plain
 
 NONE = "–"
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole

@@ -11,7 +11,6 @@ from typing import Self
 import msgspec
 
 from gateway import wire
-from gateway.cli.plain import plain
 from gateway.client.address import Address
 from gateway.client.errors import (
     CallTimeout,
@@ -22,6 +21,7 @@ from gateway.client.errors import (
     RemoteError,
     Unreachable,
 )
+from gateway.plain import plain
 
 OnNotification = Callable[[str, msgspec.Raw], None]
 OnResult = Callable[[msgspec.Raw], None]

@@ -10,9 +10,9 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.plain import plain
 from gateway.client import ConnectionState
 from gateway.messages import ParameterInfo, ParameterValue, Written
+from gateway.plain import plain
 from server_gui.core.events import Failed
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait

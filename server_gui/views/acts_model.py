@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from PySide6.QtCore import Qt
 
-from gateway.cli.plain import plain
 from gateway.messages import Number
+from gateway.plain import plain
 from server_gui.core.desk.acts import Act
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import brief, exact

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import Robot
 from gateway.client.errors import RemoteError
 from gateway.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
+from gateway.plain import json_plain, plain
 from server_gui.commands.collect import PlainLines
 from server_gui.core.events import Failed, Resources
 from server_gui.core.robot import Robot as Known
