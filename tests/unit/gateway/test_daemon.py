@@ -21,8 +21,10 @@ from hypothesis import strategies as st
 
 from drivers.joint.quick_stop import StopOutcome
 from gateway import daemon, session, wire
+from gateway.futures import done
 from gateway.limits import BAD_LINES, LINE_LIMIT
 from gateway.listeners import listen
+from gateway.service import Service
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
 
@@ -83,6 +85,33 @@ def test_a_bad_line_is_answered_and_the_next_one_served(
     assert answer is not None
     assert (answer["error"]["code"], answer["id"]) == (code, id_)
     assert client.answer(9)["monotonic_ns"] > 0
+
+
+@pytest.mark.parametrize("made", [object(), {"text": "\ud800"}, done(object())])
+def test_an_answer_that_cannot_be_encoded_is_answered_as_an_error_and_the_next_request_runs(
+    client: Client, monkeypatch: pytest.MonkeyPatch, made: object
+) -> None:
+    monkeypatch.setattr(Service, "_clock", lambda _service: made)
+    client.send(CLOCK % 1 + b'{"jsonrpc":"2.0","id":2,"method":"parameter.list"}\n')
+    with pytest.raises(Answered, match=r"clock\.read failed inside the gateway: ") as caught:
+        client.answer(1)
+    assert caught.value.code == wire.INTERNAL_ERROR
+    assert client.answer(2)["values"]
+
+
+def test_a_request_that_cannot_even_be_handled_keeps_no_other_waiting(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decode = wire.decode_request
+
+    def fail(line: bytes) -> wire.Request:
+        if b'"id":1,' in line:
+            raise ZeroDivisionError
+        return decode(line)
+
+    monkeypatch.setattr(wire, "decode_request", fail)
+    client.send(CLOCK % 1 + CLOCK % 2)
+    assert client.answer(2)["monotonic_ns"] > 0
 
 
 def test_a_notification_is_done_and_not_answered(client: Client) -> None:
