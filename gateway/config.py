@@ -19,6 +19,7 @@ from gateway.guard.checks import complaints as about_guard
 from gateway.guard.settings import WATCHES, GuardSettings
 from gateway.modules.stop.settings import StopSettings
 from gateway.modules.stop.settings import complaints as about_stop
+from gateway.object_names import ObjectName, address_of
 from gateway.records.folder import default_folder
 from gateway.sdo_ids import complaints as about_sdo
 from gateway.wording import key_of, plainly
@@ -105,7 +106,7 @@ class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only
     drive is enabled. `states` are the CiA 402 states that allow a change.
     """
 
-    object: Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$")]
+    object: ObjectName
     unit: str = ""
     scale: float = 1.0
     min: float | None = None
@@ -117,8 +118,7 @@ class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only
     @property
     def address(self) -> tuple[int, int]:
         """Index and subindex."""
-        index, _, subindex = self.object.partition(":")
-        return int(index, 16), int(subindex, 0)
+        return address_of(self.object)
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True):
