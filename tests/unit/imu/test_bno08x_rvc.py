@@ -5,7 +5,7 @@ import math
 import pytest
 
 from drivers.imu import rotation
-from drivers.imu.bno08x_rvc import Bno08xRvcParser, from_angles
+from drivers.imu.formats.bno08x_rvc import Bno08xRvcParser, from_angles
 from tests.unit.imu.encode import bno08x_rvc
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 

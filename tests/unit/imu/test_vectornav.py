@@ -5,8 +5,8 @@ import struct
 
 import pytest
 
+from drivers.imu.formats.vectornav import VectornavParser
 from drivers.imu.frame import ImuFrame
-from drivers.imu.vectornav import VectornavParser
 from tests.unit.imu.encode import crc16_xmodem, vectornav_ascii, vectornav_binary
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from drivers.imu.witmotion import WitmotionParser
+from drivers.imu.formats.witmotion import WitmotionParser
 from tests.unit.imu.encode import witmotion
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 

@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from drivers.imu.xsens import XsensParser
+from drivers.imu.formats.xsens import XsensParser
 from tests.unit.imu.encode import mtdata2, xbus
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 

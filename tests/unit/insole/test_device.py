@@ -9,7 +9,8 @@ import pytest
 from drivers.component import Component, Kind
 from drivers.errors import SettingsError
 from drivers.insole import layout as layouts
-from drivers.insole.device import Insole, insoles
+from drivers.insole.build import insoles
+from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State

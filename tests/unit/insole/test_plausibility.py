@@ -12,7 +12,8 @@ import pytest
 
 from drivers.imu.device import Imu
 from drivers.imu.settings import ImuSettings
-from drivers.insole.device import Insole, pair
+from drivers.insole.build import pair
+from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.parsing import Parser
 from drivers.samples import State

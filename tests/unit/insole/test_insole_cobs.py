@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.insole.cobs import InsoleCobsParser
+from drivers.insole.formats.insole_cobs import InsoleCobsParser
 from drivers.insole.frame import InsoleFrame
 from tests.unit.insole.encode import (
     CALIBRATED,
