@@ -27,7 +27,7 @@ class Match:
     frames: int
     share: float  # of the bytes, 0 to 1
     cells: int | None = None  # of an insole
-    feet: tuple[Foot, ...] = ()  # that an insole's frames name
+    feet: tuple[Foot, ...] = ()  # whose cells an insole's frames name
 
 
 def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
@@ -63,7 +63,7 @@ def _try(data: bytes, name: str, layout: str | None, make_parser: Callable[[], P
         return None
     if not isinstance(frames[-1], InsoleFrame):
         return Match(name, layout, len(frames), share)
-    named = {frame.foot for frame in frames}
+    named = {frame.foot for frame in frames if frame.cells.count(None) < len(frame.cells)}
     feet = tuple(foot for foot in FEET if foot in named)
     return Match(name, layout, len(frames), share, len(frames[-1].cells), feet)
 

@@ -10,6 +10,8 @@ from drivers.imu.frame import ImuFrame
 from tests.unit.imu.encode import crc16_xmodem, vectornav_ascii, vectornav_binary
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 
+STREAM = [vectornav_ascii(f"VNYPR,+{n:03d}.5,-001.0,+000.5") for n in range(60)]
+
 # From VectorNav's own programming library (vnproglib), an example.
 YMR = (
     b"$VNYMR,+100.949,-007.330,+000.715,-00.0049,-00.2449,+00.5397,-01.258,-00.100,-09.701,"

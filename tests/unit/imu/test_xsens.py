@@ -9,6 +9,8 @@ from drivers.imu.formats.xsens import XsensParser
 from tests.unit.imu.encode import mtdata2, xbus
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 
+STREAM = [mtdata2({0x1020: struct.pack(">H", n), 0x2030: struct.pack(">3f", n, 1, 2)}) for n in range(60)]
+
 # A capture of an MTi-300, decoded by Xsens' MT Manager: github.com/Scottapotamas/xsens-mti, its tests.
 QUATERNION = bytes.fromhex(
     "FA FF 36 26 10 20 02 46 82 10 60 04 01 C4 FC 3E 20 10 10 3F 71 CE 6C BE A5 6B CF 3C 61 3B D8 BD 69 1D 25"

@@ -15,6 +15,8 @@ from tests.unit.insole.encode import (
 )
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 
+STREAM = [cobs_frame([n + cell for cell in range(16)], sequence=n, time_us=5000 * n) for n in range(60)]
+
 
 def test_crc_of_the_check_string() -> None:
     assert crc16_ccitt_false(b"123456789") == 0x29B1

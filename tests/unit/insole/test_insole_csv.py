@@ -11,6 +11,8 @@ from drivers.insole.formats.insole_csv import InsoleCsvParser
 from drivers.insole.frame import InsoleFrame
 from tests.unit.port.streams import assert_same_at_every_split, parse
 
+STREAM = [f"{n},{n + 1},{n + 2},{n + 3}\r\n".encode() for n in range(60)]
+
 THREE = FORMATS["insole-csv"].parser(layouts.load("insole-3"))
 EIGHT = FORMATS["insole-csv"].parser(layouts.load("insole-8"))
 PLAIN = FORMATS["insole-csv"].parser(None)

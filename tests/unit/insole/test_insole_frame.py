@@ -14,6 +14,8 @@ from drivers.insole.formats.insole_frame import CHECKSUMS, InsoleFrameParser
 from tests.unit.insole.encode import crc16_ccitt_false, eighteen_cell_frame
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 
+STREAM = [eighteen_cell_frame(1 + n % 2, [n] * 18) for n in range(60)]
+
 EIGHTEEN = FORMATS["insole-frame"].parser(layouts.load("insole-18"))
 GRID = FORMATS["insole-frame"].parser(layouts.load("insole-35"))
 
