@@ -11,7 +11,8 @@ import msgspec
 from msgspec import Meta, Struct
 
 from drivers.bus.settings import CanSettings, DeviceSettings, Role
-from drivers.imu.settings import CanImuSettings, ImuSettings, InclinometerSettings, MountedSettings, kind_of
+from drivers.component import Kind
+from drivers.imu.settings import CanImuSettings, ImuSettings, MountedSettings, NodeImuSettings, kind_of
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
@@ -26,7 +27,7 @@ from gateway.wording import key_of, plainly
 
 Table = Mapping[str, Any]
 Node = tuple[str, int]  # a bus by its name, and a node id there
-OnBus = JointSettings | DeviceSettings | CanImuSettings | InclinometerSettings
+OnBus = JointSettings | DeviceSettings | CanImuSettings | NodeImuSettings
 
 CONTROLWORD = 0x6040
 AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
@@ -179,7 +180,7 @@ _NAMED: Mapping[str, type[Struct]] = {
     "imu": MountedSettings,  # one of several, by what the table says
     "parameter": ParameterSettings,
 }
-COMPONENT_TABLES = ("joint", "device", "insole", "imu")
+COMPONENT_TABLES = tuple(Kind)  # each kind by its name
 
 
 def load(path: Path) -> RobotConfig:

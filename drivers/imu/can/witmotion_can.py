@@ -7,8 +7,9 @@ another head follows.
 
 import struct
 
+from drivers.imu.format import CanFormat
+from drivers.imu.formats.witmotion import KINDS, vectors
 from drivers.imu.frame import ImuFrame
-from drivers.imu.witmotion import KINDS, vectors
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 HEAD = 0x55
@@ -60,3 +61,6 @@ class WitmotionCanParser(FrameScanner[ImuFrame]):
 
 def _is_head(buffer: bytes | bytearray, at: int) -> bool:
     return buffer[at] == HEAD and buffer[at + 1] in KINDS
+
+
+FORMAT = CanFormat(decode, WitmotionCanParser, "WitMotion")

@@ -15,6 +15,7 @@ from functools import reduce
 from operator import xor
 
 from drivers.clock import ClockSpec
+from drivers.imu.format import Conventions, Format
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
@@ -209,3 +210,6 @@ def _frame(kind: str, values: dict[str, float], ticks: int | None) -> ImuFrame:
         ticks=ticks,
         more={**values},
     )
+
+
+FORMAT = Format(VectornavParser, CLOCK, Conventions(axes=("x", "-y", "-z")))

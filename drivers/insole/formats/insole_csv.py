@@ -3,12 +3,14 @@
 import fnmatch
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from drivers.insole import layout as layouts
 from drivers.insole.description import SECONDS, Column, CsvDescription, Flag
+from drivers.insole.format import MICROSECONDS, Format, MakeParser
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import Foot
+from drivers.insole.layout import Foot, Layout
 from drivers.insole.order import LARGEST, Order
 from drivers.parsing import DelimitedParser
 
@@ -186,3 +188,16 @@ def _number(text: str) -> float | None:
 
 def _is_set(flag: Flag, text: str) -> bool:
     return text == flag.equals if flag.mask is None else bool(int(text, 0) & flag.mask)
+
+
+def _parser(layout: Layout | None) -> MakeParser:
+    csv = (layout.csv if layout else None) or CsvDescription()
+    return lambda: InsoleCsvParser(csv)
+
+
+def _described() -> Iterator[str | None]:
+    yield None
+    yield from (name for name in layouts.shipped() if layouts.load(name).csv is not None)
+
+
+FORMAT = Format(parser=_parser, clock=MICROSECONDS, described=True, identify=_described)

@@ -7,6 +7,7 @@ moment comes in several frames. (WitMotion, "WIT standard communication protocol
 import math
 import struct
 
+from drivers.imu.format import Format
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
@@ -91,3 +92,6 @@ def _time(raw: bytes) -> ImuFrame:
     year, month, day, hour, minute, second, ms = _TIME.unpack_from(raw, HEAD)
     parts = {"year": 2000 + year, "month": month, "day": day, "hour": hour, "minute": minute}
     return ImuFrame("time", more={**parts, "second": second + ms / 1000})
+
+
+FORMAT = Format(WitmotionParser)

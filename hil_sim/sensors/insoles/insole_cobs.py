@@ -69,6 +69,9 @@ def encode(pressures: Pressures, tick: Tick) -> bytes:
     return frame(flags, tick.number, tick.time_ns // 1000, counts)
 
 
-INSOLE_COBS = SerialFormat(
-    encode, baudrate=230400, banner=b"ESP-ROM:esp32s3-20210327\r\nrst:0x1 (POWERON)\r\n"
+INSOLE = SerialFormat(
+    encode,
+    baudrate=230400,
+    banner=b"ESP-ROM:esp32s3-20210327\r\nrst:0x1 (POWERON)\r\n",
+    keys='layout = "insole-16"            # where its cells are; or a .toml file of your own\n',
 )

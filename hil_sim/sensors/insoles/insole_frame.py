@@ -6,7 +6,7 @@ The cells are counts of a 12-bit converter, `PASCAL_PER_COUNT` each; the frame h
 import struct
 
 from hil_sim.sensors.serial_sensor import SerialFormat, Tick
-from hil_sim.sensors.sole import Cell, Pressures
+from hil_sim.sensors.sole import Cell, Pressures, calibration_text
 
 HEAD = 0xAA
 FULL_SCALE = 4095
@@ -43,4 +43,12 @@ def encode(pressures: Pressures, _tick: Tick) -> bytes:
     return body + bytes([sum(body) & 0xFF])
 
 
-INSOLE_FRAME = SerialFormat(encode, baudrate=115200)
+CALIBRATION = "insole-18.calibration.toml"
+KEYS = f"""\
+layout = "insole-18"            # its cells, and how its frame is laid out
+calibration = "{CALIBRATION}"   # counts to pressure: gwrms calibrate insole writes one
+"""
+
+INSOLE = SerialFormat(
+    encode, baudrate=115200, keys=KEYS, beside={CALIBRATION: calibration_text(PASCAL_PER_COUNT)}
+)

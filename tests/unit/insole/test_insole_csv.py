@@ -5,15 +5,17 @@ import pytest
 
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
-from drivers.insole.csv_lines import InsoleCsvParser
 from drivers.insole.description import CsvDescription
-from drivers.insole.formats import parser_maker
+from drivers.insole.formats import FORMATS
+from drivers.insole.formats.insole_csv import InsoleCsvParser
 from drivers.insole.frame import InsoleFrame
 from tests.unit.port.streams import assert_same_at_every_split, parse
 
-THREE = parser_maker("insole-csv", layouts.load("insole-3"))
-EIGHT = parser_maker("insole-csv", layouts.load("insole-8"))
-PLAIN = parser_maker("insole-csv", None)
+STREAM = [f"{n},{n + 1},{n + 2},{n + 3}\r\n".encode() for n in range(60)]
+
+THREE = FORMATS["insole-csv"].parser(layouts.load("insole-3"))
+EIGHT = FORMATS["insole-csv"].parser(layouts.load("insole-8"))
+PLAIN = FORMATS["insole-csv"].parser(None)
 
 BOTH_FEET = b"""# logger 1.2
 time_ms,seq,L_ch0,L_ch1,L_ch2,R_ch0,R_ch1,R_ch2

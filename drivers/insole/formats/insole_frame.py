@@ -7,9 +7,12 @@ from collections.abc import Callable
 from functools import reduce
 from operator import xor
 
+from drivers.errors import SettingsError
+from drivers.insole import layout as layouts
 from drivers.insole.description import Flag, FrameDescription
+from drivers.insole.format import MICROSECONDS, Format, MakeParser
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import Foot
+from drivers.insole.layout import Foot, Layout
 from drivers.insole.order import LONGEST_TIME_S, Order
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
@@ -181,3 +184,17 @@ def _sequence_modulus(description: FrameDescription) -> int:
 def _is_set(flag: Flag, values: dict[str, Numbers]) -> bool:
     number = int(values[str(flag.source)][0])
     return str(number) == flag.equals if flag.mask is None else bool(number & flag.mask)
+
+
+def _parser(layout: Layout | None) -> MakeParser:
+    frame = layout.frame if layout else None
+    if frame is None:
+        raise SettingsError("insole-frame needs a layout file whose table [frame] describes its frame")
+    return lambda: InsoleFrameParser(frame)
+
+
+def _described() -> list[str]:
+    return [name for name in layouts.shipped() if layouts.load(name).frame is not None]
+
+
+FORMAT = Format(parser=_parser, clock=MICROSECONDS, described=True, identify=_described)

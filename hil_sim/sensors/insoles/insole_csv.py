@@ -33,4 +33,9 @@ def encode(pressures: Pressures, tick: Tick) -> bytes:
     return f"{head};{'R' if pressures.right else 'L'};0;{counts}\r\n".encode("ascii")
 
 
-INSOLE_CSV = SerialFormat(encode, baudrate=115200, banner=b"# ets Jul 29 2019 12:21:46\r\nsensor ready\r\n")
+INSOLE = SerialFormat(
+    encode,
+    baudrate=115200,
+    banner=b"# ets Jul 29 2019 12:21:46\r\nsensor ready\r\n",
+    keys='layout = "insole-8"             # its cells, what its columns are, a calibration\n',
+)

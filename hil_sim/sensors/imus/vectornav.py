@@ -10,7 +10,7 @@ from functools import reduce
 from operator import xor
 
 from hil_sim.sensors.serial_sensor import SerialFormat, Tick
-from hil_sim.sensors.trunk_imu import Motion, Vector
+from hil_sim.sensors.trunk_imu import AXES_DOWN, Motion, Vector
 
 # Common group (bit 0): time since start-up, yaw pitch roll, quaternion, rate, acceleration, then magnetic
 # field, temperature and pressure.
@@ -51,5 +51,8 @@ def encode_binary(motion: Motion, tick: Tick) -> bytes:
     return b"\xfa" + body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
 
 
-VECTORNAV = SerialFormat(encode_ascii, baudrate=230400)  # 118 bytes at 100 Hz are too much for 115200
-VECTORNAV_BINARY = SerialFormat(encode_binary, baudrate=115200)
+# 118 bytes at 100 Hz are too much for 115200.
+VECTORNAV = SerialFormat(encode_ascii, baudrate=230400, keys=AXES_DOWN)
+VECTORNAV_BINARY = SerialFormat(encode_binary, baudrate=115200, keys=AXES_DOWN)
+
+IMUS = {"vectornav": VECTORNAV, "vectornav-binary": VECTORNAV_BINARY}

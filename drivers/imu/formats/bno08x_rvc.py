@@ -12,6 +12,7 @@ import struct
 
 from drivers.clock import ClockSpec
 from drivers.imu import rotation
+from drivers.imu.format import Conventions, Format
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion
 from drivers.parsing import FrameScanner, Sequence
@@ -59,3 +60,6 @@ class Bno08xRvcParser(FrameScanner[ImuFrame]):
             ticks=index,
             late=self._sequence.is_late(index),
         )
+
+
+FORMAT = Format(Bno08xRvcParser, CLOCK, Conventions(angles=from_angles))

@@ -4,8 +4,8 @@ import struct
 
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.sensors.faults import LineFaults
-from hil_sim.sensors.trunk_imu import Motion
-from hil_sim.sensors.witmotion import HEAD, vectors
+from hil_sim.sensors.imus.witmotion import HEAD, vectors
+from hil_sim.sensors.trunk_imu import AXES, BusImu, Motion
 
 CAN_ID = 0x50  # as delivered
 
@@ -26,3 +26,11 @@ class WitmotionCan:
         if not self._faults.unplugged:
             for payload in payloads(motion):
                 self._bus.send(Frame(CAN_ID, payload), self)
+
+
+KEYS = f"""\
+format = "witmotion-can"
+can_id = 0x{CAN_ID:02X}                   # of its frames, as set in it
+{AXES}"""
+
+IMUS = {"witmotion-can": BusImu(lambda _clock, bus, _name, faults: WitmotionCan(bus, faults), KEYS)}

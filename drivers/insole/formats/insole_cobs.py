@@ -10,6 +10,8 @@ Each foot counts its own sequence. COBS: Cheshire and Baker, "Consistent Overhea
 import binascii
 import struct
 
+from drivers.clock import ClockSpec
+from drivers.insole.format import Format
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import FEET
 from drivers.parsing import DelimitedParser, Sequence
@@ -85,3 +87,6 @@ class InsoleCobsParser(DelimitedParser[InsoleFrame]):
             ticks=time_us,
             late=self._sequences[foot].is_late(sequence),
         )
+
+
+FORMAT = Format(parser=lambda _: InsoleCobsParser, clock=ClockSpec(1_000_000, 1 << 32))

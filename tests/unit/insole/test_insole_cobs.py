@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.insole.cobs import InsoleCobsParser
+from drivers.insole.formats.insole_cobs import InsoleCobsParser
 from drivers.insole.frame import InsoleFrame
 from tests.unit.insole.encode import (
     CALIBRATED,
@@ -14,6 +14,8 @@ from tests.unit.insole.encode import (
     crc16_ccitt_false,
 )
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
+
+STREAM = [cobs_frame([n + cell for cell in range(16)], sequence=n, time_us=5000 * n) for n in range(60)]
 
 
 def test_crc_of_the_check_string() -> None:

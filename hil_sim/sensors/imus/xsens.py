@@ -3,7 +3,7 @@
 import struct
 
 from hil_sim.sensors.serial_sensor import SerialFormat, Tick
-from hil_sim.sensors.trunk_imu import Motion
+from hil_sim.sensors.trunk_imu import AXES, Motion
 
 MTDATA2, WAKE_UP = 0x36, 0x3E
 
@@ -32,4 +32,6 @@ def encode(motion: Motion, tick: Tick) -> bytes:
     return message(MTDATA2, b"".join(struct.pack(">HB", item, len(data)) + data for item, data in items))
 
 
-XSENS = SerialFormat(encode, baudrate=115200, banner=message(WAKE_UP, b""))
+XSENS = SerialFormat(encode, baudrate=115200, keys=AXES, banner=message(WAKE_UP, b""))
+
+IMUS = {"xsens": XSENS}

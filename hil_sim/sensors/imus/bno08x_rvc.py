@@ -8,7 +8,7 @@ import struct
 
 from hil_sim.gait.wearer import GRAVITY
 from hil_sim.sensors.serial_sensor import SerialFormat, Tick
-from hil_sim.sensors.trunk_imu import Motion, Quaternion, Vector
+from hil_sim.sensors.trunk_imu import AXES, Motion, Quaternion, Vector
 
 
 def phone_angles(q: Quaternion) -> Vector:
@@ -28,5 +28,7 @@ def encode(motion: Motion, tick: Tick) -> bytes:
 
 
 BNO08X_RVC = SerialFormat(
-    encode, baudrate=115200, banner=b"%Hillcrest Labs 10003608\r\n%SW Ver 3.12.4\r\n%(c) 2018\r\n"
+    encode, baudrate=115200, keys=AXES, banner=b"%Hillcrest Labs 10003608\r\n%SW Ver 3.12.4\r\n%(c) 2018\r\n"
 )
+
+IMUS = {"bno08x-rvc": BNO08X_RVC}

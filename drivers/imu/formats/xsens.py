@@ -10,6 +10,7 @@ import struct
 from collections.abc import Callable
 
 from drivers.clock import ClockSpec
+from drivers.imu.format import Format
 from drivers.imu.frame import ImuFrame, More
 from drivers.parsing import IMPOSSIBLE, FrameScanner, Sequence, needs
 
@@ -184,3 +185,6 @@ def _numbers(kind: int, item: int, data: bytes) -> Numbers | None:
     if kind in REALS and len(data) == REALS[kind] * size:
         return read(data)
     return None
+
+
+FORMAT = Format(XsensParser, CLOCK)

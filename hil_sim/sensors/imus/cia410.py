@@ -6,6 +6,7 @@ Positive is a slope whose axis points below the horizon; profile and makers leav
 import math
 from collections.abc import Callable
 
+import eds
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import Clock
@@ -14,7 +15,7 @@ from hil_sim.node.dictionary import Value
 from hil_sim.node.nmt import NmtState
 from hil_sim.node.node import Node
 from hil_sim.sensors.faults import LineFaults
-from hil_sim.sensors.trunk_imu import Motion
+from hil_sim.sensors.trunk_imu import AXES, BusImu, Motion
 
 EDS = "inclinometer.eds"
 NODE_ID = 20
@@ -64,3 +65,16 @@ class Inclinometer(Node):
 def _check_resolution(value: Value) -> None:
     if value not in RESOLUTIONS:
         raise SdoAbort(AbortCode.INVALID_VALUE)
+
+
+def _make(clock: Clock, bus: CanBus, name: str, faults: LineFaults) -> Inclinometer:
+    return Inclinometer(clock, bus, name, eds.load(eds.locate(EDS, None), NODE_ID), faults)
+
+
+KEYS = f"""\
+format = "cia410"               # an inclinometer: tilt, and nothing else
+node_id = {NODE_ID}
+directions = [1, 1]             # of its x and y axis: 1 where positive means that it points below the horizon
+{AXES}"""
+
+IMUS = {"cia410": BusImu(_make, KEYS)}

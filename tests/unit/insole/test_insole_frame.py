@@ -9,13 +9,15 @@ import pytest
 from drivers.errors import SettingsError
 from drivers.insole import layout as layouts
 from drivers.insole.description import FrameDescription
-from drivers.insole.fixed_frame import CHECKSUMS, InsoleFrameParser
-from drivers.insole.formats import parser_maker
+from drivers.insole.formats import FORMATS
+from drivers.insole.formats.insole_frame import CHECKSUMS, InsoleFrameParser
 from tests.unit.insole.encode import crc16_ccitt_false, eighteen_cell_frame
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
 
-EIGHTEEN = parser_maker("insole-frame", layouts.load("insole-18"))
-GRID = parser_maker("insole-frame", layouts.load("insole-35"))
+STREAM = [eighteen_cell_frame(1 + n % 2, [n] * 18) for n in range(60)]
+
+EIGHTEEN = FORMATS["insole-frame"].parser(layouts.load("insole-18"))
+GRID = FORMATS["insole-frame"].parser(layouts.load("insole-35"))
 
 # Sent by a 35-cell ESP32 insole with ten cells fitted; an example in its public parser.
 SENT = bytes.fromhex(
@@ -156,7 +158,7 @@ def test_wrong_description_is_named(changes: dict[str, object], words: str) -> N
 
 def test_format_without_a_description_says_what_it_needs(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"table \[frame\]"):
-        parser_maker("insole-frame", layouts.load("insole-16"))
+        FORMATS["insole-frame"].parser(layouts.load("insole-16"))
 
 
 def test_count_that_would_never_end_is_no_frame() -> None:

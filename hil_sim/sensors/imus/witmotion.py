@@ -5,7 +5,7 @@ import struct
 
 from hil_sim.gait.wearer import GRAVITY
 from hil_sim.sensors.serial_sensor import SerialFormat, Tick
-from hil_sim.sensors.trunk_imu import Motion
+from hil_sim.sensors.trunk_imu import AXES, Motion
 
 HEAD = 0x55
 ACCELERATION = 0x51  # ÷ 32768 · 16 g, temperature ÷ 100
@@ -47,4 +47,6 @@ def _word(value: float) -> int:
     return min(max(round(value), -_FULL_SCALE), _FULL_SCALE - 1)
 
 
-WITMOTION = SerialFormat(encode, baudrate=115200)
+WITMOTION = SerialFormat(encode, baudrate=115200, keys=AXES)
+
+IMUS = {"witmotion": WITMOTION}
