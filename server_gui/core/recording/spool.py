@@ -332,8 +332,10 @@ class Spool:
 
     def _copy(self, number: int) -> None:
         """The database last: where that is there, all of the copy is."""
-        for suffix in ("-wal", ""):
+        for suffix in reversed(SUFFIXES):
             source = self._path(number).with_name(self._path(number).name + suffix)
+            if not source.exists():  # the log's index; SQLite makes it anew
+                continue
             target = self._path(number, Kept.CUT).with_name(self._path(number, Kept.CUT).name + suffix)
             draft = target.with_name(f"{target.name}.draft")
             with source.open("rb") as content, open(draft, "wb", opener=opener) as out:
