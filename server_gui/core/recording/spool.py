@@ -261,15 +261,24 @@ class Spool:
         return sum(Segment.size_bytes(self._path(number)) for number in self._all(Kept.WAITING))
 
     def make_room(self) -> bool:
-        """Remove the oldest uploaded segments as far as needed; False where the disk is still nearly full."""
-        paths = [self._path(number, Kept.UPLOADED) for number in self._all(Kept.UPLOADED)]
-        kept = sum(map(Segment.size_bytes, paths))
-        for path in paths:
-            if kept <= self._keep_bytes and self._roomy():
-                break
-            kept -= Segment.size_bytes(path)
-            Segment.remove(path)
-        return self._roomy()
+        """Remove the oldest uploaded segments as far as needed; False where the disk is still nearly full.
+
+        Raises:
+            SpoolUnusable: nobody knows how full it is, or a file cannot be removed.
+
+        """
+        try:
+            paths = [self._path(number, Kept.UPLOADED) for number in self._all(Kept.UPLOADED)]
+            kept = sum(map(Segment.size_bytes, paths))
+            for path in paths:
+                if kept <= self._keep_bytes and self._roomy():
+                    break
+                kept -= Segment.size_bytes(path)
+                Segment.remove(path)
+            return self._roomy()
+        except OSError as error:
+            reason = error.strerror or error
+            raise SpoolUnusable(f"no room can be made in the spool {self.folder}: {reason}") from error
 
     def _roomy(self) -> bool:
         return self._free_bytes(self.folder) >= self._reserve_bytes
