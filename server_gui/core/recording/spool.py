@@ -306,7 +306,11 @@ class Spool:
                 self._name(number, kept)
 
     def _segments(self) -> list[tuple[int, Kept]]:
-        names = (_NAME.fullmatch(path.name) for path in self.folder.iterdir())
+        try:
+            names = [_NAME.fullmatch(path.name) for path in self.folder.iterdir()]
+        except OSError as error:
+            reason = error.strerror or error
+            raise SpoolUnusable(f"the spool {self.folder} cannot be read: {reason}") from error
         found = [(int(name[1]), Kept(name[2] or "")) for name in names if name]
         return sorted(found, key=lambda each: (each[0], each[1].value))
 
