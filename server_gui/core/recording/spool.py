@@ -87,6 +87,7 @@ class Spool:
         self._reserve_bytes = reserve_bytes
         self._keep_bytes = keep_bytes
         self._free_bytes = free_bytes
+        self.anew: list[str] = []  # in words, where a store is another one than batches went to
         self.missing: str | None = None  # in words, where files that were there are not any more
         self._lock = _take(folder)
         try:

@@ -5,7 +5,7 @@ import logging
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Self
 
@@ -37,7 +37,7 @@ class UploaderState:
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
-    lost: tuple[str, ...] = ()  # batches that are lost as a whole, in words
+    lost: tuple[str, ...] = ()  # batches that are lost as a whole, or a store that is no more, in words
     ahead: tuple[str, ...] = ()  # where the store has what this spool has lost, in words
 
 
@@ -169,14 +169,17 @@ class Uploader:
     def _look(self, *, told: bool) -> None:
         """Alarm for batches that are lost as a whole, and have them `told` in the store."""
         lost = self._spool.untold()
-        for text in lost.values():
-            if text not in self.state.lost:
-                log.error("%s", text)
-                self.state = replace(self.state, lost=(*self.state.lost, text))
+        self._alarm(lost.values())
         if lost and told:
             self._store = self._store or self._reach()
             lost_batches(self._spool, self._store)
             self.state = replace(self.state, problem=self._problem)
+
+    def _alarm(self, texts: Iterable[str]) -> None:
+        for text in texts:
+            if text not in self.state.lost:
+                log.error("%s", text)
+                self.state = replace(self.state, lost=(*self.state.lost, text))
 
     def _failed(self, what: str, error: Exception) -> bool:
         self._store = None
@@ -192,6 +195,8 @@ class Uploader:
         except Damaged as error:
             log.error("batch %d is not uploaded as a whole: %s", number, error)
             return
+        finally:
+            self._alarm(self._spool.anew)
         took_s, uploaded = time.monotonic() - began_s, self.state.uploaded + 1
         self.state = replace(self.state, uploaded=uploaded, upload_s=took_s, problem=self._problem)
         log.info("batch %d is in the store after %.1f s", number, took_s)
