@@ -66,7 +66,10 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
         proof = prove(store, receipts, sound, advance, values=False)
     copies = verify.second_copies(spool.folder)
     unproven = {batch.number for batch in verify.copies(spool.folder, _known(receipts))[0]}
-    again = {number for number, batch in copies.items() if batch in proof.lacking} | unproven
+    lacking = proof.lacking
+    if broken or mending.taken_out(store):  # nobody can count what files held of these
+        lacking = lacking | proof.shortened
+    again = {number for number, batch in copies.items() if batch in lacking} | unproven
     waiting = spool.waiting()  # the next upload brings these
     nowhere = sorted(number for _, number in proof.lacking - set(copies.values()) if number not in waiting)
     lost = (

@@ -212,13 +212,13 @@ def _complete(
     batch: int,
     look: Callable[[], list[pa.RecordBatch]],
 ) -> None:
-    """Bring what the table lacks of a batch whose number it knows."""
-    rows = look()
+    """Bring what the table lacks of a batch whose number it knows, but for what retention has removed."""
+    rows = lacking.newer(look(), store, location)
     if not rows:
         return
     named = lacking.name(writer, batch, rows)
     new = store.append(table, location, rows[0].schema, lambda: iter(rows), named, 1)
-    if not new and look():
+    if not new and lacking.newer(look(), store, location):
         count = sum(each.num_rows for each in rows)
         raise Contradicted(
             f"{store.url}/{location} had {count} rows of batch {batch}, which were removed since"
