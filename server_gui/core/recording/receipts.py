@@ -13,6 +13,7 @@ from typing import Final
 
 import msgspec
 
+from ml.store import durable
 from ml.store.private import opener
 from server_gui.core.recording.errors import SpoolUnusable
 
@@ -94,7 +95,7 @@ class Receipts:
                 out.flush()
                 os.fsync(out.fileno())
             if not known:
-                _sync(self.file.parent)
+                durable.sync(self.file.parent)
             if self._tables is not None:
                 _see(self._tables, receipt)
         except OSError as error:
@@ -180,11 +181,3 @@ def _tail(descriptor: int) -> tuple[int, bytes]:
         if end and (start or not begin):
             return begin + end, data[start:end]
     return 0, b""
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -296,7 +296,7 @@ class Spool:
                 file = self._path(number).with_name(self._path(number).name + suffix)
                 if file.exists():
                     file.rename(file.with_name(self._path(number, kept).name + suffix))
-            _sync(self.folder)
+            durable.sync(self.folder)
 
     def _look_at_names(self) -> None:
         """What was cut off when a segment got another name goes on."""
@@ -332,7 +332,7 @@ class Spool:
                 out.flush()
                 os.fsync(out.fileno())
             draft.rename(file)
-            _sync(self.folder)
+            durable.sync(self.folder)
         return file.read_text().strip()
 
     def _look_at_logs(self) -> None:
@@ -357,7 +357,7 @@ class Spool:
                 out.flush()
                 os.fsync(out.fileno())
             draft.rename(target)
-        _sync(self.folder)
+        durable.sync(self.folder)
 
     def _cut(self, number: int) -> None:
         """Let the segment itself tell what it has lost, when it goes to the store."""
@@ -421,7 +421,7 @@ class Spool:
                 if not segment.rows:
                     segment.name(self.writer)
                 segment.append((), (), self._heads)
-                _sync(self.folder)
+                durable.sync(self.folder)
         except BaseException:
             segment.close()
             raise
@@ -462,11 +462,3 @@ def _take(folder: Path) -> IO[bytes]:
             f"another server records into {folder}; end it first, or give this one another folder"
         ) from error
     return lock
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
