@@ -155,7 +155,7 @@ def ahead(spool: Spool, store: Store) -> list[str]:
         with contextlib.suppress(NoSuchTable):
             store.mend(location)
             table = store.table(location)
-            newest = max(table.transaction_version(each) or 0 for each in writers)
+            newest = max((table.transaction_version(each) or 0 for each in writers), default=0)
             if newest >= spool.first:
                 found.append(
                     f"{store.url}/{location} has batch {newest} of the spool {spool.folder}, which had only "
