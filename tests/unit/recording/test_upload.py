@@ -188,7 +188,7 @@ def test_a_store_that_cannot_be_reached_is_told_and_tried_again(spool: Spool, fo
         assert uploader.state.problem is None
 
 
-@pytest.mark.parametrize("part", ["header", "record", "run"])
+@pytest.mark.parametrize("part", ["header", "schema", "record", "run"])
 def test_a_damaged_batch_keeps_none_after_it_from_the_store(
     spool: Spool, folder_url: str, part: str, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -209,6 +209,7 @@ def test_a_damaged_batch_keeps_none_after_it_from_the_store(
     seqs = sorted(Store(folder_url).dataset(HERE).to_table()["seq"].to_pylist())
     lost, rows, kept = {
         "header": (["the spool's file "], ["0", "2"], [0, 2]),
+        "schema": (["the spool's file "], ["0", "2"], [0, 1, 2]),  # its runs had gone before
         "record": (["row 0 of batch 2, of exo-01, from about 20"], ["0", "2"], [0, 1, 2]),
         "run": (["1 rows of exo-01, stream 7 from notification 1 on, were"], ["0", "1", "2"], [0, 2]),
     }[part]
@@ -262,6 +263,9 @@ def flip(file: Path, column: str) -> None:
 def damage(file: Path, part: str) -> None:
     if part == "header":
         file.write_bytes(b"x" * 10_000)
+        return
+    if part == "schema":  # a column's name, as one flipped bit leaves it
+        file.write_bytes(file.read_bytes().replace(b"    number INTEGER", b"    nulber INTEGER"))
         return
     column = {"record": "content", "run": "data"}[part]
     with contextlib.closing(sqlite3.connect(file)) as database, database:
