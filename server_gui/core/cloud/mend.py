@@ -19,7 +19,7 @@ from ml.store.private import FILE
 from ml.store.store import Batches, Store
 from ml.store.tables import Table
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.proving import Advance, Proof, prove
+from server_gui.core.cloud.receipt_check import Advance, Proof, prove
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.segment import Segment

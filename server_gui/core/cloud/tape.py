@@ -15,7 +15,7 @@ from ml.store.sessions import Session
 from ml.store.tables import EVENTS
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.rows import Floats, Ints, Run
-from server_gui.core.settings import ServerSettings
+from server_gui.core.settings.server_file import ServerSettings
 
 Bools = npt.NDArray[np.bool_]
 

@@ -19,7 +19,7 @@ from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spooled
-from server_gui.core.cloud.proving import Advance, Batch, Proof, prove
+from server_gui.core.cloud.receipt_check import Advance, Batch, Proof, prove
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
 

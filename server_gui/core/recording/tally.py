@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from ml.store import sums
-from server_gui.core.recording.lacking import numbers_alone
+from server_gui.core.recording.missing_rows import numbers_alone
 from server_gui.core.recording.receipts import Part, Stream
 
 _Name = tuple[str, str, str, int]  # robot, session, connection, stream
