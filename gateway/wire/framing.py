@@ -1,7 +1,7 @@
 """The wire: JSON-RPC 2.0, one UTF-8 message a line; framing, envelopes, errors. Pure, no I/O.
 
-The parameters and results of each method are in `messages.py`. Numbers that are not finite never reach the wire:
-msgspec encodes NaN and infinities as `null`.
+The parameters and results of each method are in `messages.py`. Numbers that are not finite never reach the
+wire: msgspec encodes NaN and infinities as `null`.
 """
 
 import json

@@ -10,8 +10,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.plain import plain
 from gateway.client import ConnectionState
+from gateway.plain import plain
 from gateway.wire.messages import ParameterInfo, ParameterValue
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import Robot

@@ -7,10 +7,10 @@ import logging
 import pytest
 from rich.console import Console
 
-from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import Robot
 from gateway.client.errors import RemoteError
+from gateway.plain import json_plain, plain
 from gateway.wire.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
 from server_gui.cli.collect import PlainLines
 from server_gui.core.desk.station import Station
