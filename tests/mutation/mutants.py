@@ -5,7 +5,6 @@ lives in a process of its own, forked before the module was imported.
 """
 
 import ast
-import copy
 import gc
 import importlib
 import importlib.abc
@@ -16,7 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -25,60 +24,12 @@ import psutil  # noqa: F401
 import pytest
 from hypothesis import Phase, settings
 
+from tests.mutation.operators import Kind, mutants
+
 # Only whether they pass is asked: nothing is rewritten, traced or searched for to say it better.
 _OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-p", "pytest_timeout", "--assert", "plain", "--tb", "no")
 settings.register_profile("noticed", phases=(Phase.explicit, Phase.generate), database=None)
 MOST_S = 60  # a mutant that makes a test hang is noticed too
-# What each operator becomes: where there is a boundary, its neighbour there, which is the hardest to notice.
-_COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.Is: ast.IsNot,
-    ast.IsNot: ast.Is,
-    ast.In: ast.NotIn,
-    ast.NotIn: ast.In,
-}
-_ARITHMETIC: dict[type[ast.operator], type[ast.operator]] = {ast.Add: ast.Sub, ast.Sub: ast.Add}
-_LOGIC: dict[type[ast.boolop], type[ast.boolop]] = {ast.And: ast.Or, ast.Or: ast.And}
-
-
-def mutants(tree: ast.Module) -> Iterator[tuple[str, ast.Module]]:
-    """Each mutant and what was changed where, in words."""
-    for number, node in enumerate(ast.walk(tree)):
-        for change in range(_changes(node)):
-            mutant = copy.deepcopy(tree)
-            changed = next(one for at, one in enumerate(ast.walk(mutant)) if at == number)
-            before = ast.unparse(changed)
-            _mutate(changed, change)
-            yield f"line {getattr(node, 'lineno', '?')}: {before} → {ast.unparse(changed)}", mutant
-
-
-def _changes(node: ast.AST) -> int:
-    """In how many ways a node can be changed."""
-    if isinstance(node, ast.Compare):
-        return len(node.ops)
-    return int(
-        (isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC)
-        or isinstance(node, ast.BoolOp)
-        or (isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub))
-    )
-
-
-def _mutate(node: ast.AST, change: int) -> None:
-    if isinstance(node, ast.Compare):
-        node.ops[change] = _COMPARISONS[type(node.ops[change])]()
-    elif isinstance(node, ast.BinOp):
-        node.op = _ARITHMETIC[type(node.op)]()
-    elif isinstance(node, ast.BoolOp):
-        node.op = _LOGIC[type(node.op)]()
-    elif isinstance(node, ast.UnaryOp):
-        node.op = ast.UAdd() if isinstance(node.op, ast.USub) else ast.Not()
-        if isinstance(node.op, ast.Not):
-            node.operand = ast.UnaryOp(ast.Not(), node.operand)
 
 
 class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -86,7 +37,7 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
     def __init__(self, name: str, tree: ast.Module, path: str) -> None:
         self._name = name
-        self._code = compile(ast.fix_missing_locations(tree), path, "exec")
+        self._code = compile(tree, path, "exec")
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -132,7 +83,7 @@ def main(name: str, *tests: str) -> None:
         if os.waitpid(start(name, tree, spec.origin, tests, folder), 0)[1]:
             raise SystemExit(f"{', '.join(tests)}: do not pass with {name} as it is")
         running: dict[int, str] = {}
-        for what, mutant in mutants(tree):
+        for what, mutant in mutants(tree, Kind.DECISIONS):
             if len(running) >= (os.cpu_count() or 1):
                 _tell_next(running)
             running[start(name, mutant, spec.origin, tests, folder)] = what
