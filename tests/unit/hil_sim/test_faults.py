@@ -13,7 +13,7 @@ from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
 from hil_sim.scenario.script import load
 
-BENCH = (Path(__file__).parents[3] / "docs" / "bench.md").read_text(encoding="utf-8")
+BENCH = (Path(__file__).parents[3] / "docs" / "how-to" / "bench.md").read_text(encoding="utf-8")
 TESTED = {
     name
     for file in Path(__file__).parent.glob("test_fault_*.py")

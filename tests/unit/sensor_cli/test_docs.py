@@ -25,6 +25,6 @@ def test_the_readmes_table_of_a_sensor_builds_its_component(tmp_path: Path) -> N
 
 
 def test_the_document_names_every_format() -> None:
-    text = (ROOT / "docs" / "sensors.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "wire-a-sensor.md").read_text(encoding="utf-8")
     assert [name for name in (*FORMATS, "cia410") if name not in text] == []
     assert {imu.removesuffix("-binary") for imu in IMUS} | set(INSOLES) == {*FORMATS, "cia410"}
