@@ -60,7 +60,7 @@ def test_the_bench_chapter_names_no_fault_and_no_command_that_is_none() -> None:
 
 
 def test_the_bench_chapters_scenario_can_be_read(tmp_path: Path) -> None:
-    (text,) = re.findall(r"```toml\n(.*?)```", BENCH, re.DOTALL)
+    (text,) = re.findall(r"```toml[^\n]*\n(.*?)```", BENCH, re.DOTALL)
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     script = load(tmp_path / "mine.toml")
     assert f"\n{script.title}\n  ok      {script.expectations[0].words}\n" in BENCH
