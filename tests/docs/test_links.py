@@ -19,6 +19,13 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
+def named_files(text: str) -> list[str]:
+    """Paths of this repository in code spans, whole or from within a house; not those of the reader's own."""
+    houses = "|".join([*_PARTS, "tools", "scenarios"])
+    found = re.findall(rf"`((?:{houses})/(?:[\w./-]*(?:/|\.py))?|[\w/]+\.py)`", _FENCED.sub("", text))
+    return [path for path in found if not re.search(r"mine|[A-Z]{4}", path)]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_link_leads_somewhere(page: Path) -> None:
     wrong = []
@@ -27,3 +34,15 @@ def test_every_link_leads_somewhere(page: Path) -> None:
         if not there.exists() or (anchor and anchor not in anchors(there)):
             wrong.append(f"{target}#{anchor}" if anchor else target)
     assert wrong == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_file_that_is_named_is_there(page: Path) -> None:
+    known = {
+        file.relative_to(ROOT).as_posix()
+        for part in (*_PARTS, "tools")
+        for file in (ROOT / part).rglob("*.py")
+    }
+    named = named_files(page.read_text(encoding="utf-8")) if page.name != "CHANGELOG.md" else []
+    wrong = [path for path in named if not (ROOT / path).exists()]
+    assert [path for path in wrong if not any(f"/{one}".endswith(f"/{path}") for one in known)] == []
