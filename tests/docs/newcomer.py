@@ -85,7 +85,6 @@ class Newcomer:
             self._port = _free_port()
             self._environment = self._prepare()
             self._terminals: list[Terminal] = []
-            stack.callback(lambda: [terminal.end() for terminal in self._terminals])
             self._stack = stack.pop_all()
         return self
 
@@ -110,8 +109,10 @@ class Newcomer:
         here = Command(self._here(command.typed), command.shown)
         if block.terminal:
             log = self.home / "bin" / f"terminal-{len(self._terminals)}.log"
-            self._terminals.append(Terminal(here, self.home, self._environment, log))
-            self._terminals[-1].wait()
+            terminal = Terminal(here, self.home, self._environment, log)
+            self._stack.callback(terminal.end)
+            self._terminals.append(terminal)
+            terminal.wait()
             return
         ran = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", here.typed],
