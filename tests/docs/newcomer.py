@@ -118,7 +118,7 @@ class Newcomer:
             ["bash", "-euo", "pipefail", "-c", here.typed],
             cwd=self.home,
             env=self._environment,
-            input="\n",  # whoever is asked presses Enter
+            input="y\n",  # whoever is asked says yes, and presses Enter
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -25,7 +25,7 @@ BY_HAND: Final[Mapping[str, int]] = {
     "how-to/run-as-a-service.md": 1,
     "how-to/train.md": 2,
     "how-to/wire-a-joint.md": 1,
-    "how-to/wire-a-sensor.md": 4,
+    "how-to/wire-a-sensor.md": 2,
     "tutorial/first-walk.md": 1,
 }
 
