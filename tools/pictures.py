@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/window.md: the window on the simulated robot, worked as a newcomer would.
+"""Makes the pictures of docs/reference/window.md: the window on the simulated robot, worked by a newcomer.
 
 `.venv/bin/python tools/pictures.py` takes about three minutes; with a display, or QT_QPA_PLATFORM=offscreen.
 It records into a folder of its own, and starts a process that eats a core, to be found in the table.
@@ -25,7 +25,7 @@ from server_gui.core.settings.server_file import RecordingSettings, ServerSettin
 from server_gui.core.tuning.stop import StopState
 from server_gui.views.processes import NAME
 
-DOCS = Path(__file__).parents[1] / "docs"
+PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 SIZE = 1480, 900
 WITHIN_S = 240.0
 WALKED_S = 75.0  # recorded before it is labelled
@@ -61,7 +61,7 @@ class Newcomer:
     def keep(self, name: str) -> None:
         self.wait(lambda: not self.station.robot.is_stale(), "was live")
         QTest.qWait(300)
-        self.window.grab().save(str(DOCS / f"window-{name}.png"))
+        self.window.grab().save(str(PICTURES / f"window-{name}.png"))
         sys.stdout.write(f"window-{name}.png\n")
         sys.stdout.flush()
 

@@ -1,6 +1,6 @@
 """`python tools/scale.py URL`: how long a store's commits, listings and compactions take, and what follows.
 
-The figures of docs/scale.md. The URL must be of a store of its own: it is written to.
+The figures of docs/explanation/scale.md. The URL must be of a store of its own: it is written to.
 """
 
 import functools

@@ -1,6 +1,6 @@
 """What a client can make grow, and how far: of one connection, of one address, and of all together.
 
-The same numbers stand in the table of `SECURITY.md`. What is asked for beyond one of them is answered by an
+The same numbers stand in docs/reference/limits.md. What is asked for beyond one of them is answered by an
 error that names it; a stop is subject to none of them.
 """
 

@@ -20,7 +20,7 @@ happens to the robot, and what they expect of the gateway and of the robot is ch
 
 _EPILOG = """\
 exit codes: 0 all that was expected is so; 1 something is not, or it could not be run; 2 wrong usage, or a
-file that is no scenario. docs/bench.md tells how to write one; those in scenarios/ are examples.
+file that is no scenario. docs/how-to/bench.md tells how to write one; those in scenarios/ are examples.
 
 example
   gwrms sim run scenarios/node_lost.toml

@@ -1,4 +1,4 @@
-"""A scenario file: the robot, what happens to it and when, and what is expected (docs/bench.md).
+"""A scenario file: the robot, what happens to it and when, and what is expected (docs/how-to/bench.md).
 
 `[robot]` has scenario, seconds, seed, subject, imu, insole and drive; each `[[at]]` a time and one thing
 that happens; each `[[expect]]` what is looked at, what it must be, and when.

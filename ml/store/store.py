@@ -55,7 +55,7 @@ class About(msgspec.Struct, frozen=True):
     """What a store is, decided when it is first used."""
 
     format: int = FORMAT
-    shards: int = 1  # of sharded tables; see docs/scale.md
+    shards: int = 1  # of sharded tables; see docs/explanation/scale.md
     several_writers: bool = True
 
 

@@ -28,7 +28,7 @@ class Table:
     schema: pa.Schema
     indexed: int
     partition_by: tuple[str, ...] = ()
-    sharded: bool = False  # several tables, chosen by the robot; see docs/scale.md
+    sharded: bool = False  # several tables, chosen by the robot; see docs/explanation/scale.md
 
     def locations(self, shards: int) -> list[str]:
         """Where it lies, below the store's URL."""

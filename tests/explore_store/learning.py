@@ -37,7 +37,7 @@ from tests.explore_store.world import World
 
 TASK: Final = "activity"
 NOTHING: Final = Path("/nonexistent")  # no models come with it
-OLDEST_NS: Final = 100_000_000  # a value that is older is missing (docs/prediction.md)
+OLDEST_NS: Final = 100_000_000  # a value that is older is missing (docs/explanation/prediction.md)
 FOLDER: Final = "models/serving"
 HELD_OUT: Final = ((), ("P03",))  # two people seldom have the same model
 Split = tuple[list[Part], list[Part], list[Part]]

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QDockWidget
 from server_gui.core.desk import manual
 from server_gui.views.main_window import MainWindow
 
-DOCS = Path(__file__).parents[2] / "docs" / "window.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "window.md"
 
 
 def test_the_sections_are_the_documents_own_without_pictures_and_links() -> None:
@@ -65,7 +65,7 @@ def test_a_reset_layout_has_no_help(window: MainWindow) -> None:
 def test_the_manual_is_in_what_is_installed(tmp_path: Path) -> None:
     built = subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
-        cwd=DOCS.parents[1],
+        cwd=DOCS.parents[2],
         env=os.environ | {"PYTHONPATH": ""},
         capture_output=True,
         text=True,

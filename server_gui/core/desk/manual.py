@@ -1,4 +1,4 @@
-"""The manual of the window, a section at a time: the very text of docs/window.md, which is in the package."""
+"""The manual of the window, a section at a time: docs/reference/window.md, which is in the package."""
 
 import re
 from importlib import resources
@@ -24,4 +24,5 @@ def _text() -> str:
     shipped = resources.files("server_gui") / SHIPPED
     if shipped.is_file():
         return shipped.read_text(encoding="utf-8")
-    return (Path(__file__).parents[3] / "docs" / SHIPPED).read_text(encoding="utf-8")  # a working copy
+    docs = Path(__file__).parents[3] / "docs" / "reference"  # of a working copy
+    return (docs / SHIPPED).read_text(encoding="utf-8")

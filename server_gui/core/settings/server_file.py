@@ -72,7 +72,7 @@ class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StoreSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """`[store]`; `shards` and `several_writers` count when the store is first used (docs/scale.md).
+    """`[store]`; `shards` and `several_writers` count when the store is first used.
 
     `compact_h` is how often a collector puts its small files together; 0 leaves that to others.
     """

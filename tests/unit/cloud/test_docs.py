@@ -1,4 +1,4 @@
-"""What docs/store.md says of the tables is so, and its questions have answers."""
+"""What docs/reference/store.md says of the tables is so, and its questions have answers."""
 
 import re
 import shlex
@@ -10,7 +10,7 @@ from gateway.main import main
 from ml.store.tables import TABLES, Table
 from tests.unit.cloud.recordings import record
 
-TEXT = (Path(__file__).parents[3] / "docs" / "store.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "store.md").read_text(encoding="utf-8")
 CHANNELS = ("left_knee.position", "left_knee.torque", "left_insole.force")
 
 

@@ -1,10 +1,10 @@
-"""Each test that docs/promises.md names is there."""
+"""Each test that docs/explanation/promises.md names is there."""
 
 import re
 from pathlib import Path
 
 TOP = Path(__file__).parents[3]
-TEXT = (TOP / "docs" / "promises.md").read_text(encoding="utf-8")
+TEXT = (TOP / "docs" / "explanation" / "promises.md").read_text(encoding="utf-8")
 
 
 def test_every_test_that_is_named_exists() -> None:
@@ -23,5 +23,5 @@ def test_every_test_that_is_named_exists() -> None:
 
 
 def test_it_is_found_from_where_people_look() -> None:
-    for page in ("README.md", "docs/collecting.md"):
+    for page in ("docs/how-to/record.md", "docs/explanation/recording.md"):
         assert "promises.md" in (TOP / page).read_text(encoding="utf-8")

@@ -169,8 +169,8 @@ def test_reading_garbage_costs_no_more_than_its_length(piece: bytes) -> None:
 
 
 def test_the_table_of_limits_says_what_is_true() -> None:
-    """`SECURITY.md` names every limit, with its number."""
-    text = (Path(__file__).parents[3] / "SECURITY.md").read_text(encoding="utf-8")
+    """docs/reference/limits.md names every limit, with its number."""
+    text = (Path(__file__).parents[3] / "docs" / "reference" / "limits.md").read_text(encoding="utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
     for name, number in vars(limits).items():
         if not name.isupper():

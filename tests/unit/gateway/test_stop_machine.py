@@ -196,5 +196,5 @@ def test_every_phase_can_be_left_and_reached() -> None:
 
 
 def test_the_table_in_the_docs_is_the_one_of_the_code() -> None:
-    text = Path("docs/stop.md").read_text(encoding="utf-8")
+    text = Path("docs/explanation/stop.md").read_text(encoding="utf-8")
     assert table() in text

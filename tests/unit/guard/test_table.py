@@ -7,7 +7,7 @@ import pytest
 from gateway.guard.settings import WATCHES
 from gateway.guard.table import table
 
-MANUAL = (Path(__file__).parents[3] / "docs" / "guard.md").read_text(encoding="utf-8")
+MANUAL = (Path(__file__).parents[3] / "docs" / "reference" / "guard.md").read_text(encoding="utf-8")
 
 
 def test_the_manual_has_the_table_as_it_is_drawn() -> None:

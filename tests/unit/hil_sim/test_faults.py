@@ -13,7 +13,7 @@ from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
 from hil_sim.scenario.script import load
 
-BENCH = (Path(__file__).parents[3] / "docs" / "bench.md").read_text(encoding="utf-8")
+BENCH = (Path(__file__).parents[3] / "docs" / "how-to" / "bench.md").read_text(encoding="utf-8")
 TESTED = {
     name
     for file in Path(__file__).parent.glob("test_fault_*.py")
@@ -60,7 +60,7 @@ def test_the_bench_chapter_names_no_fault_and_no_command_that_is_none() -> None:
 
 
 def test_the_bench_chapters_scenario_can_be_read(tmp_path: Path) -> None:
-    (text,) = re.findall(r"```toml\n(.*?)```", BENCH, re.DOTALL)
+    (text,) = re.findall(r"```toml[^\n]*\n(.*?)```", BENCH, re.DOTALL)
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     script = load(tmp_path / "mine.toml")
     assert f"\n{script.title}\n  ok      {script.expectations[0].words}\n" in BENCH

@@ -7,6 +7,7 @@ import pytest
 from gateway.client import Address
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.core.settings.server_file import RecordingSettings, SettingsError, Upload, add_robots, load
+from tests.docs.pages import blocks
 
 WHOLE = """
 [robots]
@@ -142,10 +143,10 @@ def test_robots_of_the_command_line_come_on_top(tmp_path: Path) -> None:
         add_robots(settings, {"exo-04": ":7430"})
 
 
-def test_the_readmes_file_is_one(tmp_path: Path) -> None:
-    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
-    block = readme.partition("## Keep everything")[2].partition("```toml\n")[2].partition("```")[0]
-    settings = load(written(tmp_path, block))
+def test_the_file_of_the_docs_is_one(tmp_path: Path) -> None:
+    page = Path(__file__).parents[3] / "docs" / "how-to" / "record.md"
+    shown = next(block.text for block in blocks(page) if block.language == "toml")
+    settings = load(written(tmp_path, shown))
     assert set(settings.robots) == {"exo-01", "exo-02"}
     assert (settings.store.url, settings.recorder.upload) == ("s3://exoskeletons/lab", Upload.IDLE)
 

@@ -1,0 +1,155 @@
+"""A newcomer who types what a page shows, with a home in which nothing is yet."""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final, Self
+
+from tests.docs.comparing import difference
+from tests.docs.pages import Block, Command, commands
+
+DEADLINE_S: Final = 120.0
+ENDS_S: Final = 60.0
+LOOK_S: Final = 0.05
+PORT: Final = "7420"  # which the pages name, and nobody here may rely on
+
+# `gwrms` as it is installed, but that a robot which no option names is at a free port.
+_GWRMS: Final = """#!/bin/sh
+for word; do [ "$word" = --robot ] && exec @RUN@ "$@"; done
+case $1 in
+    gateway) shift && exec @RUN@ gateway --port @PORT@ "$@" ;;
+    describe | snapshot | cost | bench | blame | watch | get | set | params | store | restore | \\
+        stop | reset | enable)
+        exec @RUN@ "$@" --robot 127.0.0.1:@PORT@ ;;
+    journal) [ "$2" = tail ] && exec @RUN@ "$@" --robot 127.0.0.1:@PORT@ ;;
+esac
+exec @RUN@ "$@"
+"""
+
+
+class Terminal:
+    """A command that goes on; what it says is in a file."""
+
+    def __init__(self, command: Command, home: Path, environment: Mapping[str, str], log: Path) -> None:
+        self._command = command
+        self._log = log
+        with log.open("wb") as said:
+            self._process = subprocess.Popen(
+                ["bash", "-c", f"exec {command.typed}"],
+                cwd=home,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=said,
+                stderr=subprocess.STDOUT,
+                process_group=0,
+            )
+
+    def wait(self) -> None:
+        """Until it has said what the page shows."""
+        deadline = time.monotonic() + DEADLINE_S
+        while wrong := difference((*self._command.shown, "…"), self.said):
+            assert self._process.poll() is None, f"{self._command.typed} has ended:\n{self.said}"
+            assert time.monotonic() < deadline, wrong
+            time.sleep(LOOK_S)
+
+    @property
+    def said(self) -> str:
+        return self._log.read_text(encoding="utf-8")
+
+    def end(self) -> int:
+        """Ctrl-C; its exit status."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            return self._process.wait(ENDS_S)
+        finally:
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, signal.SIGKILL)
+                self._process.wait()
+
+
+class Newcomer:
+    """Types block after block; leaving ends every terminal that was opened."""
+
+    def __enter__(self) -> Self:
+        with ExitStack() as stack:
+            self.home = Path(stack.enter_context(TemporaryDirectory(prefix="gwrms-home-")))
+            self._port = _free_port()
+            self._environment = self._prepare()
+            self._terminals: list[Terminal] = []
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._stack.close()
+
+    def type(self, block: Block) -> None:
+        """Do what a block shows, and compare what comes of it."""
+        if block.file is not None:
+            (self.home / block.file).write_text(self._here(block.text), encoding="utf-8")
+        elif block.is_shell and not block.by_hand:
+            for command in commands(block):
+                self._run(command, block)
+
+    def end(self) -> None:
+        """Ctrl-C in every terminal, the newest first: each ends well."""
+        while self._terminals:
+            terminal = self._terminals.pop()
+            assert terminal.end() in (0, 130), terminal.said
+
+    def _run(self, command: Command, block: Block) -> None:
+        here = Command(self._here(command.typed), command.shown)
+        if block.terminal:
+            log = self.home / "bin" / f"terminal-{len(self._terminals)}.log"
+            terminal = Terminal(here, self.home, self._environment, log)
+            self._stack.callback(terminal.end)
+            self._terminals.append(terminal)
+            terminal.wait()
+            return
+        ran = subprocess.run(
+            ["bash", "-euo", "pipefail", "-c", here.typed],
+            cwd=self.home,
+            env=self._environment,
+            input="y\n",  # whoever is asked says yes, and presses Enter
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=DEADLINE_S,
+            check=False,
+        )
+        assert ran.returncode == 0, f"{here.typed}\n{ran.stdout}"
+        wrong = difference(here.shown, ran.stdout)
+        assert wrong is None, f"{here.typed}\n{wrong}"
+
+    def _here(self, text: str) -> str:
+        return text.replace(PORT, str(self._port))
+
+    def _prepare(self) -> dict[str, str]:
+        folder = self.home / "bin"
+        folder.mkdir()
+        run = f"'{sys.executable}' -P -m gateway.main"
+        program = folder / "gwrms"
+        program.write_text(_GWRMS.replace("@RUN@", run).replace("@PORT@", str(self._port)), encoding="utf-8")
+        program.chmod(0o755)
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+        path = os.pathsep.join([str(folder), str(Path(sys.executable).parent), os.environ["PATH"]])
+        return kept | {"HOME": str(self.home), "PATH": path, "COLUMNS": "200"}
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def bring(file: Path, home: Path) -> None:
+    """Something that a page takes for granted, such as a vendor's file."""
+    shutil.copy(file, home)

@@ -1,0 +1,18 @@
+"""The twenty changes of CONTRIBUTING belong to folders and files that there are."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+TABLE = TEXT.partition("## Where a change belongs")[2].partition("\n## ")[0]
+
+
+def test_there_are_twenty() -> None:
+    assert [int(number) for number in re.findall(r"^\| (\d+)\. ", TABLE, re.MULTILINE)] == list(range(1, 21))
+
+
+def test_every_place_is_there() -> None:
+    paths = re.findall(r"`([a-z_0-9]+/[^`*]*)`", TABLE)
+    assert len(paths) > 20
+    assert [path for path in paths if not (ROOT / path).exists()] == []

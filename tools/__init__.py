@@ -1,0 +1,1 @@
+"""What the repository is kept with: what draws the reference, makes the pictures and measures a store."""

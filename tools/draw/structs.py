@@ -1,0 +1,112 @@
+"""A msgspec struct as rows of a table: each key's name, type, default, and what its comment says."""
+
+import ast
+import enum
+import inspect
+import re
+import textwrap
+import tokenize
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from io import StringIO
+
+from msgspec import NODEFAULT, UNSET, Struct
+from msgspec.structs import FieldInfo, fields
+
+from tools.draw.kinds import kind, parts, without_none
+
+_ABOVE = re.compile(r"^(?:Result of )?`[^`]+`(?: and `[^`]+`)?[.:;] ?")
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a struct, in words."""
+
+    name: str
+    kind: str
+    default: str | None  # None: it is required
+    meaning: str
+
+
+def written(struct: type[Struct]) -> Iterator[Key]:
+    """The keys of a table that people write: what may be `None` may be left out."""
+    said = comments(struct)
+    for field in fields(struct):
+        meaning = said.get(field.name, "").replace("None: ", "not given: ")
+        yield Key(field.encode_name, kind(without_none(field.type)), _default(field), meaning)
+
+
+def sent(struct: type[Struct]) -> Iterator[Key]:
+    """The fields of an object that programs send: what may be `None` is `null`."""
+    said = comments(struct)
+    for field in fields(struct):
+        meaning = said.get(field.name, "").replace("None: ", "null: ")
+        yield Key(field.encode_name, kind(field.type), _default(field), meaning)
+
+
+def docstring(struct: type[Struct]) -> str:
+    """What is said of it, a line a paragraph, without the name that stands above it already."""
+    paragraphs = (inspect.getdoc(struct) or "").split("\n\n")
+    text = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+    text = _ABOVE.sub("", text).replace("`None`", "`null`")
+    return text[:1].upper() + text[1:]
+
+
+def mentioned(struct: type[Struct]) -> Iterator[type[Struct]]:
+    """The structs that its fields are made of, and theirs."""
+    for field in fields(struct):
+        for part in parts(field.type):
+            if isinstance(part, type) and issubclass(part, Struct):
+                yield part
+                yield from mentioned(part)
+
+
+def table(keys: Iterable[Key], first: str = "key") -> str:
+    """In Markdown; keys that are required stand first, in bold."""
+    lines = [f"| {first} | type | default | meaning |", "|---|---|---|---|"]
+    for key in sorted(keys, key=lambda key: key.default is not None):
+        name = f"**`{key.name}`**" if key.default is None else f"`{key.name}`"
+        lines.append(f"| {name} | {key.kind} | {key.default or ''} | {key.meaning} |")
+    return "\n".join(lines)
+
+
+def comments(struct: type[Struct]) -> dict[str, str]:
+    """By field: the comment behind it, also where a base class declares it."""
+    found: dict[str, str] = {}
+    for base in reversed(struct.__mro__):
+        if issubclass(base, Struct) and base is not Struct:
+            found |= _own_comments(textwrap.dedent(inspect.getsource(base)))
+    return found
+
+
+def _own_comments(source: str) -> dict[str, str]:
+    tokens = tokenize.generate_tokens(StringIO(source).readline)
+    by_line = {one.start[0]: one.string.lstrip("# ") for one in tokens if one.type == tokenize.COMMENT}
+    [declared] = ast.parse(source).body
+    return {
+        node.target.id: " ".join(
+            by_line[line] for line in range(node.lineno, (node.end_lineno or 0) + 1) if line in by_line
+        )
+        for node in getattr(declared, "body", ())
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+    }
+
+
+def _default(field: FieldInfo) -> str | None:
+    if field.required:
+        return None
+    if field.default in (NODEFAULT, UNSET, None, (), ""):
+        return ""
+    return f"`{_as_toml(field.default)}`"
+
+
+def _as_toml(value: object) -> str:
+    if isinstance(value, enum.Enum):
+        value = value.value
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_as_toml, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)

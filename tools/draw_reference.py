@@ -1,0 +1,48 @@
+"""Draws the reference: `python -m tools.draw_reference [--check]`.
+
+With `--check` nothing is written; exit status 1 names the pages that are not what would be drawn.
+"""
+
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+from tools.draw import commands, robot_file, server_file, wire
+
+REFERENCE: Final = Path(__file__).parents[1] / "docs" / "reference"
+PAGES: Final[Mapping[str, Callable[[], str]]] = {
+    page.PAGE: page.draw for page in (robot_file, server_file, wire, commands)
+}
+
+
+def stale() -> list[str]:
+    """The pages that are not what would be drawn."""
+    return [name for name, draw in PAGES.items() if _held(name) != draw()]
+
+
+def write() -> list[str]:
+    """Draw every page anew; which have changed."""
+    changed = stale()
+    for name in changed:
+        (REFERENCE / name).write_text(PAGES[name](), encoding="utf-8")
+    return changed
+
+
+def main(argv: list[str]) -> int:
+    """Draw, or check."""
+    check = argv == ["--check"]
+    found = stale() if check else write()
+    for name in found:
+        said = "is not up to date; run ./dev docs" if check else "is drawn anew"
+        sys.stderr.write(f"docs/reference/{name} {said}\n")
+    return int(check and bool(found))
+
+
+def _held(name: str) -> str:
+    page = REFERENCE / name
+    return page.read_text(encoding="utf-8") if page.exists() else ""
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
