@@ -18,7 +18,7 @@ from gateway.connections.acceptor import Acceptor
 from gateway.process.futures import done, then
 from gateway.process.loop import READ, WRITE, Loop, Timer
 from gateway.registry import Registry
-from gateway.wire.messages import ResourceSnapshot, ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshot, ResourceSnapshotParams
 
 log = logging.getLogger(__name__)
 

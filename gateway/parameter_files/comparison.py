@@ -7,7 +7,7 @@ from msgspec import Struct
 
 from eds.datatypes import DATA_TYPE_BY_NAME
 from gateway.coding import Coding, CodingError, Number, text, too_far
-from gateway.wire.messages import ParameterInfo, ParameterValue
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 
 class Verdict(StrEnum):

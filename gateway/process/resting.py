@@ -1,8 +1,9 @@
 """What a gateway is while nobody needs it: a bare interpreter that sleeps at its sockets until one comes.
 
 Run as a script, without site-packages, with the gateway's own command line as arguments
-(`connections/listeners.py` does both ways). It imports next to nothing, so that it stays as small as Python can be, and it never accepts:
-who comes waits in the socket's backlog and is served by the gateway that this becomes.
+(`connections/listeners.py` does both ways). It imports next to nothing, so that it stays as small as Python
+can be, and it never accepts: who comes waits in the socket's backlog and is served by the gateway that this
+becomes.
 """
 
 import os

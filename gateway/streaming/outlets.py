@@ -13,7 +13,7 @@ import msgspec
 
 from gateway.connections.session import Session
 from gateway.wire import framing
-from gateway.wire.messages import STREAM_DATA
+from gateway.wire.stream import STREAM_DATA
 
 if TYPE_CHECKING:
     from gateway.streaming.streams import Feed

@@ -11,7 +11,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from drivers.samples import Sample
-from gateway.connections.limits import (
+from gateway.connections.session import Session
+from gateway.process.loop import Loop, Timer
+from gateway.streaming.budget import Budget
+from gateway.streaming.outlets import Batch, Outlet, encode_batch
+from gateway.streaming.sources import Selection
+from gateway.wire import framing
+from gateway.wire.limits import (
     ALL_VALUES_A_SECOND,
     OWN_RATE_HZ,
     ROW_VALUES,
@@ -19,12 +25,6 @@ from gateway.connections.limits import (
     STREAMS,
     VALUES_A_SECOND,
 )
-from gateway.connections.session import Session
-from gateway.process.loop import Loop, Timer
-from gateway.streaming.budget import Budget
-from gateway.streaming.outlets import Batch, Outlet, encode_batch
-from gateway.streaming.sources import Selection
-from gateway.wire import framing
 
 BATCH_S = 0.010  # ticks faster than this travel together
 GATHER_S = 0.002  # how long a source's own samples wait for company

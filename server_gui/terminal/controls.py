@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 from server_gui.core.follow.robot import Robot
 from server_gui.terminal.keys import Key
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from gateway.cli.plain import plain
 from gateway.client import ConnectionState
-from gateway.wire.messages import ParameterInfo, ParameterValue, Written
+from gateway.wire.parameter import ParameterInfo, ParameterValue, Written
 from server_gui.core.follow.events import Failed
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg

@@ -13,7 +13,7 @@ from eds.datatypes import DATA_TYPES
 from gateway.coding import Coding, CodingError, Number, text
 from gateway.config import ParameterSettings
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 
 READABLE = ("rw", "rwr", "rww", "ro", "const")
 WRITABLE = ("rw", "rwr", "rww")

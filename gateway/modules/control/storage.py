@@ -24,7 +24,7 @@ from gateway.process.futures import then
 from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import Stored
+from gateway.wire.parameter import Stored
 
 if TYPE_CHECKING:
     from gateway.modules.component.module import ComponentModule

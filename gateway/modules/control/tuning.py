@@ -36,7 +36,7 @@ from gateway.process.loop import Loop
 from gateway.records.records import Records
 from gateway.records.undo import Undo
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
+from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
 
 if TYPE_CHECKING:
     from gateway.connections.session import Session

@@ -15,8 +15,8 @@ from gateway.modules.stop.stopper import Stopper, Tell, nmt_stop
 from gateway.modules.stop.target import Report, Target
 from gateway.process.futures import back, done, gather, outcome, then
 from gateway.process.loop import Loop
-from gateway.wire.messages import StopOutcome as Said
-from gateway.wire.messages import Stopped
+from gateway.wire.stop import StopOutcome as Said
+from gateway.wire.stop import Stopped
 
 log = logging.getLogger(__name__)
 

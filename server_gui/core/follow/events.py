@@ -6,16 +6,13 @@ from dataclasses import dataclass
 import msgspec
 
 from gateway.client import Batch, ClockOffset, ConnectionState
-from gateway.wire.messages import (
-    Description,
-    GatewayCost,
-    JournalEntries,
-    ParameterValues,
-    ResourceSnapshot,
-    Snapshot,
-    Stopped,
-    Written,
-)
+from gateway.wire.component import Snapshot
+from gateway.wire.control import JournalEntries
+from gateway.wire.cost import GatewayCost
+from gateway.wire.parameter import ParameterValues, Written
+from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.robot import Description
+from gateway.wire.stop import Stopped
 
 STOP = "STOP"  # what a stop that failed is called
 

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from gateway.wire.messages import Number, ParameterInfo, ParameterValue
+from gateway.wire.method import Number
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 from server_gui.core.processing.units import Unit, Units
 
 Values = Mapping[str, ParameterValue]

@@ -17,7 +17,7 @@ from gateway.config import ConfigError, DeviceTable, JointTable
 from gateway.modules.control.catalogue import Catalogue, resolve
 from gateway.modules.control.parameters import Lock, Parameter
 from gateway.wire.framing import RpcError
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 from tests.unit.gateway.harness import DISABLED, HEAD, ROBOT, Bench, Client, config, serving
 
 KNEE = """

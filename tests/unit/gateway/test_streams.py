@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.component import Kind
-from gateway.connections import limits
 from gateway.connections.session import Session
 from gateway.modules.component.module import ComponentSource
 from gateway.process.loop import Loop
@@ -20,6 +19,7 @@ from gateway.streaming.budget import Budget
 from gateway.streaming.outlets import Batch, Outlet, encode_batch
 from gateway.streaming.sources import merge, narrow, whole
 from gateway.streaming.streams import SampleFeed, Streams, TickFeed, values_a_second
+from gateway.wire import limits
 from gateway.wire.framing import RpcError
 from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
 

@@ -1,0 +1,1 @@
+"""What draws the references and makes the figures of the docs."""
