@@ -7,7 +7,7 @@ from typing import Any
 
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.insole import layout as layouts
-from drivers.insole.formats import parser_maker
+from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import FEET, Foot
 from drivers.parsing import Parser
@@ -27,25 +27,20 @@ class Match:
     frames: int
     share: float  # of the bytes, 0 to 1
     cells: int | None = None  # of an insole
-    feet: tuple[Foot, ...] = ()  # that an insole's frames name
+    feet: tuple[Foot, ...] = ()  # whose cells an insole's frames name
 
 
 def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
     """Every format (and shipped description) that a serial stream can be in."""
     for name, imu in IMU_FORMATS.items():
-        yield name, None, imu.make_parser
-    yield "insole-cobs", None, parser_maker("insole-cobs", None)
-    yield "insole-csv", None, parser_maker("insole-csv", None)
-    for name in layouts.shipped():
-        layout = layouts.load(name)
-        if layout.frame is not None:
-            yield "insole-frame", name, parser_maker("insole-frame", layout)
-        if layout.csv is not None:
-            yield "insole-csv", name, parser_maker("insole-csv", layout)
+        yield name, None, imu.parser
+    for name, insole in sorted(INSOLE_FORMATS.items(), key=lambda item: item[1].described):
+        for layout in insole.identify():
+            yield name, layout, insole.parser(None if layout is None else layouts.load(layout))
 
 
 def matches(data: bytes) -> list[Match]:
-    """The formats that fit `data`, the best first."""
+    """The formats that fit `data`, the best first; of equal ones a device's own before a described one."""
     found = [match for candidate in candidates() if (match := _try(data, *candidate)) is not None]
     if not found and (lines := _number_lines(data)) is not None:
         found.append(lines)
@@ -68,7 +63,7 @@ def _try(data: bytes, name: str, layout: str | None, make_parser: Callable[[], P
         return None
     if not isinstance(frames[-1], InsoleFrame):
         return Match(name, layout, len(frames), share)
-    named = {frame.foot for frame in frames}
+    named = {frame.foot for frame in frames if frame.cells.count(None) < len(frame.cells)}
     feet = tuple(foot for foot in FEET if foot in named)
     return Match(name, layout, len(frames), share, len(frames[-1].cells), feet)
 

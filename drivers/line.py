@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, TypeVar
 
-from drivers.identify import recognise
 from drivers.parsing import Parser
 from drivers.port import SerialPort
 
@@ -71,6 +70,10 @@ class Line(Generic[F]):
             return f"no byte from {self.path} for {silent_s:.1f} s: check the sensor's power and its TX wire"
         if self._unread < UNREAD:
             return None
+        from drivers.identify import (
+            recognise,  # imports every format: for a line that nobody understands only
+        )
+
         spoken = recognise(self._unread_tail)
         why = f"wrong baud rate or wrong format (gwrms sensor {self.path} finds out)"
         if spoken is not None and spoken.format_name != self.format_name:

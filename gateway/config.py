@@ -11,7 +11,8 @@ import msgspec
 from msgspec import Meta, Struct
 
 from drivers.bus.settings import CanSettings, DeviceSettings, Role
-from drivers.imu.settings import CanImuSettings, ImuSettings, InclinometerSettings, MountedSettings, kind_of
+from drivers.component import Kind
+from drivers.imu.settings import CanImuSettings, ImuSettings, MountedSettings, NodeImuSettings, kind_of
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.cia402 import STATE_WORDS
 from drivers.joint.settings import JointSettings
@@ -19,13 +20,14 @@ from gateway.guard.checks import complaints as about_guard
 from gateway.guard.settings import WATCHES, GuardSettings
 from gateway.modules.stop.settings import StopSettings
 from gateway.modules.stop.settings import complaints as about_stop
+from gateway.object_names import ObjectName, address_of
 from gateway.records.folder import default_folder
 from gateway.sdo_ids import complaints as about_sdo
 from gateway.wording import key_of, plainly
 
 Table = Mapping[str, Any]
 Node = tuple[str, int]  # a bus by its name, and a node id there
-OnBus = JointSettings | DeviceSettings | CanImuSettings | InclinometerSettings
+OnBus = JointSettings | DeviceSettings | CanImuSettings | NodeImuSettings
 
 CONTROLWORD = 0x6040
 AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
@@ -105,7 +107,7 @@ class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only
     drive is enabled. `states` are the CiA 402 states that allow a change.
     """
 
-    object: Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$")]
+    object: ObjectName
     unit: str = ""
     scale: float = 1.0
     min: float | None = None
@@ -117,8 +119,7 @@ class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only
     @property
     def address(self) -> tuple[int, int]:
         """Index and subindex."""
-        index, _, subindex = self.object.partition(":")
-        return int(index, 16), int(subindex, 0)
+        return address_of(self.object)
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True):
@@ -179,7 +180,7 @@ _NAMED: Mapping[str, type[Struct]] = {
     "imu": MountedSettings,  # one of several, by what the table says
     "parameter": ParameterSettings,
 }
-COMPONENT_TABLES = ("joint", "device", "insole", "imu")
+COMPONENT_TABLES = tuple(Kind)  # each kind by its name
 
 
 def load(path: Path) -> RobotConfig:

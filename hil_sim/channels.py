@@ -9,7 +9,8 @@ import math
 from hil_sim.drive import objects
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import JOINTS, Exoskeleton
-from hil_sim.sensors import insole_cobs, witmotion
+from hil_sim.sensors.imus import witmotion
+from hil_sim.sensors.insoles import insole_cobs
 from hil_sim.sensors.sole import Pressures
 from hil_sim.sensors.suite import FEET, TRUNK
 from hil_sim.sensors.trunk_imu import Motion

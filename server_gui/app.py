@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
+from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.feeds import Feeds, Record
@@ -94,9 +95,10 @@ class App:
         self._qt = qt
         self._followed: list[Followed] = []
         self._mailboxes: dict[str, Mailbox] = {}
+        self._stations: dict[str, Station] = {}
         self._foreseen: collections.deque[Foreseen] = collections.deque(maxlen=FORESEEN)
         self._poster = Poster()
-        self.feeds = Feeds(settings, following, record, self._show, self._foreseen.extend)
+        self.feeds = Feeds(settings, following, record, self._show, self._foreseen.extend, self._stop)
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self._foresees = settings.prediction.enabled
         self._own = OwnRobot(self._own_ready, self._own_failed)
@@ -144,7 +146,7 @@ class App:
         link = Link(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
         station.predictions.off = not self._foresees
-        self._mailboxes[name] = mailbox
+        self._mailboxes[name], self._stations[name] = mailbox, station
         self._followed.append(Followed(station, mailbox, network.run(link.run()), Ticks()))
         self.feeds.follow(name, address)
         self.desk.add(station)
@@ -152,10 +154,15 @@ class App:
 
     def stop(self, reason: str) -> None:
         """STOP the robot that is looked at; from any thread."""
-        station = self.desk.selected
-        if station is not None:
-            sent = station.send_stop(reason)
-            self._poster.deliver(lambda: station.note_stop(sent))
+        if (station := self.desk.selected) is not None:
+            self._stop(station.name, reason)
+
+    def _stop(self, robot: str, reason: str) -> "concurrent.futures.Future[Stopped]":
+        """STOP a robot, by a key or a rule; from any thread."""
+        station = self._stations[robot]
+        sent = station.send_stop(reason)
+        self._poster.deliver(lambda: station.note_stop(sent))
+        return sent
 
     def tick(self) -> None:
         """Take what has come, and draw."""
@@ -164,9 +171,8 @@ class App:
             followed.station.take(followed.ticks.take(events) if self.feeds.by_source else events)
             if followed.link.done():
                 followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
-        stations = {station.name: station for station in self.desk}
         for foreseen in [self._foreseen.popleft() for _ in range(len(self._foreseen))]:
-            stations[foreseen.robot].foresee(foreseen)
+            self._stations[foreseen.robot].foresee(foreseen)
         self.feeds.look(self.desk.recording)
         self.window.refresh()
 

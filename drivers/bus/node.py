@@ -115,6 +115,11 @@ class Node(BusUser):
         return None
 
     @property
+    def answered_ns(self) -> int:
+        """When it last did, or refused, what it was asked by SDO (monotonic); 0 before the first time."""
+        return self.channel.answered_ns
+
+    @property
     def findings(self) -> tuple[str, ...]:
         """What an integrator should know about it, in words."""
         distrust = self.distrust

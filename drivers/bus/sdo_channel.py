@@ -67,6 +67,7 @@ class SdoChannel:
         self.label = label
         self.timeout_s = timeout_s
         self.counters = SdoCounters()
+        self.answered_ns = 0  # when the device last did, or refused, what it was asked
         self._outlet = outlet
         self._distrust = distrust
         self._interrupted = threading.Event()
@@ -224,9 +225,10 @@ class SdoChannel:
             raise Unavailable(f"{transfer.what}: given up, the node began anew")
         self.counters.transfers += 1
         try:
-            return self._run(transfer)
+            result = self._run(transfer)
         except sdo.SdoAborted as error:
             self.counters.aborts += 1
+            self.answered_ns = time.monotonic_ns()
             text = f"{transfer.what}: refused, {abort_text(error.abort_code)}"
             raise DeviceAbort(text, error.abort_code) from error
         except sdo.SdoProtocolError as error:
@@ -242,6 +244,9 @@ class SdoChannel:
             self.counters.timeouts += 1
             self._abort(transfer, sdo.TIMED_OUT)
             raise DeviceTimeout(f"{transfer.what}: no answer within {transfer.timeout_s:g} s") from error
+        else:
+            self.answered_ns = time.monotonic_ns()
+            return result
         finally:
             self._in_flight = None
             if transfer.request is not None:

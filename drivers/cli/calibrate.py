@@ -17,18 +17,19 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.sensor import run_parsed
 from drivers.errors import SettingsError, Unavailable
 from drivers.imu import zero
-from drivers.imu.build import AnyImu, build_imu
+from drivers.imu.build import build_imu
 from drivers.imu.device import Imu
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.imu.settings import ImuSettings, kind_of
+from drivers.imu.trunk import TrunkImu
 from drivers.insole import fit as fitting
-from drivers.insole import layout as layouts
 from drivers.insole.calibration import CellCalibration, loaded_counts
+from drivers.insole.format import USUAL_LAYOUT, layout_of
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
-from drivers.insole.formats import parser_maker
 from drivers.insole.frame import InsoleFrame
 from drivers.line import Line
 from drivers.samples import State
+from drivers.site import Site
 
 STANDARD_GRAVITY = 9.80665
 AVERAGE_S = 2.0
@@ -55,10 +56,12 @@ def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Names
         "before it writes. Name the file in [insole.NAME] as `calibration`."
     )
     parser.add_argument(
-        "--format", choices=INSOLE_FORMATS, default="insole-cobs", help="default: %(default)s"
+        "--format", choices=tuple(INSOLE_FORMATS), default="insole-cobs", help="default: %(default)s"
     )
     parser.add_argument("--baud", type=int, default=230400, help="default: %(default)s")
-    parser.add_argument("--layout", default="insole-16", help="a shipped layout or a .toml file")
+    parser.add_argument(
+        "--layout", help=f"a shipped layout or a .toml file; default: the device's own, else {USUAL_LAYOUT}"
+    )
     parser.add_argument("--foot", choices=("left", "right"), help="where both feet are on the port")
     parser.add_argument("--falling", type=float, metavar="FULL_SCALE", help="fewer counts are more load")
     parser.add_argument("--saturation", type=float, help="counts from which a cell says no more")
@@ -109,8 +112,8 @@ class _Average:
 
 
 def _insole(options: argparse.Namespace) -> int:
-    layout = layouts.load(options.layout)
-    line = Line(options.port, options.baud, options.format, parser_maker(options.format, layout))
+    layout = layout_of(options.format, options.layout)
+    line = Line(options.port, options.baud, options.format, INSOLE_FORMATS[options.format].parser(layout))
     base = CellCalibration(
         polarity="falling" if options.falling else "rising",
         full_scale=options.falling,
@@ -157,7 +160,7 @@ def _imu_on_port(options: argparse.Namespace) -> Imu:
     return Imu("trunk", msgspec.convert(settings, ImuSettings))
 
 
-def _imu_in_file(where: str) -> AnyImu | None:
+def _imu_in_file(where: str) -> TrunkImu | None:
     """The IMU at `ROBOT.toml:NAME`, with no zero yet; `None` for a port.
 
     Raises:
@@ -177,7 +180,7 @@ def _imu_in_file(where: str) -> AnyImu | None:
         raise SettingsError(f"{file} has no table of the name {error}, which [imu.{name}] needs") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise SettingsError(f"{file}: {error}") from error
-    return build_imu(name, settings, buses, Path(file))
+    return build_imu(name, settings, Site(Path(file), buses))
 
 
 def _average(line: Line[InsoleFrame], foot: str | None, cells: int) -> list[float]:

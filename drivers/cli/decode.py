@@ -9,13 +9,12 @@ from typing import Any, BinaryIO
 import msgspec
 
 from drivers.imu import frame as imu_frame
+from drivers.imu.can import FORMATS as CAN_FORMATS
 from drivers.imu.formats import FORMATS as IMU_FORMATS
-from drivers.imu.witmotion_can import WitmotionCanParser
 from drivers.insole import frame as insole_frame
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
-from drivers.insole.formats import parser_maker
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Layout
 from drivers.insole.load import load_of
@@ -23,7 +22,7 @@ from drivers.parsing import Parser
 
 CHUNK = 65536
 FORCE_THRESHOLD = 20.0  # N, below it there is no centre of pressure
-FORMATS = (*IMU_FORMATS, "witmotion-can", *INSOLE_FORMATS)
+FORMATS = (*IMU_FORMATS, *CAN_FORMATS, *INSOLE_FORMATS)
 
 Flatten = Callable[[Any], dict[str, object]]
 
@@ -58,12 +57,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _reader(name: str, layout_name: str | None) -> tuple[Parser[Any], Flatten]:
-    if name in IMU_FORMATS:
-        return IMU_FORMATS[name].make_parser(), imu_frame.flat
-    if name == "witmotion-can":
-        return WitmotionCanParser(), imu_frame.flat
+    for folder in (IMU_FORMATS, CAN_FORMATS):
+        if name in folder:
+            return folder[name].parser(), imu_frame.flat
     layout = layouts.load(layout_name) if layout_name else None
-    return parser_maker(name, layout)(), (insole_frame.flat if layout is None else _with_load(layout))
+    flatten = insole_frame.flat if layout is None else _with_load(layout)
+    return INSOLE_FORMATS[name].parser(layout)(), flatten
 
 
 def _decode(source: BinaryIO, parser: Parser[Any], flatten: Flatten) -> None:

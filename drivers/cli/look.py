@@ -18,7 +18,8 @@ from drivers.imu.device import Imu
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.imu.settings import ImuSettings
 from drivers.insole import layout as layouts
-from drivers.insole.device import insoles
+from drivers.insole.build import insoles
+from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.settings import InsoleSettings
 from drivers.port import open_port
 from drivers.samples import State
@@ -89,7 +90,8 @@ def table(port: str, baudrate: int, match: Match) -> str:
     keys = f'port = "{port}"\nbaudrate = {baudrate}\nformat = "{match.format_name}"\n'
     if match.format_name in IMU_FORMATS:
         return f"[imu.trunk]\n{keys}"
-    keys += f'layout = "{_layout(match)}"\n'
+    layout = _layout(match)
+    keys += f'layout = "{layout}"\n' if layout is not None else ""
     return "\n".join(f"[insole.{foot}_insole]\n{keys}" for foot in match.feet or ("left",))
 
 
@@ -130,8 +132,9 @@ def _nothing(port: str, heard: list[Heard]) -> str:
     )
 
 
-def _layout(match: Match) -> str:
-    if match.layout is not None:
+def _layout(match: Match) -> str | None:
+    """What the table has to name; `None` where the format knows where its cells are."""
+    if match.layout is not None or INSOLE_FORMATS[match.format_name].layout is not None:
         return match.layout
     return next(
         (name for name in layouts.shipped() if len(layouts.load(name).cells) == match.cells), "yours.toml"
@@ -143,7 +146,7 @@ def _components(port: str, baudrate: int, match: Match) -> list[Component]:
         settings = {"port": port, "baudrate": baudrate, "format": match.format_name}
         return [Imu("trunk", msgspec.convert(settings, ImuSettings))]
     layout = _layout(match)
-    if layout.endswith(".toml"):
+    if layout is not None and layout.endswith(".toml"):
         return []
     chosen = {"port": port, "baudrate": baudrate, "format": match.format_name, "layout": layout}
     feet = msgspec.convert(chosen, InsoleSettings)

@@ -5,18 +5,18 @@ from pathlib import Path
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import wire_id
-from drivers.imu import witmotion_can
-from drivers.imu.formats import FORMATS
+from drivers.imu.can import FORMATS
 from drivers.imu.settings import CanImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality
 
 
 class CanImu(TrunkImu, BusUser):
-    """A WitMotion IMU's CAN variant (a `Component`); it is heard, never asked."""
+    """An IMU on a CAN bus (a `Component`); it is heard, never asked."""
 
     def __init__(self, name: str, settings: CanImuSettings, bus: CanBus, beside: Path | None = None) -> None:
-        super().__init__(name, settings, FORMATS["witmotion"].conventions, settings.attitude, beside)
+        self._format = FORMATS[settings.format]
+        super().__init__(name, settings, self._format.conventions, settings.attitude, beside)
         self._bus = bus
         self._label = f"0x{settings.can_id:03X}"
         self._can_id = wire_id(settings.can_id)
@@ -51,7 +51,7 @@ class CanImu(TrunkImu, BusUser):
             self._forget()
 
     def _on_frame(self, stamp_ns: int, data: bytes) -> None:
-        frame = witmotion_can.decode(data)
+        frame = self._format.decode(data)
         with self._lock:
             if frame is None:
                 self._foreign += 1
@@ -62,8 +62,8 @@ class CanImu(TrunkImu, BusUser):
     def _silence(self) -> str:
         if self._foreign and not self._frames:
             return (
-                f"frames {self._label} on bus {self._bus.name} are not WitMotion's: another device has this "
-                "identifier, correct `can_id`"
+                f"frames {self._label} on bus {self._bus.name} are not {self._format.maker}'s: another "
+                "device has this identifier, correct `can_id`"
             )
         return (
             f"no frame {self._label} comes on bus {self._bus.name}: check the sensor's power, its bit rate, "

@@ -17,7 +17,7 @@ class Imu(TrunkImu):
     def __init__(self, name: str, settings: ImuSettings, beside: Path | None = None) -> None:
         imu_format = FORMATS[settings.format]
         super().__init__(name, settings, imu_format.conventions, settings.attitude, beside)
-        self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.make_parser)
+        self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.parser)
         self._clock_spec = imu_format.clock
         self._clock = imu_format.clock.make() if imu_format.clock else None
 

@@ -12,7 +12,7 @@ More = dict[str, float | int | str]
 class ImuFrame(msgspec.Struct, frozen=True):
     """What one frame says; `None` for what it does not carry.
 
-    Axes and the order of the angles are the device's own: `drivers.imu.formats` says what they are.
+    Axes and the order of the angles are the device's own: the format's `conventions` say what they are.
     """
 
     kind: str

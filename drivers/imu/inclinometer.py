@@ -12,11 +12,11 @@ from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.errors import SettingsError
-from drivers.imu import cia410
-from drivers.imu.cia410 import MappedSlope, SlopePlan
-from drivers.imu.formats import Conventions
+from drivers.imu import slopes
+from drivers.imu.canopen.cia410 import InclinometerSettings
+from drivers.imu.format import Conventions
 from drivers.imu.motion import TILT
-from drivers.imu.settings import InclinometerSettings
+from drivers.imu.slopes import MappedSlope, SlopePlan
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality, State
 from eds import Description
@@ -37,7 +37,7 @@ class Inclinometer(TrunkImu):
     ) -> None:
         """Raises `SettingsError` also where the file describes one axis only, or shares its node wrongly."""
         super().__init__(name, settings, Conventions(), "device", beside)
-        if not cia410.has_two_axes(description):
+        if not slopes.has_two_axes(description):
             raise SettingsError(
                 f"[imu.{name}] eds: {description.path.name} has no longitudinal and lateral slope "
                 "(6010h and 6020h, or 6110h and 6120h): a trunk's tilt needs a two-axis inclinometer"
@@ -79,7 +79,7 @@ class Inclinometer(TrunkImu):
     # What the node tells.
 
     def boot(self, sdo: SdoChannel) -> None:
-        plan = cia410.make_plan(sdo, self._description, self.settings.poll_hz)
+        plan = slopes.make_plan(sdo, self._description, self.settings.poll_hz)
         with self._lock:
             self.forget()
             if self._started:
@@ -135,7 +135,7 @@ class Inclinometer(TrunkImu):
             if longitudinal is None or lateral is None:
                 return
             if stamp_ns - min(longitudinal[0], lateral[0]) <= self._stale_ns:
-                self._take(cia410.frame(longitudinal[1], lateral[1], self.settings.directions), stamp_ns)
+                self._take(slopes.frame(longitudinal[1], lateral[1], self.settings.directions), stamp_ns)
 
     def _silence(self) -> str | None:
         if self._plan is None:

@@ -1,16 +1,23 @@
-"""What an integrator says about an IMU: the table `[imu.NAME]` of the robot's file."""
+"""What an integrator says about an IMU: the table `[imu.NAME]` of the robot's file, by its wiring."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
 from drivers.bus.settings import CobId, NodeId, NodeTimes
+from drivers.imu import can, canopen, formats
+
+if TYPE_CHECKING:
+    from drivers.folder import Folder
+    from drivers.imu.format import CanFormat, Format, NodeFormat
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Attitude = Literal["auto", "device", "filter"]
-Sign = Literal[1, -1]
+
+# The key that only tables of that wiring have → the format of those that name none.
+USUAL = {"can_id": "witmotion-can", "node_id": "cia410", "port": "witmotion"}
 
 
 class MountedSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -25,6 +32,12 @@ class MountedSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     zero: str | None = None  # file of a zero taken by `gwrms calibrate imu`, beside the robot's file
     stale_after_s: Positive = 0.5
     lost_after_s: Positive = 2.0
+    format: str  # how it talks
+
+    def __post_init__(self) -> None:
+        if not any(self.format in wiring.formats for wiring in WIRINGS):
+            known = ", ".join(name for wiring in WIRINGS for name in wiring.formats)
+            raise ValueError(f"format {self.format!r} is not known; here are {known}")
 
 
 class ImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,7 +45,7 @@ class ImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_o
 
     port: str  # a stable path: /dev/serial/by-id/…
     baudrate: Annotated[int, msgspec.Meta(gt=0)] = 115200
-    format: Literal["witmotion", "bno08x-rvc", "xsens", "vectornav"] = "witmotion"
+    format: str = USUAL["port"]
     attitude: Attitude = "auto"  # auto: the device's, else from rates and acceleration
 
 
@@ -41,22 +54,17 @@ class CanImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, k
 
     bus: str
     can_id: CobId  # above 7FFh it is an extended one
-    format: Literal["witmotion-can"] = "witmotion-can"
+    format: str = USUAL["can_id"]
     attitude: Attitude = "auto"
 
 
-class InclinometerSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One two-axis inclinometer on a CANopen bus (CiA 410)."""
+class NodeImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One IMU that is a CANopen device."""
 
     bus: str
     node_id: NodeId
-    format: Literal["cia410"] = "cia410"
+    format: str = USUAL["node_id"]
     eds: str = "inclinometer.eds"  # the vendor's is better
-    directions: tuple[Sign, Sign] = (
-        1,
-        1,
-    )  # of its x and y axis; 1: positive when it points below the horizon
-    poll_hz: Annotated[float, msgspec.Meta(ge=0, le=200)] = 20.0  # slopes that no TPDO brings; 0: never
     sdo_timeout_s: Positive = 0.5
     heartbeat_timeout_s: Positive | None = None  # None: 2.5 times what the device says in 1017h
 
@@ -66,15 +74,29 @@ class InclinometerSettings(MountedSettings, frozen=True, forbid_unknown_fields=T
         return NodeTimes(sdo_timeout_s=self.sdo_timeout_s, heartbeat_timeout_s=self.heartbeat_timeout_s)
 
 
-_BY_FORMAT: dict[str, type[MountedSettings]] = {
-    "witmotion-can": CanImuSettings,
-    "cia410": InclinometerSettings,
-}
-_BY_KEY: dict[str, type[MountedSettings]] = {"can_id": CanImuSettings, "node_id": InclinometerSettings}
+class Wiring(NamedTuple):
+    """What IMUs that are wired alike have in common."""
+
+    formats: "Folder[Format] | Folder[CanFormat] | Folder[NodeFormat]"
+    settings: type[MountedSettings]
+
+
+SERIAL = Wiring(formats.FORMATS, ImuSettings)
+WIRINGS = (SERIAL, Wiring(can.FORMATS, CanImuSettings), Wiring(canopen.FORMATS, NodeImuSettings))
+
+
+def wiring_of(format_name: str) -> Wiring:
+    """How devices of that language are wired; a serial one where nobody speaks it."""
+    return next((wiring for wiring in WIRINGS if format_name in wiring.formats), SERIAL)
 
 
 def kind_of(table: Mapping[str, Any]) -> type[MountedSettings]:
-    """Which settings a table `[imu.NAME]` means: by its `format`, else by the key that only they have."""
-    if "format" in table:
-        return _BY_FORMAT.get(str(table["format"]), ImuSettings)
-    return next((kind for key, kind in _BY_KEY.items() if key in table), ImuSettings)
+    """Which settings a table `[imu.NAME]` means: by its `format`, else by the key that only they have.
+
+    A format's own settings are looked up, which imports it, only where the table says more than its wiring.
+    """
+    name = table.get("format") or next(usual for key, usual in USUAL.items() if key in (*table, "port"))
+    formats_there, settings = wiring_of(str(name))
+    if set(table) <= set(settings.__struct_fields__) or name not in formats_there:
+        return settings
+    return formats_there[name].settings

@@ -6,7 +6,7 @@ from pathlib import Path
 from drivers.component import Kind
 from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
-from drivers.imu.formats import Conventions
+from drivers.imu.format import Conventions
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import UNITS, TrunkMotion, channels
 from drivers.imu.plausibility import ImuCheck
@@ -49,6 +49,15 @@ class TrunkImu:
         stored = IDENTITY if settings.zero is None else zero.load((beside or Path()) / settings.zero)
         self._motion = TrunkMotion(name, settings, conventions, attitude, stored)
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
+
+    def start(self) -> None:
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        raise NotImplementedError
+
+    def quality(self, now_ns: int) -> Quality:
+        raise NotImplementedError
 
     def zero_now(self) -> Quaternion:
         """Count tilt from the present posture (not stored; `zero.text` makes the file).

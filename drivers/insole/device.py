@@ -7,9 +7,9 @@ from drivers.component import Kind
 from drivers.errors import SettingsError
 from drivers.freshness import Freshness, silence_text
 from drivers.insole import calibration as calibrations
-from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
-from drivers.insole.formats import CLOCKS, parser_maker
+from drivers.insole.format import layout_of
+from drivers.insole.formats import FORMATS
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import FEET, Foot, Layout
 from drivers.insole.load import Stance, load_of
@@ -49,13 +49,13 @@ class Insole:
         self.name = name
         self.settings = settings
         self.foot: Foot | None = settings.foot or _foot_in(name)
-        layout = layouts.load(settings.layout, beside)
+        layout = layout_of(settings.format, settings.layout, beside)
         self.layout = layout if self.foot is None else layout.for_foot(self.foot)
         if not layout.cells:
             raise SettingsError(
                 f"[insole.{name}]: layout {layout.name} has no `cells`: add their places and areas"
             )
-        self.line = line if line is not None else line_for(settings, beside)
+        self.line = line if line is not None else line_for(settings, layout)
         self.channels = _channels(name, len(layout.cells))
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         self.other: Insole | None = None  # the other foot's, where there is one
@@ -70,7 +70,8 @@ class Insole:
         self._fault: str | None = None  # what the device's own frames say is wrong
         self._foreign = 0  # frames of the other foot since the last of ours
         self._saturated = 0
-        self._clock = CLOCKS[settings.format].make()
+        self._clock_spec = FORMATS[settings.format].clock
+        self._clock = self._clock_spec.make()
 
     def start(self) -> None:
         self._freshness.reset()
@@ -124,7 +125,7 @@ class Insole:
         self.latest.clear()
         self._freshness.disconnected()
         self._fault, self._foreign = None, 0
-        self._clock = CLOCKS[self.settings.format].make()
+        self._clock = self._clock_spec.make()
         self.check.restart()
         self._feet_check.restart()
         self._swap_check.restart()
@@ -198,39 +199,15 @@ class Insole:
         }
 
 
-def line_for(settings: InsoleSettings, beside: Path | None = None) -> Line[InsoleFrame]:
+def line_for(settings: InsoleSettings, layout: Layout) -> Line[InsoleFrame]:
     """The line that `settings` describe.
 
     Raises:
         SettingsError: the format needs a description that the layout does not have.
 
     """
-    make_parser = parser_maker(settings.format, layouts.load(settings.layout, beside))
+    make_parser = FORMATS[settings.format].parser(layout)
     return Line(settings.port, settings.baudrate, settings.format, make_parser)
-
-
-def pair(insoles: list[Insole]) -> None:
-    """Let the two feet of one wearer know each other, so that each can say its share of the load."""
-    by_foot = {insole.foot: insole for insole in insoles}
-    if len(insoles) == 2 and {"left", "right"} == set(by_foot):
-        by_foot["left"].other, by_foot["right"].other = by_foot["right"], by_foot["left"]
-
-
-def insoles(settings: Mapping[str, InsoleSettings], beside: Path | None = None) -> list[Insole]:
-    """The insoles of a robot; those that name the same port share its line.
-
-    Raises:
-        SettingsError: a layout or calibration is wrong.
-
-    """
-    lines: dict[str, Line[InsoleFrame]] = {}
-    made = []
-    for name, one in settings.items():
-        if one.port not in lines:
-            lines[one.port] = line_for(one, beside)
-        made.append(Insole(name, one, lines[one.port], beside))
-    pair(made)
-    return made
 
 
 def _calibration(settings: InsoleSettings, layout: Layout, beside: Path | None) -> Cells | None:

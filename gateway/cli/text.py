@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from gateway.cli.plain import json_plain, plain
 from gateway.coding import text as digits
+from gateway.plain import json_plain, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.cost import BudgetInfo
 

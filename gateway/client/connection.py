@@ -10,7 +10,6 @@ from typing import Self
 
 import msgspec
 
-from gateway.cli.plain import plain
 from gateway.client.address import Address
 from gateway.client.errors import (
     CallTimeout,
@@ -21,6 +20,7 @@ from gateway.client.errors import (
     RemoteError,
     Unreachable,
 )
+from gateway.plain import plain
 from gateway.wire import framing
 
 OnNotification = Callable[[str, msgspec.Raw], None]

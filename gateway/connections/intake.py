@@ -47,6 +47,7 @@ SHORTEST = len(b'{"method":""}')  # of all that could be a request
 FOREIGN = "speaks another protocol: is it a browser, or another program?"
 # What a client of ours begins with, or a stop in an odd form: no method of HTTP, no TLS and no SSH.
 _BEGINNINGS = frozenset(b"{[ \t\"'")
+_NOTHING_YET = b"\r\n\0"  # of these UTF-16 and UTF-32 have the last before the first letter
 
 # Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
@@ -230,7 +231,7 @@ class Inlet:
             self._end(None, self._sorted(self._splitter.end()))
             return True
         if not self._began:
-            self._began = bool(begin := data.lstrip(b"\r\n"))
+            self._began = bool(begin := data.lstrip(_NOTHING_YET))
             if self._began and begin[0] not in _BEGINNINGS and begin[0] < 0x80:
                 self._end(FOREIGN, Heard())
                 return True

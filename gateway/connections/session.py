@@ -299,10 +299,12 @@ class Session:
     @_spends
     def _run_next(self) -> None:
         self._scheduled = False
-        if not self.closed and self._may_run:
-            self._run(*self._queue.popleft())
-        self._schedule()
-        self._finish_if_done()
+        try:
+            if not self.closed and self._may_run:
+                self._run(*self._queue.popleft())
+        finally:  # whatever became of that request, the next one has its turn
+            self._schedule()
+            self._finish_if_done()
 
     def _run(self, asked_ns: int, line: bytes | framing.BadLine) -> None:
         self.asked_ns = asked_ns
@@ -353,14 +355,22 @@ class Session:
         self._finish_if_done()
 
     def _answer(self, ids: list[framing.Id | float | UnsetType], method: str, answer: object) -> None:
-        if isinstance(answer, Exception) and not isinstance(answer, framing.RpcError):
-            log.error("%s from %s failed", method, self.peer, exc_info=answer)
-            answer = framing.internal_error(method, answer)
-        lines = framing.encode_answers([id_ for id_ in ids if id_ is not UNSET], answer)
+        asked = [id_ for id_ in ids if id_ is not UNSET]
+        try:
+            lines = framing.encode_answers(asked, self._told(method, answer))
+        except Exception as error:  # noqa: BLE001 - an answer of ours that is none: it is told, and logged
+            lines = framing.encode_answers(asked, self._told(method, error))
         if method == STOP:
             self._send_if_room(lines)
         elif lines:
             self.send(b"".join(lines))
+
+    def _told(self, method: str, answer: object) -> object:
+        """A failure of our own as the error that it is answered with; it is logged."""
+        if not isinstance(answer, Exception) or isinstance(answer, framing.RpcError):
+            return answer
+        log.error("%s from %s failed", method, self.peer, exc_info=answer)
+        return framing.internal_error(method, answer)
 
     def _finish_if_done(self) -> None:
         """A client that says nothing more gets its answers, then the end, streams or not."""

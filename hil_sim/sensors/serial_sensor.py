@@ -1,8 +1,8 @@
 """A sensor on a serial line: what it measures becomes its format's bytes, numbered and timed by itself."""
 
 import random
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Generic, NamedTuple, TypeVar
 
 from hil_sim.clock import SECOND_NS
@@ -24,11 +24,16 @@ class Tick(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SerialFormat(Generic[M]):
-    """A sensor's language, from its manual. `encode` cuts the tick to the size of its counters."""
+    """A sensor's language, from its manual. `encode` cuts the tick to the size of its counters.
+
+    `keys` are more lines of its table in the robot's file, `beside` the files that they name, with contents.
+    """
 
     encode: Callable[[M, Tick], bytes]
     baudrate: int
     banner: bytes = b""  # said once when it starts
+    keys: str = ""
+    beside: Mapping[str, str] = field(default_factory=dict)
 
 
 class SerialSensor(Generic[M]):

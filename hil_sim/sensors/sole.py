@@ -75,3 +75,12 @@ class Sole:
         if number == self._faults.stuck_cell:
             return _STUCK_PA
         return max(truth * (1.0 + _NOISE_SHARE * noise) + _NOISE_PA * noise + self._drifted, 0.0)
+
+
+def calibration_text(pascal_per_count: float) -> str:
+    """What `gwrms calibrate insole` would write for cells that are all alike."""
+    return f"""\
+# The simulated insole's converter: the same for every cell. A real one is measured: gwrms calibrate insole.
+[default]
+gain = {pascal_per_count}   # Pa a count
+"""

@@ -1,43 +1,42 @@
 """The sensors that a robot wears: two insoles and a trunk IMU, in the languages that were chosen."""
 
+import importlib
+import pkgutil
 import random
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from types import ModuleType
 
-import eds
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock
 from hil_sim.gait.wearer import Foot, Trunk
 from hil_sim.node.node import Node
-from hil_sim.sensors import cia410, insole_cobs, insole_csv, insole_frame
-from hil_sim.sensors.bno08x_rvc import BNO08X_RVC
-from hil_sim.sensors.cia410 import Inclinometer
+from hil_sim.sensors import imus, insoles
 from hil_sim.sensors.faults import ImuFaults, InsoleFaults, LineFaults
 from hil_sim.sensors.line import SerialLine
 from hil_sim.sensors.serial_sensor import M, SerialFormat, SerialSensor
 from hil_sim.sensors.sole import Cell, Pressures, Sole
-from hil_sim.sensors.trunk_imu import Motion, TrunkImu
-from hil_sim.sensors.vectornav import VECTORNAV, VECTORNAV_BINARY
-from hil_sim.sensors.witmotion import WITMOTION
-from hil_sim.sensors.witmotion_can import WitmotionCan
-from hil_sim.sensors.xsens import XSENS
+from hil_sim.sensors.trunk_imu import BusImu, Motion, TrunkImu, TrunkSensor
 
 FEET = ("left_insole", "right_insole")
 TRUNK = "trunk"
 PERIOD_NS = 10 * MILLISECOND_NS  # 100 Hz
 
-SERIAL_IMUS: dict[str, SerialFormat[Motion]] = {
-    "witmotion": WITMOTION,
-    "bno08x-rvc": BNO08X_RVC,
-    "xsens": XSENS,
-    "vectornav": VECTORNAV,
-    "vectornav-binary": VECTORNAV_BINARY,
+
+def _files(package: ModuleType) -> Iterator[tuple[str, ModuleType]]:
+    """The package's modules by the names of what they simulate."""
+    for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        yield found.name.rpartition(".")[2].replace("_", "-"), importlib.import_module(found.name)
+
+
+_IMUS: dict[str, SerialFormat[Motion] | BusImu] = {
+    name: one for _, file in _files(imus) for name, one in file.IMUS.items()
 }
-IMUS = (*SERIAL_IMUS, "witmotion-can", "cia410")
+SERIAL_IMUS = {name: one for name, one in _IMUS.items() if isinstance(one, SerialFormat)}
+BUS_IMUS = {name: one for name, one in _IMUS.items() if isinstance(one, BusImu)}
+IMUS = (*SERIAL_IMUS, *BUS_IMUS)
 INSOLES: dict[str, tuple[SerialFormat[Pressures], tuple[Cell, ...]]] = {
-    "insole-cobs": (insole_cobs.INSOLE_COBS, insole_cobs.CELLS),
-    "insole-csv": (insole_csv.INSOLE_CSV, insole_csv.CELLS),
-    "insole-frame": (insole_frame.INSOLE_FRAME, insole_frame.CELLS),
+    name: (file.INSOLE, file.CELLS) for name, file in _files(insoles)
 }
 
 
@@ -47,12 +46,6 @@ class SensorChoice:
 
     imu: str = "witmotion"
     insole: str = "insole-cobs"
-
-
-class TrunkSensor(Protocol):
-    """What tells the trunk's motion, over whatever line."""
-
-    def tell(self, measured: Motion, now_ns: int, /) -> None: ...
 
 
 class SensorSuite:
@@ -106,7 +99,4 @@ class SensorSuite:
     def _trunk_sensor(self, language: str, bus: CanBus, seed: int) -> TrunkSensor:
         if language in SERIAL_IMUS:
             return self._serial(SERIAL_IMUS[language], TRUNK, seed)
-        if language == "witmotion-can":
-            return WitmotionCan(bus, self.faults[TRUNK])
-        description = eds.load(eds.locate(cia410.EDS, None), cia410.NODE_ID)
-        return Inclinometer(self._clock, bus, TRUNK, description, self.faults[TRUNK])
+        return BUS_IMUS[language].make(self._clock, bus, TRUNK, self.faults[TRUNK])

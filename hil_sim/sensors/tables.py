@@ -1,96 +1,58 @@
 """The sensors' tables of the robot's file, and what must stand beside it, for every choice of sensors."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from hil_sim.sensors.cia410 import NODE_ID
-from hil_sim.sensors.insole_frame import PASCAL_PER_COUNT
-from hil_sim.sensors.suite import FEET, INSOLES, SERIAL_IMUS, TRUNK, SensorChoice
-from hil_sim.sensors.witmotion_can import CAN_ID
+from hil_sim.sensors.suite import BUS_IMUS, FEET, INSOLES, SERIAL_IMUS, TRUNK, SensorChoice
 
 _FIRST_INSOLE = """\
 [insole.{name}]
 port = "{folder}/{name}"   # a path that stays: for real ones /dev/serial/by-id/…
 baudrate = {baudrate}
 format = "{format}"          # how the insole talks
-{more}"""
+{keys}"""
 
 _INSOLE = """
 [insole.{name}]           # the same for the other foot: the layout is mirrored
 port = "{folder}/{name}"
 baudrate = {baudrate}
 format = "{format}"
-{more}"""
-
-_CALIBRATION = "insole-18.calibration.toml"
-_INSOLE_MORE = {
-    "insole-cobs": 'layout = "insole-16"            # where its cells are; or a .toml file of your own\n',
-    "insole-csv": 'layout = "insole-8"             # its cells, what its columns are, a calibration\n',
-    "insole-frame": (
-        'layout = "insole-18"            # its cells, and how its frame is laid out\n'
-        f'calibration = "{_CALIBRATION}"   # counts to pressure: gwrms calibrate insole writes one\n'
-    ),
-}
-
-_CALIBRATION_TEXT = f"""\
-# The simulated insole's converter: the same for every cell. A real one is measured: gwrms calibrate insole.
-[default]
-gain = {PASCAL_PER_COUNT}   # Pa a count
-"""
+{keys}"""
 
 _SERIAL_IMU = """
 [imu.{name}]
 port = "{folder}/{name}"
 baudrate = {baudrate}
 format = "{format}"
-{axes}"""
+{keys}"""
 
-_AXES = 'axes = ["x", "y", "z"]          # which sensor axes point forward, left and up along the trunk\n'
-_AXES_DOWN = (
-    'axes = ["x", "-y", "-z"]        # which sensor axes point forward, left and up along the trunk\n'
-)
-
-_CAN_IMU = f"""
-[imu.{{name}}]
+_BUS_IMU = """
+[imu.{name}]
 bus = "main"                    # the [can.…] table it is wired to
-format = "witmotion-can"
-can_id = 0x{CAN_ID:02X}                   # of its frames, as set in it
-{_AXES}"""
-
-_INCLINOMETER = f"""
-[imu.{{name}}]
-bus = "main"                    # the [can.…] table it is wired to
-format = "cia410"               # an inclinometer: tilt, and nothing else
-node_id = {NODE_ID}
-directions = [1, 1]             # of its x and y axis: 1 where positive means that it points below the horizon
-{_AXES}"""
-
-_BUS_IMUS = {"witmotion-can": _CAN_IMU, "cia410": _INCLINOMETER}
+{keys}"""
 
 
 def tables(choice: SensorChoice, folder: Path) -> str:
     """`[insole.…]` and `[imu.…]` for the simulator in `folder`."""
-    serial = INSOLES[choice.insole][0]
-    facts = {"folder": folder, "baudrate": serial.baudrate, "format": choice.insole}
-    feet = (
-        template.format(name=name, more=_INSOLE_MORE[choice.insole], **facts)
-        for template, name in zip((_FIRST_INSOLE, _INSOLE), FEET, strict=True)
-    )
+    language = INSOLES[choice.insole][0]
+    facts = {"folder": folder, "baudrate": language.baudrate, "format": choice.insole, "keys": language.keys}
+    templates = zip((_FIRST_INSOLE, _INSOLE), FEET, strict=True)
+    feet = (template.format(name=name, **facts) for template, name in templates)
     return "".join((*feet, _imu_table(choice.imu, folder)))
 
 
-def companions(choice: SensorChoice) -> dict[str, str]:
+def companions(choice: SensorChoice) -> Mapping[str, str]:
     """Names and contents of the files that the tables name."""
-    return {_CALIBRATION: _CALIBRATION_TEXT} if choice.insole == "insole-frame" else {}
+    return INSOLES[choice.insole][0].beside
 
 
 def _imu_table(language: str, folder: Path) -> str:
-    if language in _BUS_IMUS:
-        return _BUS_IMUS[language].format(name=TRUNK)
-    format_name, _, _ = language.partition("-binary")
+    if language in BUS_IMUS:
+        return _BUS_IMU.format(name=TRUNK, keys=BUS_IMUS[language].keys)
     return _SERIAL_IMU.format(
         name=TRUNK,
         folder=folder,
         baudrate=SERIAL_IMUS[language].baudrate,
-        format=format_name,
-        axes=_AXES_DOWN if format_name == "vectornav" else _AXES,
+        format=language.removesuffix("-binary"),
+        keys=SERIAL_IMUS[language].keys,
     )

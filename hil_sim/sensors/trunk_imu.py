@@ -2,17 +2,39 @@
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
+from hil_sim.bus.can_bus import CanBus
+from hil_sim.clock import Clock
 from hil_sim.gait.wearer import GRAVITY, Trunk
-from hil_sim.sensors.faults import ImuFaults
+from hil_sim.sensors.faults import ImuFaults, LineFaults
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
+# Of a sensor's table in the robot's file: how its axes lie on the trunk.
+AXES = 'axes = ["x", "y", "z"]          # which sensor axes point forward, left and up along the trunk\n'
+AXES_DOWN = 'axes = ["x", "-y", "-z"]        # which sensor axes point forward, left and up along the trunk\n'
+
 _TEMPERATURE_C = 31.5
 _NOISE_ACCELERATION = 0.02  # m/s²
 _NOISE_RATE = 0.002  # rad/s
+
+
+class TrunkSensor(Protocol):
+    """What tells the trunk's motion, over whatever line."""
+
+    def tell(self, measured: "Motion", now_ns: int, /) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class BusImu:
+    """An IMU on the CAN bus: how it is made, and its table in the robot's file behind header and `bus`."""
+
+    make: Callable[[Clock, CanBus, str, LineFaults], TrunkSensor]
+    keys: str
 
 
 @dataclass(frozen=True, slots=True)

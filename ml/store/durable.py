@@ -44,6 +44,15 @@ def synchronise(files: Iterable[Path]) -> None:
         list(pool.map(_sync_names, folders))
 
 
+def sync(path: Path) -> None:
+    """Make a file's contents, or the names in a folder, last; raises `OSError`."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def create(file: Path, data: bytes) -> bool:
     """Write a file that is not there yet, whole or not at all; False where it is. Either way it lasts."""
     private_folder(file.parent)
@@ -130,11 +139,5 @@ def _sync_names(folder: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except FileNotFoundError:  # it has gone since: what needs it no more was made to last before
-        return
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    with contextlib.suppress(FileNotFoundError):  # what needs it no more was made to last before it went
+        sync(path)

@@ -2,21 +2,19 @@
 
 import argparse
 import fnmatch
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 
 from gateway.cli.text import counted, say, say_json, size, warn
 from ml.store import sessions
-from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
-from ml.store.objects import Objects
+from ml.store.errors import StoreError
 from ml.store.sessions import Session
-from ml.store.store import ABOUT, Store, checked_url
+from ml.store.store import Store, checked_url
 from server_gui.cli.cloud_reach import add_url, parser, progress, reach, url
-from server_gui.core.cloud import parts, transfer, verify
+from server_gui.core.cloud import emptying, parts, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded
-from server_gui.core.recording.errors import Damaged, SpoolUnusable
-from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import ahead, lost_batches, send
+from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings.server_file import load
 
 UPLOAD_EPILOG = """Without --from: what waits in this computer's spool goes to the store now. A collector
@@ -73,41 +71,22 @@ def upload(argv: list[str]) -> int:
 def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     """Upload it here and now."""
     settings = load(arguments.config).store
+    if arguments.url is None:
+        there = functools.partial(Store, settings.url, settings.shards, settings.several_writers)
+    else:
+        there = functools.partial(Store, arguments.url)
     wanted = checked_url(arguments.url or settings.url)
-    if Objects(wanted).read(ABOUT) is None and verify.sent_to(wanted, folder):
-        raise StoreError(verify.no_store(wanted, folder))
-    store = (
-        Store(settings.url, settings.shards, settings.several_writers)
-        if arguments.url is None
-        else Store(arguments.url)
-    )
-    with Spool(folder) as spool:
-        for problem in ahead(spool, store):
-            warn("cloud", problem)
-        damaged = lost_batches(spool, store)
-        waiting = spool.waiting()
-        uploaded, waits = 0, []
-        with progress("batches", len(waiting)) as advance:
-            for number in waiting:
-                try:
-                    send(spool, number, store)
-                    uploaded += 1
-                except Damaged as error:
-                    damaged.append(str(error))
-                except (StoreUnreachable, StoreRefused):
-                    raise
-                except StoreError as error:  # as where a file of the table is gone that this one is in
-                    waits.append(f"batch {number} waits: {error}")
-                advance(1)
-    for problem in (*damaged, *waits):
+    done = emptying.empty(folder, wanted, there, functools.partial(progress, "batches"))
+    for problem in (*done.notes, *done.problems, *done.waits):
         warn("cloud", problem)
+    batches = counted(done.uploaded, "batch", "batches")
     _tell(
         arguments,
-        f"{counted(uploaded, 'batch', 'batches')} uploaded to {store.url}; {len(waits) or 'nothing'} waits",
-        uploaded=uploaded,
-        waiting=len(waits),
+        f"{batches} uploaded to {done.url}; {len(done.waits) or 'nothing'} waits",
+        uploaded=done.uploaded,
+        waiting=len(done.waits),
     )
-    return 1 if damaged or waits else 0
+    return 1 if done.problems or done.waits else 0
 
 
 def download(argv: list[str]) -> int:

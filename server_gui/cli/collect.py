@@ -12,8 +12,8 @@ from pathlib import Path
 
 import msgspec
 
-from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import NONE, age, say, size, table, warn
+from gateway.plain import json_plain, plain
 from ml.store.private import private_files
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.control_socket import ask, why_not_uploaded

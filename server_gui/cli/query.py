@@ -10,8 +10,8 @@ import msgspec
 import pyarrow as pa
 import pyarrow.csv
 
-from gateway.cli.plain import json_plain
 from gateway.cli.text import NONE, say, table, warn
+from gateway.plain import json_plain
 from ml.store.private import private_files
 from ml.store.query import Result, query
 from server_gui.cli.cloud_reach import add_url, parser, reach

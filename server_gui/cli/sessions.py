@@ -59,7 +59,13 @@ def ls(argv: list[str]) -> int:
     add_url(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
-    found = [session for session in known.sessions() if _wanted(session, arguments)]
+    every = known.sessions()
+    found = [session for session in every if _wanted(session, arguments)]
+    gone = known.gone()
+    if gone is not None:
+        warn("sessions", gone)
+    elif every and all(session.uploaded and not session.rows for session in every):
+        warn("sessions", "no session has telemetry: if some was uploaded, it has gone from the store")
     if known.unread is not None:
         warn("sessions", f"{known.unread}; sessions that it alone has are not listed")
     if arguments.json:
@@ -67,7 +73,7 @@ def ls(argv: list[str]) -> int:
     else:
         away = known.problem is not None
         say(table(HEADER, [_row(session, away=away) for session in found], right=(3, 4, 5)))
-    return 0 if known.problem is None and known.unread is None else 1
+    return 0 if known.problem is None and known.unread is None and gone is None else 1
 
 
 def _wanted(session: Session, arguments: argparse.Namespace) -> bool:

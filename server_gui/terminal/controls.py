@@ -1,36 +1,27 @@
 """What keys do: choose a parameter, raise or lower it, stop, quit. Draws nothing."""
 
-import concurrent.futures
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from collections.abc import Callable
 
 from gateway.wire.parameter import ParameterInfo
-from server_gui.core.follow.robot import Robot
+from server_gui.core.desk.station import Station
+from server_gui.core.processing.units import Units
+from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.keys import Key
 
 STEPS = 20  # from one end of a parameter's range to the other
 
 
-class Commands(Protocol):
-    """What can be asked of a robot; both return at once."""
-
-    def write(self, changes: Mapping[str, float]) -> "concurrent.futures.Future[None]": ...
-
-    def stop(self, reason: str) -> "concurrent.futures.Future[Any]": ...
-
-
 class Controls:
     """The selected parameter and what is under way. Belongs to the thread that draws."""
 
-    def __init__(self, robot: Robot, commands: Commands) -> None:
+    def __init__(self, station: Station) -> None:
         self.wants_to_quit = False
         self.stop_sent = False
         self.note = ""
-        self._robot = robot
-        self._commands = commands
+        self._station = station
         self._row = 0
-        self._write: concurrent.futures.Future[None] | None = None
         self._does: dict[Key, Callable[[], None]] = {
             Key.UP: lambda: self._move(-1),
             Key.DOWN: lambda: self._move(+1),
@@ -43,7 +34,7 @@ class Controls:
     @property
     def names(self) -> list[str]:
         """The parameters that can be chosen, in the robot's order."""
-        return list(self._robot.parameters)
+        return list(self._station.robot.parameters)
 
     @property
     def selected(self) -> str | None:
@@ -54,7 +45,7 @@ class Controls:
     @property
     def writing(self) -> bool:
         """Whether a write is under way."""
-        return self._write is not None and not self._write.done()
+        return self._station.writing.state is WriteState.WRITING
 
     def press(self, key: Key) -> None:
         """Do what a key stands for; what a STOP came to is shown until the next key."""
@@ -68,8 +59,8 @@ class Controls:
         name = self.selected
         if name is None or self.writing:
             return
-        value = self._robot.parameters[name].value
-        info = self._info(name)
+        value = self._station.robot.parameters[name].value
+        info = self._station.known.get(name)
         if value is None or info is None:
             self.note = f"{name} is not known now, so it is not changed"
             return
@@ -78,16 +69,12 @@ class Controls:
             self.note = f"{name} has no limits to move between; use gwrms set {name}=VALUE"
         elif target != value:
             self.note = f"writing {name} = {target:.10g} {info.unit}"
-            self._write = self._commands.write({name: target})
-
-    def _info(self, name: str) -> ParameterInfo | None:
-        description = self._robot.description
-        known = description.parameters if description is not None else []
-        return next((info for info in known if info.name == name), None)
+            unit = unit_of(name, info.unit, Units())
+            problem = refusal(target, value, info, unit)
+            self._station.write((Change(name, unit, value, target, elsewhere=False, problem=problem),))
 
     def _stop(self) -> None:
-        self._robot.last_stop = None
-        self._commands.stop("STOP key of the dashboard")
+        self._station.stop("STOP key of the dashboard")
 
     def _quit(self) -> None:
         self.wants_to_quit = True

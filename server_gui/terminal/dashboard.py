@@ -10,9 +10,7 @@ from rich.console import Console, RenderableType
 from rich.layout import Layout
 from rich.live import Live
 
-from server_gui.core.follow.robot import Robot
-from server_gui.core.processing.gait_measures import Gait
-from server_gui.core.processing.robot_processing import RobotProcessing
+from server_gui.core.desk.station import Station
 from server_gui.terminal import panels
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.keys import Keyboard
@@ -22,18 +20,19 @@ PICTURE_SIZE = (118, 27)
 WIDE_COLUMNS, WIDE_LINES = 110, 27
 
 
-def draw(robot: Robot, gait: Gait, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
+def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
     """One frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24."""
+    robot, gait = station.robot, station.processing.derived().gait
     columns, lines = size
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
     page = Layout()
     page.split_column(
         Layout(panels.header(robot, where, look), size=3 if look.roomy else 1),
-        Layout(panels.joints(robot, look), size=2 + 1 + max(6, len(robot.names("joint")))),
+        Layout(panels.joints(station, look), size=2 + 1 + max(6, len(robot.names("joint")))),
         Layout(name="lower"),
-        Layout(panels.footer(robot, controls, where), size=2),
+        Layout(panels.footer(station, controls, where), size=2),
     )
-    page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(robot, look), ratio=2))
+    page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(station, look), ratio=2))
     page["left"].split_column(
         Layout(panels.feet_and_trunk(robot, gait, look), size=6),
         Layout(panels.parameters(robot, controls, look)),
@@ -44,9 +43,8 @@ def draw(robot: Robot, gait: Gait, controls: Controls, where: str, size: tuple[i
 class Dashboard:
     """Shows a robot in the terminal until `tick` says that it is enough, or the user quits."""
 
-    def __init__(self, robot: Robot, processing: RobotProcessing, controls: Controls, where: str) -> None:
-        self._robot = robot
-        self._processing = processing
+    def __init__(self, station: Station, controls: Controls, where: str) -> None:
+        self._station = station
         self._controls = controls
         self._where = where
 
@@ -65,14 +63,14 @@ class Dashboard:
                     self._controls.press(key)
 
     def _frame(self, size: tuple[int, int]) -> RenderableType:
-        return draw(self._robot, self._processing.derived().gait, self._controls, self._where, size)
+        return draw(self._station, self._controls, self._where, size)
 
 
-def save_picture(path: Path, robot: Robot, gait: Gait, controls: Controls, where: str) -> None:
+def save_picture(path: Path, station: Station, controls: Controls, where: str) -> None:
     """The frame of this moment as an SVG file."""
     width, height = PICTURE_SIZE
     console = Console(record=True, width=width, height=height, file=io.StringIO(), force_terminal=True)
-    console.print(draw(robot, gait, controls, where, PICTURE_SIZE), height=height)
+    console.print(draw(station, controls, where, PICTURE_SIZE), height=height)
     svg = console.export_svg(title="gwrms demo")
     # rich names a font on somebody's server; a picture of ours asks nobody for anything.
     path.write_text(re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL), encoding="utf-8")

@@ -83,7 +83,7 @@ def _folder(wanted: Path | None) -> Iterator[Path]:
 
 
 def _view(session: Session, options: Options, where: str, check: Callable[[], None]) -> None:
-    controls = Controls(session.robot, session)
+    controls = Controls(session.station)
     if options.headless:
         _wait_whole(session, check)
         try:
@@ -98,13 +98,13 @@ def _view(session: Session, options: Options, where: str, check: Callable[[], No
         session.update()
         return ends is None or time.monotonic() < ends
 
-    Dashboard(session.robot, session.processing, controls, where).run(tick)
+    Dashboard(session.station, controls, where).run(tick)
     _picture(options.picture, session, controls, where)
 
 
 def _picture(path: Path | None, session: Session, controls: Controls, where: str) -> None:
     if path is not None:
-        save_picture(path, session.robot, session.processing.derived().gait, controls, where)
+        save_picture(path, session.station, controls, where)
 
 
 def _wait_whole(session: Session, check: Callable[[], None]) -> None:
@@ -115,15 +115,15 @@ def _wait_whole(session: Session, check: Callable[[], None]) -> None:
         if time.monotonic() > deadline:
             missing = ", ".join(
                 f"{part.name} {part.state} ({part.problem or 'no reason known'})"
-                for part in session.robot.not_ok()
+                for part in session.station.robot.not_ok()
             )
-            reason = missing or session.robot.link.problem or "no telemetry came"
+            reason = missing or session.station.robot.link.problem or "no telemetry came"
             raise DemoFailed(f"the robot is not whole after {WHOLE_S:g} s: {reason}")
         time.sleep(TICK_S)
 
 
 def _headless(session: Session, seconds: float | None, check: Callable[[], None]) -> None:
-    summary = session.begin_summary()
+    summary, robot, processing = session.begin_summary(), session.station.robot, session.station.processing
     began = time.monotonic()
     next_line = began + LINE_S
     try:
@@ -131,15 +131,12 @@ def _headless(session: Session, seconds: float | None, check: Callable[[], None]
             check()
             session.update()
             if time.monotonic() >= next_line:
-                headless.say(
-                    headless.line(session.robot, session.processing.derived().gait, next_line - began)
-                )
+                headless.say(headless.line(robot, processing.derived().gait, next_line - began))
                 next_line += LINE_S
             time.sleep(TICK_S)
     finally:
-        headless.say(
-            headless.table(summary, session.processing.derived().gait, session.robot)
-        )  # also of a run that was cut short
+        # Also of a run that was cut short.
+        headless.say(headless.table(summary, processing.derived().gait, robot))
     failures = summary.failures()
     if failures:
         raise DemoFailed(f"this was no walk: {'; '.join(failures)}")

@@ -3,8 +3,8 @@
 import math
 import sys
 
-from gateway.cli.plain import plain
 from gateway.client import ConnectionState
+from gateway.plain import plain
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait

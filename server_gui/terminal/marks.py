@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from gateway.cli.plain import plain
+from gateway.plain import plain
 
 LEFT = "#56b4e9"  # Okabe–Ito sky blue
 RIGHT = "#e69f00"  # Okabe–Ito orange

@@ -10,13 +10,15 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from gateway.cli.plain import plain
 from gateway.client import ConnectionState
-from gateway.wire.parameter import ParameterInfo, ParameterValue, Written
-from server_gui.core.follow.events import Failed
+from gateway.plain import plain
+from gateway.wire.parameter import ParameterInfo, ParameterValue
+from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
+from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.marks import (
     BAD,
@@ -40,7 +42,10 @@ JOINT_LOW_RAD, JOINT_HIGH_RAD = math.radians(-30), math.radians(75)
 SHOWN_PROCESSES = 8
 TILT_RAD = math.radians(15)
 SPARK_SPAN_RAD = math.radians(20)  # at least: a joint at rest is a flat line, not a magnified one
+PAST_ROWS = 240
 ROWS_A_BLOCK = 6
+STOP_STYLES = {StopState.SENT: WARN, StopState.CONFIRMED: GOOD, StopState.NOT_CONFIRMED: BAD}
+NOT_WRITTEN = (WriteState.FAILED, WriteState.NOT_STORED, WriteState.UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +96,9 @@ def _link(robot: Robot, look: Look) -> Text:
     return text
 
 
-def joints(robot: Robot, look: Look) -> RenderableType:
+def joints(station: Station, look: Look) -> RenderableType:
     """Every joint with its drive's state and its angle over the last seconds."""
+    robot = station.robot
     stale = robot.is_stale()
     grid = Table(box=None, expand=True, padding=(0, 1), header_style=DIM)
     for title in ("joint", "drive"):
@@ -104,7 +110,8 @@ def joints(robot: Robot, look: Look) -> RenderableType:
         channel = f"{name}.position"
         value = robot.values.get(channel)
         colour = OLD if stale or value is None else side_colour(name)
-        past = list(robot.history.get(channel, ()))[::ROWS_A_BLOCK]
+        past = [None if math.isnan(was) else float(was) for was in station.rings.values(channel, PAST_ROWS)]
+        past = past[::ROWS_A_BLOCK]
         grid.add_row(
             words(name.replace("_", " "), style=side_colour(name)),
             _drive(robot, name, stale),
@@ -211,8 +218,9 @@ def _range(held: ParameterValue, info: ParameterInfo | None, look: Look) -> Text
     return Text.assemble(f"{info.min:>6g} ", (where, DIM), f" {info.max:g}")
 
 
-def resources(robot: Robot, look: Look) -> RenderableType:
+def resources(station: Station, look: Look) -> RenderableType:
     """The robot's computer: CPU, memory, and who uses them most."""
+    robot, table = station.robot, station.processes
     seen = robot.resources
     if seen is None:
         return _panel(words("not known yet", style=OLD), "Computer", robot)
@@ -229,14 +237,14 @@ def resources(robot: Robot, look: Look) -> RenderableType:
     grid.add_row(
         words("this gateway", style=DIM), "", _percent(seen.gateway.cpu_percent), _mib(seen.gateway.rss_bytes)
     )
-    if isinstance(seen.processes, list):
-        for process in seen.processes[:SHOWN_PROCESSES]:
+    if table is not None and isinstance(table.processes, list):
+        for process in table.processes[:SHOWN_PROCESSES]:
             pid = words(str(process.pid) if look.roomy else "", style=DIM)
             grid.add_row(words(process.name), pid, _percent(process.cpu_percent), _mib(process.memory_bytes))
     return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
 
 
-def footer(robot: Robot, controls: Controls, where: str) -> RenderableType:
+def footer(station: Station, controls: Controls, where: str) -> RenderableType:
     """The keys, and the last thing that was said."""
     keys = Text.assemble(
         (" s ", "bold white on red"),
@@ -249,16 +257,19 @@ def footer(robot: Robot, controls: Controls, where: str) -> RenderableType:
         " quit",
     )
     keys.append("  software stop, not safety-rated", style=DIM)
-    news = _news(robot, controls, where)
+    news = _news(station, controls, where)
     for text in (keys, news):
         text.no_wrap, text.overflow = True, "ellipsis"
     return Group(keys, news)
 
 
-def _news(robot: Robot, controls: Controls, where: str) -> Text:
+def _news(station: Station, controls: Controls, where: str) -> Text:
     """The one thing that matters most now."""
+    robot, writing = station.robot, station.writing
     if controls.stop_sent:
-        return _stop(robot)
+        return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")
+    if writing.state in NOT_WRITTEN:
+        return words(f"✕ {writing.state.value}: {writing.text}", style=BAD)
     if robot.last_failure is not None:
         return words(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
     if robot.link.problem is not None:
@@ -271,31 +282,10 @@ def _news(robot: Robot, controls: Controls, where: str) -> Text:
         )
     if controls.writing:
         return words(controls.note, style=DIM)
-    if robot.last_change is not None:
-        return _written(robot.last_change.written)
+    if writing.state is WriteState.DONE:
+        return words(f"✓ {writing.text}", style=GOOD)
     hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
     return words(controls.note or hint, style=DIM)
-
-
-def _written(written: Written) -> Text:
-    changes = (
-        f"{name} {written.before.get(name, math.nan):.10g} → {after:.10g}"
-        for name, after in written.after.items()
-    )
-    return words(f"✓ {', '.join(changes)}, read back", style=GOOD)
-
-
-def _stop(robot: Robot) -> Text:
-    answer = robot.last_stop
-    if answer is None:
-        return words("STOP sent …", style=f"bold {WARN}")
-    if isinstance(answer, Failed):
-        return words(f"STOP NOT CONFIRMED: {answer.reason}", style=f"bold {BAD}")
-    drives = answer.stopped.drives
-    missing = [f"{name} {outcome}" for name, outcome in drives.items() if outcome != "confirmed"]
-    if missing or not drives:
-        return words(f"STOP NOT CONFIRMED: {', '.join(missing) or 'no drives'}", style=f"bold {BAD}")
-    return words(f"STOP confirmed by all {len(drives)} drives", style=f"bold {GOOD}")
 
 
 def _panel(content: RenderableType, title: str, robot: Robot, note: str = "") -> Panel:

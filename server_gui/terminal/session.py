@@ -1,40 +1,57 @@
-"""One robot followed for a view: its feed in the network's thread, its state in ours."""
+"""One robot at the desk, for a terminal: its station, fed and answered by the network's thread."""
 
+import collections
 import concurrent.futures
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Self
 
 from gateway.client import Address
-from server_gui.core.follow.events import Failed, Looked, StopAnswered, Telemetry
+from gateway.wire.resource import ResourceSnapshotParams
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.events import Event, Looked, Telemetry
 from server_gui.core.follow.feed import Feed, Following
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
-from server_gui.core.follow.robot import Robot
-from server_gui.core.processing.robot_processing import RobotProcessing
+from server_gui.core.follow.news import News
+from server_gui.core.tuning.link import Link
+from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.summary import Summary
 
+CLIENT = "gwrms view"
 FOLLOWING = Following(
-    "gwrms view",
-    channels=("*.position", "*.state", "*.force", "*.tilt_forward", "*.tilt_side"),
+    CLIENT,
+    channels=("*.position", "*.state", "*.error_code", "*.force", "*.tilt_forward", "*.tilt_side"),
     parameters=("gait.*",),
+    resources=ResourceSnapshotParams(processes=False),
 )
+PROCESSES = ResourceSnapshotParams(limit=8)
 
 
 class Session:
-    """Use it as a context manager; call `update` often, then read `robot` and `processing`."""
+    """Use it as a context manager; call `update` often, then read `station`."""
 
     def __init__(self, address: Address) -> None:
-        self.robot = Robot()
-        self.processing = RobotProcessing()
         self.summary: Summary | None = None
         self._mailbox = Mailbox()
+        self._posted: collections.deque[Callable[[], None]] = collections.deque()
         self._network = Network()
-        self._feed = Feed(address, self._mailbox.put, FOLLOWING)
-        self._following: concurrent.futures.Future[None] | None = None
+        self._link = Link(
+            self._network,
+            address,
+            self._mailbox.put,
+            lambda: self._posted.append(self.station.lost_control),
+            CLIENT,
+            PROCESSES,
+        )
+        self.station = Station(str(address), str(address), self._link, self._posted.append, News())
+        self._feed = Feed(address, [self._mailbox.put], FOLLOWING)
+        self._running: list[concurrent.futures.Future[None]] = []
+        self._given_back = 0  # the revision of what was written when the lease was given back
 
     def __enter__(self) -> Self:
         self._network.__enter__()
-        self._following = self._network.run(self._feed.run())
+        self.station.show_processes(wanted=True)
+        self._running = [self._network.run(part.run()) for part in (self._feed, self._link)]
         return self
 
     def __exit__(self, *exc: object) -> None:
@@ -42,34 +59,40 @@ class Session:
 
     def update(self) -> None:
         """Take what has come since the last time."""
-        if self._following is not None and self._following.done():
-            self._following.result()  # it ends only by a mistake of ours, which must not stay unseen
-        for event in self._mailbox.drain():
-            self.robot.apply(event)
-            self.processing.apply(event)
-            if self.summary is None:
-                continue
-            if isinstance(event, Telemetry):
-                self.summary.take(event.batch)
-            elif isinstance(event, Looked):
-                for part in self.robot.parts.values():
-                    self.summary.see(part.name, part.state)
+        for running in self._running:
+            if running.done():
+                running.result()  # it ends only by a mistake of ours, which must not stay unseen
+        for _ in range(len(self._posted)):
+            self._posted.popleft()()
+        events = self._mailbox.drain()
+        self.station.take(events)
+        if self.summary is not None:
+            self._add_up(self.summary, events)
+        self._give_back_control()
 
     def is_whole(self) -> bool:
         """Whether every component of the robot is there and its values are live."""
-        return bool(self.robot.parts) and not self.robot.not_ok() and not self.robot.is_stale()
+        robot = self.station.robot
+        return bool(robot.parts) and not robot.not_ok() and not robot.is_stale()
 
     def begin_summary(self) -> Summary:
         """Add up what comes from now on."""
-        self.summary = Summary.of(self.robot.names("joint"), self.robot.names("insole"))
+        robot = self.station.robot
+        self.summary = Summary.of(robot.names("joint"), robot.names("insole"))
         return self.summary
 
-    # --- what keys can ask for
+    def _add_up(self, summary: Summary, events: list[Event]) -> None:
+        for event in events:
+            if isinstance(event, Telemetry):
+                summary.take(event.batch)
+            elif isinstance(event, Looked):
+                for part in self.station.robot.parts.values():
+                    summary.see(part.name, part.state)
 
-    def write(self, changes: Mapping[str, float]) -> "concurrent.futures.Future[None]":
-        """Change parameters; the outcome comes as an event."""
-        return self._network.run(self._feed.write(changes))
-
-    def stop(self, reason: str) -> "concurrent.futures.Future[StopAnswered | Failed]":
-        """Quick stop on every drive; the outcome comes as an event."""
-        return self._network.run(self._feed.stop(reason))
+    def _give_back_control(self) -> None:
+        """The lease is held only while something is written."""
+        control, writing = self.station.control, self.station.writing
+        wanted = control.until_ns is not None and writing.state is not WriteState.WRITING
+        if wanted and writing.revision != self._given_back:
+            self._given_back = writing.revision
+            self.station.release_control()

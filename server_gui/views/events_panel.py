@@ -6,7 +6,7 @@ from typing import Any, Final
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
-from gateway.cli.plain import plain
+from gateway.plain import plain
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.news import Item
 from server_gui.views.joint_table import GLYPHS

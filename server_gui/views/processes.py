@@ -5,7 +5,7 @@ from typing import Any, Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
-from gateway.cli.plain import plain
+from gateway.plain import plain
 from gateway.wire.resource import ProcessUse
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable

@@ -158,6 +158,11 @@ class Robot:
     def rss_mb(self) -> float:
         return Cost.of(self.pid).memory_kb["rss"] / 1024
 
+    @property
+    def cpu_s(self) -> float:
+        """What the gateway has worked since it began."""
+        return Cost.of(self.pid).cpu_ms / 1e3
+
     def forget_peak(self) -> None:
         """From now on, `peak_mb` is of what comes."""
         Path(f"/proc/{self.pid}/clear_refs").write_text("5", encoding="ascii")

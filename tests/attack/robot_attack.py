@@ -40,6 +40,7 @@ COLUMNS = (
     "guard",
     "beat",
     "lost",
+    "CPU %",
     "MB before",
     "peak",
     "after",
@@ -64,6 +65,7 @@ class Phase:
     guard_missed: int = 0
     gap_ms: float = 0.0
     stall_ms: float = 0.0  # of the machine
+    cpu: float = 0.0  # of the gateway: 1 is a whole core
     streams: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -94,10 +96,12 @@ class Stopping:
         phase, until = Phase(), time.monotonic() + seconds
         self._victim.streams.report()
         self._victim.bus.take_gap_ms()
+        began, used_s = time.monotonic(), self._victim.cpu_s
         while time.monotonic() < until:
             self._number += 1
             self._one(phase)
             time.sleep(0.02 + self._number % 7 * 0.005)  # at no fixed phase of the telemetry
+        phase.cpu = (self._victim.cpu_s - used_s) / (time.monotonic() - began)
         phase.gap_ms = self._victim.bus.take_gap_ms()
         phase.streams = self._victim.streams.report()
         return phase
@@ -278,6 +282,7 @@ def _judged(
         f"{worst_ms:.1f}" + f" −{attacked.guard_missed}" * bool(attacked.guard_missed),
         f"{attacked.gap_ms:.0f}",
         f"{attacked.lost}",
+        f"{100 * quiet.cpu:.0f}/{100 * attacked.cpu:.0f}",
         *(f"{one:.1f}" for one in memory),
     )
     figures = {

@@ -170,6 +170,15 @@ def test_each_limit_is_judged() -> None:
         assert list(robot_attack._broken(0.0, dataclasses.replace(well, **change), memory)) == [limit]
 
 
+def test_a_row_says_what_the_gateway_takes_of_a_core_without_and_under_the_attack(victim: Robot) -> None:
+    measured = stopped(victim)
+    assert measured.cpu > 0.0
+    quiet, attacked = (dataclasses.replace(measured, cpu=share) for share in (0.171, 0.428))
+    row = robot_attack._judged("x", quiet, attacked, (40.0, 40.0, 40.0), Said(""))
+    assert dict(zip(row.columns, row.cells, strict=True))["CPU %"] == "17/43"
+    assert (row.figures["quiet"]["cpu"], row.figures["attacked"]["cpu"]) == (0.171, 0.428)
+
+
 def test_hostile_frames_are_such_as_a_bus_carries() -> None:
     for name, frames in on_bus.HOSTILE.items():
         found = list(itertools.islice(frames(random.Random(1)), 200))

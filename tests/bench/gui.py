@@ -31,7 +31,8 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
-from tests.gui.fakes import Bench, described, looked, resources, walking
+from tests.gui.fakes import Bench
+from tests.support.desk import described, looked, resources, walking
 
 Floats = npt.NDArray[np.float64]
 FRAMES, WARM_UP = 45, 8

@@ -16,16 +16,17 @@ from importlib import import_module, util
 from pathlib import Path
 from typing import Any
 
-from drivers.imu.bno08x_rvc import Bno08xRvcParser
 from drivers.imu.device import Imu
+from drivers.imu.formats.bno08x_rvc import Bno08xRvcParser
+from drivers.imu.formats.vectornav import VectornavParser
+from drivers.imu.formats.witmotion import WitmotionParser
+from drivers.imu.formats.xsens import XsensParser
 from drivers.imu.settings import ImuSettings
-from drivers.imu.vectornav import VectornavParser
-from drivers.imu.witmotion import WitmotionParser
-from drivers.imu.xsens import XsensParser
 from drivers.insole import layout as layouts
-from drivers.insole.cobs import InsoleCobsParser
-from drivers.insole.device import Insole, pair
-from drivers.insole.formats import parser_maker
+from drivers.insole.build import pair
+from drivers.insole.device import Insole
+from drivers.insole.formats import FORMATS
+from drivers.insole.formats.insole_cobs import InsoleCobsParser
 from drivers.insole.layout import FEET
 from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
@@ -82,7 +83,7 @@ def _streams() -> dict[str, tuple[bytes, Read | None, Read | None, Read | None]]
     euler = [
         imu.mtdata2({0x1020: struct.pack(">H", n), 0x2030: struct.pack(">3f", 1, 2, 3)}) for n in numbers
     ]
-    eighteen = parser_maker("insole-frame", layouts.load("insole-18"))
+    eighteen = FORMATS["insole-frame"].parser(layouts.load("insole-18"))
     csv = b"seq,ch0,ch1,ch2,ch3\n" + b"".join(b"%d,10,20,30,40\n" % n for n in numbers)
     return {
         "insole-cobs": (
@@ -97,7 +98,7 @@ def _streams() -> dict[str, tuple[bytes, Read | None, Read | None, Read | None]]
             _eighteen_by_hand,
             None,
         ),
-        "insole-csv": (csv, _ours(parser_maker("insole-csv", None)), _csv_by_hand, None),
+        "insole-csv": (csv, _ours(FORMATS["insole-csv"].parser(None)), _csv_by_hand, None),
         "witmotion": (
             b"".join(imu.witmotion(0x51, n % 99, 2, 3, 4) for n in numbers),
             _ours(WitmotionParser),

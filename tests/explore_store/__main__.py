@@ -2,21 +2,17 @@
 
 import argparse
 import logging
-import os
 import subprocess
 import sys
+from collections.abc import Mapping
 
-DEFAULT_S = 60.0
+from tests.explore.command import DEFAULT_S, Mistake, parser, put_back_if, run
 
 
 def main() -> int:
     options = _options()
     logging.disable(logging.CRITICAL)
-    if options.with_defect is not None:
-        from tests.explore.mutating import put_back
-        from tests.explore_store.defects import DEFECTS
-
-        put_back(DEFECTS[options.with_defect].parts)
+    put_back_if(options.with_defect, _defects)
     # Only now: with the first import of anything of the path it is too late for a defect.
     if options.defects is not None:
         from tests.explore_store.defects import judge
@@ -33,19 +29,21 @@ def main() -> int:
     return _search(options.seconds, options.seed, options.words, options.saying)
 
 
+def _defects() -> Mapping[str, Mistake]:
+    from tests.explore_store.defects import DEFECTS
+
+    return DEFECTS
+
+
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="./dev explore store", description=__doc__)
-    add = parser.add_argument
+    made = parser("./dev explore store", __doc__)
+    add = made.add_argument
     add("--seconds", type=float, default=DEFAULT_S, help="how long")
     add("--seed", type=int, default=1, help="another one plays something else")
     add("--workers", type=int, default=1, help="so many side by side, each with a seed of its own")
     add("--words", nargs="+", default=[], metavar="WORD", help="only these steps")
-    add("--saying", default="", metavar="PATTERN", help="only violations that say this count")
-    add("--replay", metavar="STEPS", help="play these again, as a violation printed them")
     add("--test", metavar="TEST", help="run this test below tests/unit, with a defect put back")
-    add("--with-defect", metavar="DEFECT", help="put this defect back before")
-    add("--defects", nargs="*", metavar="DEFECT", help="look for each of these, or of all, put back")
-    return parser.parse_args()
+    return made.parse_args()
 
 
 def _search(seconds: float, seed: int, words: list[str], saying: str) -> int:
@@ -110,7 +108,4 @@ def _side_by_side(options: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
-    if os.environ.get("PYTHONHASHSEED") != "0":  # what a set is iterated in belongs to the play
-        os.environ["PYTHONHASHSEED"] = "0"
-        os.execv(sys.executable, [sys.executable, "-m", "tests.explore_store", *sys.argv[1:]])
-    sys.exit(main())
+    run("tests.explore_store", main)

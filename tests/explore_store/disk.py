@@ -19,7 +19,7 @@ from typing import Any, Final
 
 SECTOR: Final = 512
 WRITING: Final = ("INSERT", "UPDATE", "DELETE", "CREATE", "ALTER")
-UNKEPT: Final = "-shm"  # SQLite makes it anew
+INDEX: Final = "-shm"  # of a log: SQLite writes into it what it has synchronised, and never synchronises it
 
 
 class Ended(BaseException):
@@ -173,8 +173,7 @@ class Disk:
 
     def _there(self) -> Iterator[tuple[str, Path]]:
         for path in sorted(self.root.rglob("*")):
-            if not path.name.endswith(UNKEPT):
-                yield self._name(path), path
+            yield self._name(path), path
 
     def _kept(self) -> Left:
         """All of it: a kill loses nothing that was written."""
@@ -208,7 +207,8 @@ class Disk:
             above = name.rpartition("/")[0]
             node = self._named(name, now.nodes.get(name), self._names.get(name), has_come, kept)
             if node is not None and (not above or above in left.folders):
-                left.files[name] = _mixed(node.synced, contents.get(node, node.synced), chance)
+                new = node.synced if name.endswith(INDEX) else contents.get(node, node.synced)
+                left.files[name] = _mixed(node.synced, new, chance)
         return left
 
     @staticmethod
@@ -290,7 +290,7 @@ class Watched(sqlite3.Connection):
     def _lasts(self) -> None:
         """SQLite has synchronised its log, the first time with the folder."""
         self.disk.point()
-        for path in (self._log, self.file):
+        for path in (self._log, self.file, self.file.with_name(f"{self.file.name}{INDEX}")):
             if path.exists():
                 self.disk.synced(path)
         if not self._named:

@@ -1,11 +1,15 @@
 """Inputs made of a corpus, always the same ones: what is tried where nothing guides the search."""
 
 import random
+import re
 from collections.abc import Callable, Iterator, Sequence
 
 MOST_EDITS = 4
 LONGEST = 4096
 INTERESTING = (0, 1, 0x7F, 0x80, 0xFE, 0xFF)
+WIDTHS = (8, 16, 31, 32, 63, 64)  # of whole numbers, in bits
+BOUNDS = (b"-1", *(b"%d" % (2**bits + more) for bits in WIDTHS for more in (-1, 0)))
+_NUMBER = re.compile(rb"-?\d+")
 
 Edit = Callable[[random.Random, bytes], bytes]
 
@@ -23,12 +27,31 @@ def mutations(corpus: Sequence[bytes], tokens: Sequence[bytes], seed: int) -> It
         other = choice.choice(known)
         return data[: choice.randint(0, len(data))] + other[choice.randint(0, len(other)) :]
 
-    edits: tuple[Edit, ...] = (_flip, _set, _cut, _repeat, _insert, insert_token, insert_token, cross)
+    edits: tuple[Edit, ...] = (
+        _flip,
+        _set,
+        _cut,
+        _repeat,
+        _insert,
+        at_bound,
+        insert_token,
+        insert_token,
+        cross,
+    )
     while True:
         data = choice.choice(known)
         for _ in range(choice.randint(1, MOST_EDITS)):
             data = choice.choice(edits)(choice, data)
         yield data[:LONGEST]
+
+
+def at_bound(choice: random.Random, data: bytes) -> bytes:
+    """One of the numbers that stand in it as digits becomes the last that a width holds, or the next one."""
+    numbers = list(_NUMBER.finditer(data))
+    if not numbers:
+        return data
+    one = choice.choice(numbers)
+    return data[: one.start()] + choice.choice(BOUNDS) + data[one.end() :]
 
 
 def _flip(choice: random.Random, data: bytes) -> bytes:

@@ -1,6 +1,7 @@
 """Every target over its corpus, and over inputs made of it: few, and always the same ones."""
 
 import itertools
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz.catalogue import HERE, NAMES, corpus, target
-from tests.fuzz.mutations import mutations
+from tests.fuzz.mutations import BOUNDS, at_bound, mutations
 from tests.fuzz.running import ROOT
 from tests.fuzz.seeding import DEFECTS
 
@@ -40,6 +41,14 @@ def test_the_corpora_are_small() -> None:
 def test_equal_seeds_make_equal_inputs() -> None:
     made = [list(itertools.islice(mutations([b"abc", b"de"], [b"xyz"], seed=3), 50)) for _ in range(2)]
     assert made[0] == made[1]
+
+
+def test_a_number_becomes_each_bound_in_the_place_where_it_stands() -> None:
+    choice = random.Random(1)
+    made = {at_bound(choice, b'object = "x:7"') for _ in range(1000)}
+    assert made == {b'object = "x:%s"' % bound for bound in BOUNDS}
+    assert {b"-1", b"255", b"256", b"65535", b"65536", b"%d" % (2**31), b"%d" % (2**63)} <= set(BOUNDS)
+    assert at_bound(choice, b"no number") == b"no number"
 
 
 @pytest.mark.parametrize("name", DEFECTS)

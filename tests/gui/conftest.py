@@ -15,7 +15,8 @@ from PySide6.QtWidgets import QApplication
 from server_gui.core.desk.desk import Desk
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, described, destroy
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import described
 
 
 def _quiet(kind: QtMsgType, _context: object, text: str) -> None:

@@ -38,11 +38,12 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, destroy, walking
+from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
 from tests.gui.journals import RobotsJournal
 from tests.gui.running import wait
 from tests.gui.test_recording import FakeKeeper, report
+from tests.support.desk import walking
 
 SECONDS = 12
 RATE_HZ = 50

@@ -26,8 +26,9 @@ from server_gui.views.acts_model import (
 )
 from server_gui.views.audit import Audit
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, described, destroy
+from tests.gui.fakes import Bench, destroy
 from tests.gui.journals import RobotsJournal
+from tests.support.desk import described
 
 STEP, ANGLE = "gait.step_length", "gait.trunk_angle"
 

@@ -20,8 +20,9 @@ from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.views.main_window import MainWindow
 from server_gui.views.widgets.files import ask_open, ask_save
 from tests.fake_robot import FakeRobot
-from tests.gui.fakes import HELD, Bench, described, looked, telemetry, walking
+from tests.gui.fakes import Bench
 from tests.gui.running import running, wait
+from tests.support.desk import HELD, described, looked, telemetry, walking
 
 HOUR_S = 3600.0
 

@@ -18,7 +18,8 @@ from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.store_page import SETTLE_MS
 from server_gui.views.parameters.tree import DEFAULT, FILE, NAME, NEW, STORED, TITLES
 from server_gui.views.theme import Theme
-from tests.gui.fakes import HELD, Bench, described, destroy, looked, walking
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import HELD, described, looked, walking
 
 FILE_TEXT = """
 [robot]

@@ -18,9 +18,10 @@ from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.foreseen import lines, model_phases, status
 from server_gui.views.main_window import MainWindow
-from tests.gui.fakes import Bench, looked, walking
+from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
+from tests.support.desk import looked, walking
 
 HOUR_S = 3600.0
 WALKS = {"walk": 0.94, "turn": 0.04, "stand": 0.02}

@@ -11,8 +11,9 @@ from gateway.wire.component import QualityInfo, Snapshot
 from server_gui.core.audit.acts import OPEN, Act, acts
 from server_gui.core.audit.journal import KEPT, Audit
 from server_gui.core.follow.events import Journalled, LinkChanged, Looked
-from tests.gui.fakes import HELD, Bench, described, looked, telemetry
+from tests.gui.fakes import Bench
 from tests.gui.journals import RobotsJournal
+from tests.support.desk import HELD, described, looked, telemetry
 
 STEP = "gait.step_length"
 

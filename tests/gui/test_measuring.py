@@ -17,7 +17,8 @@ from server_gui.views.measuring import TITLES, Measuring
 from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Plot
-from tests.gui.fakes import Bench, destroy, telemetry
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import telemetry
 
 RATE_HZ = 100
 START_NS = 1_000_000_000_000

@@ -18,7 +18,8 @@ from gateway.wire.resource import ProcessUse
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged, Telemetry
 from server_gui.views.main_window import MainWindow
-from tests.gui.fakes import Bench, described, looked, resources, walking
+from tests.gui.fakes import Bench
+from tests.support.desk import described, looked, resources, walking
 
 USUAL_HZ = 4
 RATE_HZ = int(os.environ.get("GWRMS_MEMORY_HZ", USUAL_HZ))

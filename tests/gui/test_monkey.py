@@ -25,8 +25,9 @@ from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
-from tests.gui.fakes import HELD, JOINTS, Bench, FakeCommands, described, looked, resources, walking
+from tests.gui.fakes import Bench
 from tests.gui.monkey import Monkey
+from tests.support.desk import HELD, JOINTS, FakeCommands, described, looked, resources, walking
 
 USUAL_S = 12.0
 SECONDS = float(os.environ.get("GWRMS_MONKEY_S", USUAL_S))

@@ -18,7 +18,8 @@ from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
-from tests.gui.fakes import Bench, described, destroy, looked, telemetry, walking
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import described, looked, telemetry, walking
 
 
 @pytest.fixture

@@ -17,7 +17,8 @@ from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from server_gui.views.theme import Theme
-from tests.gui.fakes import HELD, Bench, described, destroy, looked
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import HELD, described, looked
 
 
 @pytest.fixture

@@ -16,7 +16,8 @@ from server_gui.views.computer import held_back
 from server_gui.views.processes import CPU, MEMORY, NAME
 from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy, resources
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import resources
 
 MIB = 1 << 20
 

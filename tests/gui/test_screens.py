@@ -15,7 +15,7 @@ from PySide6.QtGui import QImage
 from gateway.wire.resource import ProcessUse
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, looked, resources, stop_is_whole, walking
+from tests.gui.fakes import Bench, stop_is_whole
 from tests.gui.foreseen import predicted
 from tests.gui.test_archive import (  # noqa: F401  # fixtures
     Shown,
@@ -27,6 +27,7 @@ from tests.gui.test_archive import (  # noqa: F401  # fixtures
     whole,
     window,
 )
+from tests.support.desk import looked, resources, walking
 
 FOLDER = Path(__file__).parents[2] / "build" / "screenshots"
 SMALL, LARGE = ("1366x768", 1366, 768), ("4k", 3840, 2160)

@@ -9,7 +9,8 @@ import pytest
 from server_gui.core.processing.units import Units
 from server_gui.views.signals import MOST_CURVES, Signals
 from server_gui.views.theme import Theme
-from tests.gui.fakes import JOINTS, Bench, destroy, telemetry, walking
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import JOINTS, telemetry, walking
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Theme
-from tests.gui.fakes import JOINTS, Bench, described, destroy
+from tests.gui.fakes import Bench, destroy
+from tests.support.desk import JOINTS, described
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 

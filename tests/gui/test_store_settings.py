@@ -57,7 +57,7 @@ def test_only_what_was_edited_is_written_and_every_comment_stays(form: SettingsF
     form.save.click()
     assert form.said.text().startswith(f"Saved in {file}; in force when")
     wanted = FILE.replace('"s3://lab/old"', '"s3://lab/new"')
-    assert file.read_text() == wanted.replace("[recorder]\n", "[recorder]\nbatch_s = 30.0\n")
+    assert file.read_text() == wanted.replace("upload = 'idle'\n", "upload = 'idle'\nbatch_s = 30.0\n")
     assert file.stat().st_mode & 0o777 == 0o600
     assert not form.save.isEnabled()
     assert [path.name for path in file.parent.iterdir()] == ["server.toml"]
@@ -100,12 +100,20 @@ def test_a_file_that_is_not_there_is_made(tmp_path: Path) -> None:
         '[store]\nurl = """s3://\\\nlab/old"""\n',
     ],
 )
-def test_a_file_that_is_written_otherwise_is_left_alone_and_it_says_what_to_do(
+def test_a_value_is_changed_however_it_is_written(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "server.toml"
+    file.write_text(f"# ours\n{text}")
+    change(file, {("store", "url"): "s3://lab/new"})
+    assert load(file).store.url == "s3://lab/new"
+    assert file.read_text().startswith("# ours\n")
+
+
+@pytest.mark.parametrize("text", ["store = 3\n", "[[store]]\n", "[store\n"])
+def test_a_file_that_cannot_be_changed_is_left_alone_and_it_says_what_to_do(
     tmp_path: Path, text: str
 ) -> None:
     file = tmp_path / "server.toml"
     file.write_text(text)
-    assert load(file).store.url == "s3://lab/old"
     with pytest.raises(SettingsError, match=r"change \[store\] url in it"):
         change(file, {("store", "url"): "s3://lab/new"})
     assert file.read_text() == text

@@ -14,7 +14,8 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, described, destroy, looked, stop_is_whole, walking
+from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.support.desk import described, looked, walking
 
 TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
 

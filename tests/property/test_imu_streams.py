@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.imu.witmotion import WitmotionParser
+from drivers.imu.formats.witmotion import WitmotionParser
 from tests.unit.imu.encode import witmotion
 
 word = st.integers(-32768, 32767)

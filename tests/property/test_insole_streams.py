@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.insole.cobs import InsoleCobsParser
+from drivers.insole.formats.insole_cobs import InsoleCobsParser
 from tests.unit.insole.encode import CALIBRATED, RIGHT, cobs_frame
 from tests.unit.port.streams import parse
 

@@ -4,21 +4,21 @@ import gc
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import Any, TypeVar
 
 import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.opening import needs_python_can
+from drivers.bus.settings import DeviceSettings
 from drivers.component import Component, Kind
 from drivers.errors import DriverError
 from drivers.imu.build import build_imu
-from drivers.imu.inclinometer import Inclinometer
-from drivers.imu.settings import MountedSettings
-from drivers.insole.device import Insole, line_for, pair
-from drivers.insole.settings import InsoleSettings
+from drivers.insole.build import build_insole, join_insoles
 from drivers.joint.drive import JointDrive
+from drivers.joint.settings import JointSettings
+from drivers.site import Site
 from gateway.config import RobotConfig
 from gateway.process.lean import standing_in, without
 
@@ -35,6 +35,14 @@ class Robot:
     absent: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # component → kind, why it is not there
 
 
+@dataclass(frozen=True, slots=True)
+class Builder:
+    """How components of one kind are made of their tables, and learn of all others once those are there."""
+
+    build: Callable[[str, Any, Site], Component]
+    join: Callable[[Mapping[str, Component]], None] | None = None
+
+
 def assemble(config: RobotConfig) -> Robot:
     """Build everything that the file names; nothing is opened yet."""
     robot = Robot()
@@ -43,19 +51,13 @@ def assemble(config: RobotConfig) -> Robot:
         gc.freeze()  # so that what is collected below is looked for among little
     for name, settings in config.can.items():
         robot.buses[name] = CanBus(name, settings, config.gateway.role, urgent=config.guard is not None)
-    for kind, devices in ((Kind.JOINT, config.joint), (Kind.DEVICE, config.device)):
-        for name, device in devices.items():
-            _add(robot, kind, name, _can_component(robot, config.path, kind, name, device))
-    lines: dict[str, Any] = {}
-    for name, insole in config.insole.items():
-        _add(robot, Kind.INSOLE, name, _insole(config.path, name, insole, lines))
-    feet = [one for one in robot.components.values() if isinstance(one, Insole)]
-    pair(feet)
-    for foot in feet:
-        if (hip := robot.components.get(f"{foot.foot}_hip")) is not None:
-            foot.follow_hip(hip.latest)
-    for name, imu in config.imu.items():
-        _add(robot, Kind.IMU, name, _imu(robot, config.path, name, imu))
+    site = Site(config.path, robot.buses, descriptions=robot.descriptions)
+    for kind, builder in BUILDERS.items():
+        for name, settings in getattr(config, kind).items():
+            _add(robot, kind, name, partial(builder.build, name, settings, site))
+    for builder in BUILDERS.values():
+        if builder.join is not None:
+            builder.join(robot.components)
     return robot
 
 
@@ -77,42 +79,30 @@ def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) ->
         robot.absent[name] = (kind, f"internal error, {type(error).__name__}: {error}; report it")
 
 
-def _can_component(robot: Robot, path: Path, kind: Kind, name: str, settings: Any) -> Callable[[], Component]:
-    def build() -> Component:
-        description = eds.load(eds.locate(settings.eds, path), settings.node_id)
-        if all(description.path != known.path for known in robot.descriptions.values()):
+def _on_can(make: Callable[..., Component]) -> Builder:
+    """The builder of what a vendor's EDS describes."""
+
+    def build(name: str, settings: JointSettings | DeviceSettings, site: Site) -> Component:
+        description = eds.load(eds.locate(settings.eds, site.file), settings.node_id)
+        if all(description.path != known.path for known in site.descriptions.values()):
             gc.collect()  # what reading a file leaves is larger than what it gives, and would lie there long
-        robot.descriptions[name] = description
-        make = JointDrive if kind is Kind.JOINT else CanDevice
-        return make(name, settings, robot.buses[settings.bus], description)
+        site.descriptions[name] = description
+        return make(name, settings, site.buses[settings.bus], description)
 
-    return build
-
-
-def _insole(
-    path: Path, name: str, settings: InsoleSettings, lines: dict[str, Any]
-) -> Callable[[], Component]:
-    def build() -> Component:
-        if settings.port not in lines:
-            lines[settings.port] = line_for(settings, path.parent)
-        return Insole(name, settings, lines[settings.port], path.parent)
-
-    return build
+    return Builder(build)
 
 
-def _imu(robot: Robot, path: Path, name: str, settings: MountedSettings) -> Callable[[], Component]:
-    def build() -> Component:
-        imu = build_imu(name, settings, robot.buses, path)
-        if isinstance(imu, Inclinometer):
-            robot.descriptions[name] = imu.node.description
-        return imu
-
-    return build
+BUILDERS: Mapping[Kind, Builder] = {
+    Kind.JOINT: _on_can(JointDrive),
+    Kind.DEVICE: _on_can(CanDevice),
+    Kind.INSOLE: Builder(build_insole, join_insoles),
+    Kind.IMU: Builder(build_imu),
+}
 
 
 def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
     """What `robot.describe` tells of a device: what its EDS says, and where it is."""
-    tables: dict[str, Any] = {**config.joint, **config.device, **config.imu}
+    tables: dict[str, Any] = {name: one for kind in BUILDERS for name, one in getattr(config, kind).items()}
     bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {
         "eds": description.path.name,

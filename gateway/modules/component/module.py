@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from msgspec import UNSET, UnsetType
 
 from drivers.component import Component
-from drivers.insole.device import Insole
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel, State
 from gateway.handlers import Handlers, on
@@ -207,7 +206,6 @@ def _has_values(selection: Selection) -> bool:
 
 
 def _layout(component: Component | None) -> LayoutInfo | UnsetType:
-    """Where the cells are, of an insole."""
-    if not isinstance(component, Insole):
-        return UNSET
-    return LayoutInfo(component.layout.name, list(component.layout.cells))
+    """Where the cells are, of a component that has some."""
+    layout = getattr(component, "layout", None)
+    return UNSET if layout is None else LayoutInfo(layout.name, list(layout.cells))

@@ -37,6 +37,10 @@ class Node(Protocol):
     def distrust(self) -> str | None:
         """Why nothing may be written to it."""
 
+    @property
+    def answered_ns(self) -> int:
+        """When it last did, or refused, what it was asked (monotonic)."""
+
     def upload(self, index: int, subindex: int) -> "Future[bytes]": ...
 
     def upload_all(self, objects: Sequence[tuple[int, int]]) -> "Future[list[bytes | DriverError]]": ...

@@ -20,7 +20,7 @@ from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
 from gateway.modules.control.ledger import WriteLedger
-from gateway.modules.control.objects import Change, device_error
+from gateway.modules.control.objects import Change, Node, device_error
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.control.reads import Reads
 from gateway.modules.control.rules import Rules
@@ -28,6 +28,7 @@ from gateway.modules.control.storage import Command, Storage
 from gateway.modules.control.transaction import ENDING, Leave, Outcome, Transaction
 from gateway.modules.control.trial_jobs import TrialJobs
 from gateway.modules.control.trials import Coming, Trials
+from gateway.modules.control.unanswered import Unanswered
 from gateway.modules.control.writer import Turn, Writer
 from gateway.modules.stop.authority import Authority, Permit
 from gateway.modules.stop.machine import Phase
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Changed = Callable[[], None]
-
-UNASKED_S = 1.0  # a device that did not answer a read is not read again so soon
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +86,7 @@ class Tuning:
         self._joints = tuple(config.joint)
         self._rules = Rules(config, component, self._parameters)
         self._reads = Reads(loop, self._rules.device, self._read_all)
-        self._silent: dict[str, tuple[int, str]] = {}  # component → until when it is not asked, and why
+        self._unanswered = Unanswered()
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
@@ -204,7 +203,7 @@ class Tuning:
 
     def _read_all(self, parameters: Sequence[Parameter]) -> "Future[list[ParameterValue]]":
         """For `Reads`: these are of one device. What cannot be asked of it says why."""
-        why = {name: self._why_silent(name) for name in {one.component for one in parameters}}
+        why = {name: self._why_unasked(name) for name in {one.component for one in parameters}}
         refusals = ((one.name, self._refusal(one, why[one.component])) for one in parameters)
         refused = {name: refusal for name, refusal in refusals if refusal is not None}
         asked = [one for one in parameters if one.name not in refused]
@@ -214,30 +213,29 @@ class Tuning:
         uploads = gather({"all": node.upload_all([(one.index, one.subindex) for one in asked])})
 
         def told(found: Mapping[str, Any]) -> list[ParameterValue]:
-            each = self._each(asked, found["all"])
+            each = self._each(asked, node, found["all"])
             return [self._found(one, refused.get(one.name) or next(each)) for one in parameters]
 
         return then(back(self._loop, uploads), told)
 
     def _each(
-        self, asked: Sequence[Parameter], told: "Sequence[bytes | DriverError] | Exception"
+        self, asked: Sequence[Parameter], node: Node, told: "Sequence[bytes | DriverError] | Exception"
     ) -> Iterator[bytes | Exception]:
         """What is told of each; where a device did not answer, that is so for all that is left."""
         found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
         last = found[-1]
         if isinstance(last, DeviceTimeout):
-            until_ns = time.monotonic_ns() + round(UNASKED_S * 1e9)
-            self._silent.update({one.component: (until_ns, str(last)) for one in asked})
+            self._unanswered.note({one.component for one in asked}, node, str(last))
         return itertools.islice(itertools.chain(found, itertools.repeat(last)), len(asked))
 
-    def _why_silent(self, component: str) -> str | None:
-        """Why it cannot be asked, or is not asked so soon again."""
-        until_ns, problem = self._silent.get(component, (0, ""))
-        return self._rules.silence(component) or (problem if time.monotonic_ns() < until_ns else None)
+    def _why_unasked(self, component: str) -> str | None:
+        """Why it cannot be asked, or is not asked again so soon."""
+        silence = self._rules.silence(component)
+        return self._unanswered.why(component) if silence is None else f"{component} is not there: {silence}"
 
-    def _refusal(self, parameter: Parameter, silence: str | None) -> RpcError | None:
+    def _refusal(self, parameter: Parameter, unasked: str | None) -> RpcError | None:
         """Why it is not asked for."""
-        problem = parameter.problem or (silence and f"{parameter.component} is not there: {silence}")
+        problem = parameter.problem or unasked
         if problem is not None:
             return parameter.refusal(Kind.UNAVAILABLE, problem)
         try:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Meta, Struct
 
+from gateway.object_names import ObjectName, address_of
+
 if TYPE_CHECKING:
     from gateway.config import RobotConfig
 
@@ -36,14 +38,13 @@ class ControllerStop(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """`[[stop.controller]]`: an object of who commands the drives, and the value that stops it."""
 
     component: str
-    object: Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$")]
+    object: ObjectName
     value: int
 
     @property
     def address(self) -> tuple[int, int]:
         """Index and subindex."""
-        index, _, subindex = self.object.partition(":")
-        return int(index, 16), int(subindex, 0)
+        return address_of(self.object)
 
 
 class StopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -4,6 +4,7 @@ A collector that runs is asked by its door; otherwise the label goes through the
 the store. Where that cannot be reached, it waits in the spool as everything recorded does.
 """
 
+import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import ServerSettings, Upload
+
+log = logging.getLogger(__name__)
 
 AT_ONCE: Final = 50  # labels in one question to a collector: a line of it has at most 64 KiB
 LONGEST: Final = 100  # letters of a label's or an author's name
@@ -133,8 +136,10 @@ class Labelling:
                 return Where.SPOOL, ""
             try:
                 store = connect(self._settings.store)
-                for number in spool.waiting():  # a later batch would shut out those before it
+                for number in spool.waiting():
                     send(spool, number, store)
+                for text in spool.anew:
+                    log.error("%s", text)
             except StoreError as error:
                 return Where.SPOOL, str(error)
         return Where.STORE, ""

@@ -2,7 +2,9 @@
 
 import contextlib
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +13,8 @@ import pyarrow as pa
 from gateway.cli.text import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
-from server_gui.core.cloud import parts, transfer, verify
+from ml.store.store import checked_url
+from server_gui.core.cloud import emptying, parts, transfer, verify
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recordings
@@ -19,8 +22,6 @@ from server_gui.core.cloud.selection import Choice, Recording, choose
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 from server_gui.core.fleet.collector import connect
 from server_gui.core.recording.errors import Damaged
-from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import lost_batches, send
 from server_gui.core.settings.server_file import ServerSettings
 
 FORMATS: Final[dict[str, Callable[[Path, Recording], int]]] = {
@@ -51,17 +52,14 @@ def upload(settings: ServerSettings) -> Work:
     """What waits in a spool that nobody records into, to the store."""
 
     def work(job: Job) -> str:
-        with Spool(settings.recorder.spool) as spool:
-            store = connect(settings.store)
-            lost = lost_batches(spool, store)
-            waiting = spool.waiting()
-            job.expect(len(waiting), "batches")
-            for number in waiting:
-                send(spool, number, store)
-                job.advance(1)
-        if lost:
-            raise Damaged("; ".join(lost))
-        return f"{counted(len(waiting), 'batch', 'batches')} uploaded to {settings.store.url}; nothing waits"
+        url = checked_url(settings.store.url)
+        there = functools.partial(connect, settings.store)
+        done = emptying.empty(settings.recorder.spool, url, there, _steps(job, "batches"))
+        if done.waits:
+            raise StoreError("; ".join((*done.waits, *done.problems)))
+        if done.problems:
+            raise Damaged("; ".join(done.problems))
+        return f"{counted(done.uploaded, 'batch', 'batches')} uploaded to {done.url}; nothing waits"
 
     return work
 
@@ -90,18 +88,24 @@ def check(settings: ServerSettings, *, deep: bool) -> Work:
     def work(job: Job) -> str:
         store = Store.existing(settings.store.url)
 
-        @contextlib.contextmanager
-        def expect(steps: int) -> Iterator[Callable[[int], object]]:
-            job.expect(steps, "steps")
-            yield job.advance
-
-        found = verify.whole(store, settings.recorder.spool, expect, deep=deep)
+        found = verify.whole(store, settings.recorder.spool, _steps(job, "steps"), deep=deep)
         if found.problems:
             told = "; ".join(found.problems[:PROBLEMS_TOLD])
             raise StoreError(f"{len(found.problems)} problems: {told} (gwrms cloud verify lists them)")
         return f"{store.url} is whole: {found.text}"
 
     return work
+
+
+def _steps(job: Job, unit: str) -> Callable[[int], AbstractContextManager[Callable[[int], object]]]:
+    """What hears how many steps there will be, and then of each."""
+
+    @contextlib.contextmanager
+    def expect(steps: int) -> Iterator[Callable[[int], object]]:
+        job.expect(steps, unit)
+        yield job.advance
+
+    return expect
 
 
 def _counted(tables: Iterable[pa.Table], job: Job) -> Iterator[pa.Table]:

@@ -11,7 +11,7 @@ from mcap.records import Schema
 from mcap_ros2.writer import Writer
 
 from ml.store.sessions import Session
-from server_gui.core.cloud.atomic_files import draft
+from server_gui.core.atomic_files import draft
 from server_gui.core.cloud.ros import definition, header
 from server_gui.core.cloud.selection import Recording, Row
 from server_gui.core.cloud.topics import Message, Topic, ros_name, topics

@@ -19,9 +19,9 @@ from ml.store.private import FILE
 from ml.store.store import Batches, Store
 from ml.store.tables import Table
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.receipt_check import Advance, prove
+from server_gui.core.cloud.receipt_check import Advance, Proof, prove
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.segment import Segment
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import upload
@@ -57,22 +57,21 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
         StoreError: it could not be looked, or a table's log is damaged.
 
     """
-    receipts = verify.receipts_of(spool.folder)
-    found = verify.files(store)
-    with expect(2 * len(found)) as advance:
-        broken = verify.broken(store, found, advance, deep=True)
-        gone = {(file.location, file.path) for file in broken}
-        sound = [file for file in found if (file.location, file.path) not in gone]
-        proof = prove(store, receipts, sound, advance, values=False)
+    seen = _look(store, spool, expect, deep=True)
     copies = verify.second_copies(spool.folder)
-    unproven = {batch.number for batch in verify.copies(spool.folder, _known(receipts))[0]}
-    again = {number for number, batch in copies.items() if batch in proof.lacking} | unproven
+    unproven = {batch.number for batch in verify.copies(spool.folder, _known(seen.receipts))[0]}
+    lacking = seen.proof.lacking
+    if seen.broken or mending.taken_out(store):  # nobody can count what files held of these
+        lacking = lacking | seen.proof.shortened
+    again = {number for number, batch in copies.items() if batch in lacking} | unproven
     waiting = spool.waiting()  # the next upload brings these
-    nowhere = sorted(number for _, number in proof.lacking - set(copies.values()) if number not in waiting)
+    nowhere = sorted(
+        number for _, number in seen.proof.lacking - set(copies.values()) if number not in waiting
+    )
     lost = (
         [f"the spool has no second copy of {verify.told_batches(nowhere)}: bring one back"] if nowhere else []
     )
-    return Plan(broken, sorted(again), lost)
+    return Plan(seen.broken, sorted(again), lost)
 
 
 def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object]) -> list[str]:
@@ -100,22 +99,38 @@ def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMa
         StoreError: a table's log is damaged, so nobody can say what is there.
 
     """
-    receipts = verify.receipts_of(spool.folder)
-    found = verify.files(store)
-    with expect(2 * len(found)) as advance:
-        broken = verify.broken(store, found, advance, deep=False)
-        gone = {(file.location, file.path) for file in broken}
-        sound = [file for file in found if (file.location, file.path) not in gone]
-        proof = prove(store, receipts, sound, advance)
-    whole = [each for each in receipts if isinstance(each, Receipt)]
-    if len(whole) < len(receipts):
+    seen = _look(store, spool, expect, deep=False)
+    whole = [each for each in seen.receipts if isinstance(each, Receipt)]
+    if len(whole) < len(seen.receipts):
         _rewrite(spool.folder / RECEIPTS, whole)
-    for (writer, number), parts in sorted(proof.wrong.items()):
+    for (writer, number), parts in sorted(seen.proof.wrong.items()):
         spool.receipts.add(
             Receipt(writer, number, store.url, parts, ("what was missing of it was accepted",))
         )
     for number in verify.nowhere(spool.folder, whole):
         spool.receipts.add(Receipt(spool.id, number, store.url, (), ("that it is nowhere was accepted",)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What receipts say, which files cannot be read, and what the others prove."""
+
+    receipts: Sequence[Receipt | Altered]
+    broken: Sequence[DataFile]
+    proof: Proof
+
+
+def _look(
+    store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]], *, deep: bool
+) -> _Seen:
+    """With `deep` each value is read; without, it is compared with what was sent."""
+    receipts = verify.receipts_of(spool.folder)
+    found = verify.files(store)
+    with expect(2 * len(found)) as advance:
+        broken = verify.broken(store, found, advance, deep=deep)
+        gone = {(file.location, file.path) for file in broken}
+        sound = [file for file in found if (file.location, file.path) not in gone]
+        return _Seen(receipts, broken, prove(store, receipts, sound, advance, values=not deep))
 
 
 def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:

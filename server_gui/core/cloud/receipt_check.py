@@ -52,6 +52,7 @@ class Proof:
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
     lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
+    shortened: set[Batch] = field(default_factory=set)  # by retention: how many others there are is not known
     wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
 
 
@@ -102,6 +103,8 @@ def prove(
         else:
             proof.rows += claim.rows
             proof.retained += claim.part.rows - claim.rows
+            if claim.rows < claim.part.rows and _outlasts(claim.part, retained[claim.part.location]):
+                proof.shortened.add(claim.batch)
     for batch in wrong:
         proof.wrong[batch] = tuple(_found(claim) for claim in claims if claim.batch == batch)
     proof.here, proof.batches = len(newest), len(newest) - len(wrong)
@@ -272,6 +275,11 @@ def _problem(claim: _Claim, retained: datetime | None, *, values: bool) -> str |
     if claim.rows > part.rows:
         return f"{claim.rows - part.rows} rows more than the {part.rows} that were sent: doubled ({whose})"
     return f"the {part.rows} rows are not as they were sent: altered ({whose})"
+
+
+def _outlasts(part: Part, retained: datetime | None) -> bool:
+    """Whether some of its rows are newer than what was removed."""
+    return retained is not None and part.end_us is not None and _time(part.end_us) >= retained
 
 
 def _time(us: int) -> datetime:

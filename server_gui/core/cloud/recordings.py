@@ -27,6 +27,7 @@ from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.receipts import RECEIPTS, Receipts
 
 _US: Final = timedelta(microseconds=1)
 Row = dict[str, Any]
@@ -87,6 +88,24 @@ class Recordings:
         known = {(each.robot, each.session) for each in found}
         return sessions.in_order([*found, *(each for name, each in names.items() if name not in known)])
 
+    def gone(self) -> str | None:
+        """In words, where a table of telemetry is not there that batches of the spool went to."""
+        if self._store is None:
+            return None
+        try:
+            receipts = list(Receipts(self._spool / RECEIPTS).whole())
+        except OSError:  # nobody can say, and that the spool cannot be read is told besides
+            return None
+        sent = [each for each in receipts if each.url == self._store.url]
+        wanted = {part.location for each in sent for part in each.parts if part.stream and part.rows}
+        lost = [location for location in sorted(wanted) if not self._is_there(location)]
+        return (
+            f"{', '.join(lost)} has gone from {self._url}, though batches of the spool {self._spool} went "
+            "there: rows of its sessions are missing (gwrms cloud verify tells which)"
+            if lost
+            else None
+        )
+
     def find(self, name: str, robot: str | None = None) -> Session:
         """The session whose name is this, or alone begins so.
 
@@ -142,6 +161,12 @@ class Recordings:
         location = TELEMETRY.location(session.robot, 1 if self._store is None else self._store.about.shards)
         units = {} if self._store is None else self._store.units(location)
         return _Waiting(self._spool, self._missing(location, self._batches), session, units)
+
+    def _is_there(self, location: str) -> bool:
+        try:
+            return self._store is not None and self._store.table(location) is not None
+        except NoSuchTable:
+            return False
 
     def _waiting(self, table: Table) -> list[Row]:
         return spooled.rows(self._spool, table, self._missing(table.name, self._batches))

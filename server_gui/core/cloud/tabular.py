@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from ml.store.sessions import KEYS, Channel
 from ml.store.tables import TELEMETRY, field
-from server_gui.core.cloud.atomic_files import draft
+from server_gui.core.atomic_files import draft
 from server_gui.core.cloud.selection import Recording
 
 

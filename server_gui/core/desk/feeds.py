@@ -16,7 +16,9 @@ from msgspec.structs import replace
 from gateway.client import Address
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.fleet.collector import Collector, whole
+from server_gui.core.fleet.fleet import Subscriber
 from server_gui.core.fleet.remote_collector import Elsewhere
+from server_gui.core.fleet.stop_links import StopRobot
 from server_gui.core.follow.events import Event, without_processes
 from server_gui.core.follow.feed import Feed, Following
 from server_gui.core.follow.network import Network
@@ -32,7 +34,6 @@ RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first
 AGAIN_S: Final = 1.0  # between attempts
 
-Show = Callable[[str, Event], None]  # in the network's thread
 Foresee = Callable[[Sequence[Foreseen]], None]  # in the thread that predicts
 
 
@@ -47,7 +48,8 @@ class Record:
 class Feeds:
     """For the window's thread; use it as a context manager, which ends every thread.
 
-    Without `record` it only shows. `network` is for other links, too.
+    Without `record` it only shows. `network` is for other links, too. `stop` stops a robot where a rule on
+    what is predicted wants it.
     """
 
     def __init__(
@@ -55,14 +57,16 @@ class Feeds:
         settings: ServerSettings,
         following: Following,
         record: Record | None,
-        show: Show,
+        show: Subscriber,
         foresee: Foresee,
+        stop: StopRobot,
     ) -> None:
         self._settings = settings
         self._following = following
         self._record = record
         self._show = show
         self._foresee = foresee
+        self._stop = stop
         self._robots: dict[str, Address] = {}
         self._tasks: list[concurrent.futures.Future[None]] = []  # that follow them where no collector does
         self._tried_s = 0.0
@@ -116,7 +120,7 @@ class Feeds:
         if self._collector is not None:
             self._tasks.append(self._collector.follow(name, address))
         else:
-            feed = Feed(address, functools.partial(self._shown, name), self._following)
+            feed = Feed(address, [functools.partial(self._shown, name)], self._following)
             self._tasks.append(self.network.run(feed.run()))
 
     def look(self, recording: Recording) -> None:
@@ -142,7 +146,7 @@ class Feeds:
         nobody = replace(self._settings, robots={})  # each is told when the window follows it
         operator, notes = self._record.operator, self._record.notes
         try:
-            return Collector(nobody, operator, notes, following, self._kept, self._foresee), ""
+            return Collector(nobody, operator, notes, following, [self._kept], self._foresee, self._stop), ""
         except SpoolUnusable as error:
             return None, str(error)
 

@@ -181,6 +181,7 @@ class Recording:
             self.see(report.threads, By.OTHER)
         now = {alarm.kind.value: alarm.text for alarm in report.recorder.alarms}
         now |= {} if report.uploader.problem is None else {"store": report.uploader.problem}
+        now |= {text: text for text in (*report.uploader.lost, *report.uploader.ahead)}
         for kind in now.keys() - self._trouble.keys():
             self._news.add(NewsKind.WARNING, WHO, now[kind])
         for kind in self._trouble.keys() - now.keys():

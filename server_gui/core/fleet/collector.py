@@ -7,7 +7,7 @@ import logging
 import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, Self, TypeVar
 
 import msgspec
@@ -17,10 +17,10 @@ from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from ml.store import Store
 from server_gui.core.fleet.control_socket import Answers, door
-from server_gui.core.fleet.fleet import Fleet, Show
+from server_gui.core.fleet.fleet import Fleet, Subscriber
 from server_gui.core.fleet.link_statistics import LinkReport
 from server_gui.core.fleet.live_prediction import Foresee, Foreseeing
-from server_gui.core.follow.events import Event
+from server_gui.core.fleet.stop_links import StopLinks, StopRobot
 from server_gui.core.follow.feed import ONCE, Following
 from server_gui.core.follow.network import Network
 from server_gui.core.prediction.state import PredictingState
@@ -66,8 +66,8 @@ class Collector:
 
     Leaving ends the sessions, and uploads what waits, for a while: what is not in the store then stays in the
     spool. Where an upload hangs even so, `hangs` is set, and only the end of the process ends its thread.
-    A window records with a `following` of its own, and is told of everything by `show` and, in another
-    thread, of what is predicted by `foresee`.
+    A window records with a `following` of its own; its `subscribers` are told of everything after it is
+    recorded, `foresee` in another thread of what is predicted; `stop` stops a robot where a rule wants it.
     """
 
     def __init__(
@@ -76,8 +76,9 @@ class Collector:
         operator: str = "",
         notes: str = "",
         following: Following | None = None,
-        show: Show | None = None,
+        subscribers: Iterable[Subscriber] = (),
         foresee: Foresee | None = None,
+        stop: StopRobot | None = None,
     ) -> None:
         self.hangs = False
         self._disk = concurrent.futures.ThreadPoolExecutor(1, "disk")
@@ -90,15 +91,16 @@ class Collector:
         compacting = None if every_s is None else Compacting(store.url, self._spool.folder, every_s)
         self._uploader = Uploader(self._spool, lambda: connect(store), self._wanted, compacting)
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
-        robots = {name: robot.where for name, robot in settings.robots.items()}
-        following = following or whole(recorder)
-        self._show = show
-        self._fleet = Fleet(robots, following, self._recorder, operator, notes, self._take)
+        self._fleet = Fleet(following or whole(recorder), self._recorder, operator, notes)
+        self._stop_links = StopLinks(self.network, settings.rules if stop is None else ())
         self._foreseeing = (
-            Foreseeing(settings, self._recorder, self._fleet, self.network, foresee)
+            Foreseeing(settings, self._recorder, self._fleet.session, stop or self._stop_links.stop, foresee)
             if settings.prediction.enabled
             else None
         )
+        if self._foreseeing is not None:
+            self._fleet.subscribers.append(self._foreseeing.take)
+        self._fleet.subscribers.extend(subscribers)
         self._running: concurrent.futures.Future[None] | None = None
         predicting = () if self._foreseeing is None else self._foreseeing.workers
         workers = (self.network.worker, self._recorder.worker, self._uploader.worker, *predicting)
@@ -132,6 +134,7 @@ class Collector:
     def wait(self, within_s: float) -> None:
         """Let it work so long, and see to its threads; raises what has ended it, a mistake of ours."""
         self.watch.look()
+        self._stop_links.look()
         if self._running is not None and concurrent.futures.wait([self._running], within_s).done:
             self._running.result()
 
@@ -141,7 +144,7 @@ class Collector:
 
     def follow(self, robot: str, address: Address) -> "concurrent.futures.Future[None]":
         """Another robot, from now on."""
-        return self._do(lambda: self._fleet.follow(robot, address))
+        return self._do(lambda: self._follow(robot, address))
 
     def mark(self, text: str) -> "concurrent.futures.Future[int]":
         """Mark this instant in the recording of every robot; in how many that is on the disk."""
@@ -159,11 +162,9 @@ class Collector:
 
         return self.network.run(do())
 
-    def _take(self, robot: str, event: Event) -> None:
-        if self._foreseeing is not None:
-            self._foreseeing.take(robot, event)
-        if self._show is not None:
-            self._show(robot, event)
+    def _follow(self, robot: str, address: Address) -> None:
+        self._fleet.follow(robot, address)
+        self._stop_links.follow(robot, address)
 
     async def _run(self) -> None:
         answers: Answers = {
@@ -172,6 +173,8 @@ class Collector:
             "mark": self._mark,
             "keep": self._keep,
         }
+        for name, robot in self._settings.robots.items():
+            self._follow(name, robot.where)
         async with door(self._spool.folder, answers):
             await self._fleet.run()
 

@@ -1,53 +1,51 @@
 """Every robot of the fleet, each followed by itself in the network's one thread."""
 
 import asyncio
+import functools
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from gateway.client import Address
 from server_gui.core.fleet.link_log import Saying
 from server_gui.core.fleet.link_statistics import LinkReport, LinkStatistics
 from server_gui.core.fleet.robot_recording import Keeping
-from server_gui.core.follow.events import Event, Failed, StopAnswered
-from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.events import Event
+from server_gui.core.follow.feed import Feed, Following, Tell
 from server_gui.core.recording.recorder import Recorder
 
 log = logging.getLogger(__name__)
 
 AGAIN_S: Final = 5.0  # before a robot that a mistake of ours has ended is followed anew
 
-Show = Callable[[str, Event], None]
+Subscriber = Callable[[str, Event], None]  # (robot, event), in the network's thread
 
 
 class Member:
-    """One robot: what its feed tells is kept first, then counted, said and shown."""
+    """One robot, and who is told of it: what its feed tells is kept first, then counted, logged and shown."""
 
     def __init__(
-        self, robot: str, address: Address, following: Following, keeping: Keeping, show: Show | None
+        self,
+        robot: str,
+        address: Address,
+        following: Following,
+        keeping: Keeping,
+        others: Sequence[Tell],
     ) -> None:
         self.statistics = LinkStatistics(address)
         self._robot = robot
-        self._address = address
-        self._following = following
         self._keeping = keeping
-        self._saying = Saying(robot, address)
-        self._show = show
-        self._feed = Feed(address, self._tell, following)
+        subscribers = [keeping.take, self.statistics.take, Saying(robot, address).take, *others]
+        self._feed = functools.partial(Feed, address, subscribers, following)
 
     async def run(self) -> None:
         """Follow the robot until cancelled; a mistake of ours about it ends no other's recording."""
         while True:
             try:
-                await self._feed.run()
+                await self._feed().run()
             except Exception:
                 log.exception("%s: internal error; it is followed anew in %g s", self._robot, AGAIN_S)
             await asyncio.sleep(AGAIN_S)
-            self._feed = Feed(self._address, self._tell, self._following)
-
-    async def stop(self, reason: str) -> StopAnswered | Failed:
-        """Quick stop on every drive, over the link that there is."""
-        return await self._feed.stop(reason)
 
     @property
     def session(self) -> str:
@@ -58,38 +56,21 @@ class Member:
         """How its link does now."""
         return self.statistics.report(self._keeping.session)
 
-    def _tell(self, event: Event) -> None:
-        self._keeping.take(event)
-        self.statistics.take(event)
-        self._saying.take(event)
-        if self._show is not None:
-            self._show(self._robot, event)
-
 
 class Fleet:
-    """The robots of a server; everything that they send goes to the recorder, before `show` is told of it.
+    """The robots of a server; what they send goes to the recorder, before any of `subscribers` is told of it.
 
     For the network's thread, but for `robots`, `session` and `newest_ns`.
     """
 
-    def __init__(
-        self,
-        robots: Mapping[str, Address],
-        following: Following,
-        recorder: Recorder,
-        operator: str = "",
-        notes: str = "",
-        show: Show | None = None,
-    ) -> None:
+    def __init__(self, following: Following, recorder: Recorder, operator: str = "", notes: str = "") -> None:
+        self.subscribers: list[Subscriber] = []  # of the robots that join from now on
+        self._following = following
+        self._recorder = recorder
+        self._operator = operator
+        self._notes = notes
         self._members: dict[str, Member] = {}
         self._joining: asyncio.Queue[Member] = asyncio.Queue()
-
-        def member(robot: str, address: Address) -> Member:
-            return Member(robot, address, following, Keeping(robot, recorder, operator, notes), show)
-
-        self._member = member
-        for robot, address in robots.items():
-            self.follow(robot, address)
 
     async def run(self) -> None:
         """Follow all of them, and who joins, until cancelled."""
@@ -99,13 +80,11 @@ class Fleet:
 
     def follow(self, robot: str, address: Address) -> None:
         """Another robot, from now on."""
-        member = self._member(robot, address)
+        keeping = Keeping(robot, self._recorder, self._operator, self._notes)
+        others = [functools.partial(subscriber, robot) for subscriber in self.subscribers]
+        member = Member(robot, address, self._following, keeping, others)
         self._members = self._members | {robot: member}
         self._joining.put_nowait(member)
-
-    async def stop(self, robot: str, reason: str) -> StopAnswered | Failed:
-        """Quick stop on every drive of a robot."""
-        return await self._members[robot].stop(reason)
 
     def session(self, robot: str) -> str:
         """What a robot's recording that goes on is called."""

@@ -1,14 +1,15 @@
 """Prediction while recording: what models say is kept with the recording, and a rule's stop is asked for."""
 
+import concurrent.futures
+import functools
 import logging
 import time
 from collections.abc import Callable, Sequence
 
 import msgspec
 
-from server_gui.core.fleet.fleet import Fleet
-from server_gui.core.follow.events import Failed, StopAnswered
-from server_gui.core.follow.network import Network
+from gateway.wire.stop import Stopped
+from server_gui.core.fleet.stop_links import StopRobot
 from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.service import Predicting
 from server_gui.core.recording.batching import EventKind
@@ -22,24 +23,27 @@ Foresee = Callable[[Sequence[Foreseen]], None]
 
 
 class Foreseeing(Predicting):
-    """`Predicting`, for the robots of a fleet that is recorded; `show` is told of everything afterwards."""
+    """`Predicting`, for robots that are recorded; `show` is told of everything afterwards.
+
+    `session` says what a robot's recording is called; `stop` stops a robot.
+    """
 
     def __init__(
         self,
         settings: ServerSettings,
         recorder: Recorder,
-        fleet: Fleet,
-        network: Network,
+        session: Callable[[str], str],
+        stop: StopRobot,
         show: Foresee | None = None,
     ) -> None:
         super().__init__(settings, self._keep, self._ask_to_stop)
         self._recorder = recorder
-        self._fleet = fleet
-        self._network = network
+        self._session = session
+        self._stop_robot = stop
         self._show = show
 
     def _keep(self, news: Sequence[Foreseen]) -> None:
-        rows = [record(self._fleet.session(one.robot), one) for one in news if isinstance(one, Predicted)]
+        rows = [record(self._session(one.robot), one) for one in news if isinstance(one, Predicted)]
         if rows:
             self._recorder.add(*rows)
         for one in news:
@@ -50,19 +54,21 @@ class Foreseeing(Predicting):
             self._show(news)
 
     def _ask_to_stop(self, ruled: Ruled) -> None:
-        self._network.run(self._stopped(ruled))
+        self._stop_robot(ruled.robot, ruled.text).add_done_callback(functools.partial(self._stopped, ruled))
 
-    async def _stopped(self, ruled: Ruled) -> None:
-        answer = await self._fleet.stop(ruled.robot, ruled.text)
+    def _stopped(self, ruled: Ruled, answer: "concurrent.futures.Future[Stopped]") -> None:
         after_ms = (time.time_ns() - ruled.cause.utc_ns) / 1e6
-        match answer:
-            case StopAnswered(stopped=stopped):
-                said = ", ".join(f"{name} {state}" for name, state in stopped.drives.items())
-            case Failed(reason=reason):
-                said = f"failed: {reason}"
-        text = f"stop by a rule: {said}; {after_ms:.0f} ms after the sample"
+        text = f"stop by a rule: {_said(answer)}; {after_ms:.0f} ms after the sample"
         log.warning("%s: %s", ruled.robot, text)
         self._recorder.event(ruled.robot, EventKind.RULE, text, after_ms=after_ms)
+
+
+def _said(answer: "concurrent.futures.Future[Stopped]") -> str:
+    if answer.cancelled():
+        return "failed: this program ended before the robot had answered"
+    if (error := answer.exception()) is not None:
+        return f"failed: {error}"
+    return ", ".join(f"{name} {state}" for name, state in answer.result().drives.items())
 
 
 def record(session: str, news: Predicted) -> Record:

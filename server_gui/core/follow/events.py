@@ -9,12 +9,9 @@ from gateway.client import Batch, ClockOffset, ConnectionState
 from gateway.wire.component import Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.cost import GatewayCost
-from gateway.wire.parameter import ParameterValues, Written
+from gateway.wire.parameter import ParameterValues
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
-from gateway.wire.stop import Stopped
-
-STOP = "STOP"  # what a stop that failed is called
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,24 +74,10 @@ class Journalled:
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
-    """A write was done and read back."""
-
-    written: Written
-
-
-@dataclass(frozen=True, slots=True)
 class Costs:
     """What monitoring costs the robot, client by client."""
 
     cost: GatewayCost
-
-
-@dataclass(frozen=True, slots=True)
-class StopAnswered:
-    """What the drives said to a stop."""
-
-    stopped: Stopped
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,18 +93,7 @@ class Refused(Failed):
     """The robot sent what cannot be kept: it was told to nobody."""
 
 
-Event = (
-    LinkChanged
-    | Described
-    | Telemetry
-    | Looked
-    | Resources
-    | Costs
-    | Journalled
-    | Changed
-    | StopAnswered
-    | Failed
-)
+Event = LinkChanged | Described | Telemetry | Looked | Resources | Costs | Journalled | Failed
 
 
 def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[float | None]]) -> Telemetry:

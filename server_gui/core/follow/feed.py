@@ -1,10 +1,10 @@
-"""Follows one robot in the network's thread and tells what it sees; carries out what it is told."""
+"""Follows one robot in the network's thread and tells its subscribers what it sees. It commands nothing."""
 
 import asyncio
 import fnmatch
 import math
 import time
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any, Final
 
 from msgspec import Struct
@@ -25,8 +25,6 @@ from gateway.client.backoff import Backoff
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
-    STOP,
-    Changed,
     Described,
     Event,
     Failed,
@@ -35,7 +33,6 @@ from server_gui.core.follow.events import (
     Looked,
     Refused,
     Resources,
-    StopAnswered,
     Telemetry,
 )
 from server_gui.core.follow.validation import Arriving, Unfit, journal
@@ -44,7 +41,6 @@ Tell = Callable[[Event], None]
 
 ONCE: Final = math.inf  # a period: once on every link
 AGAIN_S: Final = 5.0  # before a look that failed is tried again
-LEASE_S: Final = 10.0
 DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
 WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
 COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
@@ -69,12 +65,12 @@ class Following(Struct, frozen=True):
 class Feed:
     """One robot, followed from `run` until that is cancelled.
 
-    `tell` is called in the network's thread with every event that may be kept, in order. Writes take the
-    lease for as long as they last.
+    Each of `subscribers` is called in the network's thread with every event that may be kept, in order; for
+    one event those before come before those after.
     """
 
-    def __init__(self, address: Address, tell: Tell, following: Following) -> None:
-        self._tell = tell
+    def __init__(self, address: Address, subscribers: Sequence[Tell], following: Following) -> None:
+        self._subscribers = subscribers
         self._following = following
         self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
         self._backoff = Backoff()
@@ -112,25 +108,9 @@ class Feed:
             for one in errors.exceptions:
                 self._tell(Failed("following the robot", str(one)))
 
-    async def write(self, changes: Mapping[str, float]) -> None:
-        """Change parameters; the lease is taken and given back around it."""
-        try:
-            async with self._client.writing(LEASE_S):
-                self._tell(Changed(await self._client.write(changes)))
-        except ClientError as error:
-            self._tell(Failed(f"write of {', '.join(changes)}", str(error)))
-
-    async def stop(self, reason: str) -> StopAnswered | Failed:
-        """Quick stop on every drive; what was told of it."""
-        told: StopAnswered | Failed
-        try:
-            told = StopAnswered(await self._client.stop(reason))
-        except ClientError as error:
-            told = Failed(STOP, str(error))
-        self._tell(told)
-        return told
-
-    # --- what goes on by itself
+    def _tell(self, event: Event) -> None:
+        for tell in self._subscribers:
+            tell(event)
 
     def _link_changed(self, state: ConnectionState) -> None:
         if state is ConnectionState.CONNECTED:

@@ -10,20 +10,16 @@ from gateway.wire.parameter import ParameterValue
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
-    STOP,
-    Changed,
     Described,
     Event,
     Failed,
     LinkChanged,
     Looked,
     Resources,
-    StopAnswered,
     Telemetry,
 )
 
 STALE_NS = 500_000_000  # older than this is shown as old
-HISTORY_ROWS = 240
 RATE_WINDOW_NS = 2_000_000_000
 
 
@@ -56,21 +52,17 @@ class Robot:
     """The newest facts of one robot, for one thread; `apply` is the only writer.
 
     Values are those of the last row. They stay when the link drops, and `age_s` says how old they are: a
-    view shows nothing as live when `is_stale`. `history` holds the latest rows of each channel, at most
-    `HISTORY_ROWS`.
+    view shows nothing as live when `is_stale`.
     """
 
     link: LinkStatus = field(default_factory=LinkStatus)
     description: Description | None = None
     values: dict[str, float | None] = field(default_factory=dict)
-    history: dict[str, collections.deque[float | None]] = field(default_factory=dict)
     parts: dict[str, Part] = field(default_factory=dict)
     parameters: dict[str, ParameterValue] = field(default_factory=dict)
     parameters_at_ns: int | None = None
     resources: ResourceSnapshot | None = None
     resources_at_ns: int | None = None
-    last_change: Changed | None = None
-    last_stop: StopAnswered | Failed | None = None
     last_failure: Failed | None = None
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(
@@ -93,12 +85,6 @@ class Robot:
                 self._link_changed(event)
             case Described():
                 self._described(event)
-            case Changed():
-                self.last_change, self.last_failure = event, None
-            case StopAnswered():
-                self.last_stop = event
-            case Failed(what=what) if what == STOP:
-                self.last_stop = event
             case Failed():
                 self.last_failure = event
 
@@ -159,7 +145,6 @@ class Robot:
             return
         for name, column in batch.columns.items():
             self.values[name] = column[-1]
-            self.history.setdefault(name, collections.deque(maxlen=HISTORY_ROWS)).extend(column)
         self._newest_ns = batch.received_ns - (event.age_ns or 0)
         self._arrivals.append((batch.received_ns, rows))
         self.link.missed += batch.missed

@@ -1,6 +1,7 @@
 """Robots followed and predicted without being recorded, for a terminal."""
 
 import collections
+import functools
 import threading
 from collections.abc import Mapping, Sequence
 from typing import Final, Self
@@ -8,7 +9,7 @@ from typing import Final, Self
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from ml.robot.groups import GROUPS
-from server_gui.core.follow.events import Event, LinkChanged
+from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.feed import ONCE, Feed, Following, Tell
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
@@ -54,7 +55,11 @@ class Live:
         self._predicting.__enter__()
         self._network.__enter__()
         for name, address in self._addresses.items():
-            self._network.run(Feed(address, self._teller(name), self._following).run())
+            subscribers: list[Tell] = [
+                functools.partial(self._predicting.take, name),
+                self._mailboxes[name].put,
+            ]
+            self._network.run(Feed(address, subscribers, self._following).run())
         return self
 
     def __exit__(self, *exc: object) -> None:
@@ -78,10 +83,3 @@ class Live:
     def _foresee(self, news: Sequence[Foreseen]) -> None:
         self._foreseen.extend(news)
         self._came.set()
-
-    def _teller(self, name: str) -> Tell:
-        def tell(event: Event) -> None:
-            self._predicting.take(name, event)
-            self._mailboxes[name].put(event)
-
-        return tell

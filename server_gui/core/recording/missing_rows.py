@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
 
-from ml.store import sums
+from ml.store import sums, upkeep
 from ml.store.errors import translated
 from ml.store.store import Store
 from ml.store.tables import Table
@@ -53,6 +53,15 @@ def of_rows(store: Store, table: Table, rows: pa.Table) -> pa.Table:
             f"so it has of {len(wrong)} of {len(numbers)} rows"
         )
     return rows.filter(pa.array([number not in known for number in numbers]))
+
+
+def newer(rows: Sequence[pa.RecordBatch], store: Store, location: str) -> list[pa.RecordBatch]:
+    """Those of them that retention does not mean to be gone."""
+    until = upkeep.retained(store, location) if rows else None
+    if until is None:
+        return list(rows)
+    found = [each.filter(pc.greater_equal(each["utc"], pa.scalar(until, each["utc"].type))) for each in rows]
+    return [each for each in found if each.num_rows]
 
 
 def name(writer: str, batch: int, rows: Sequence[pa.RecordBatch]) -> str:

@@ -6,13 +6,14 @@ that follows in it and of the CRC before it, so a line that was altered, taken o
 
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
+from ml.store import durable
 from ml.store.private import opener
 from server_gui.core.recording.errors import SpoolUnusable
 
@@ -74,6 +75,7 @@ class Receipts:
 
     def __init__(self, file: Path) -> None:
         self.file = file
+        self._tables: dict[str, dict[str, str]] | None = None  # of each store; None: nobody has looked yet
 
     def add(self, receipt: Receipt) -> None:
         """Write it; on the disk when this returns.
@@ -93,10 +95,26 @@ class Receipts:
                 out.flush()
                 os.fsync(out.fileno())
             if not known:
-                _sync(self.file.parent)
+                durable.sync(self.file.parent)
+            if self._tables is not None:
+                _see(self._tables, receipt)
         except OSError as error:
             reason = error.strerror or error
             raise SpoolUnusable(f"the spool's receipts {self.file} cannot be written: {reason}") from error
+
+    def begun_anew(self, url: str, parts: Iterable[Part]) -> dict[str, str]:
+        """Where others went to another table than these parts: the location, and what that was called."""
+        if self._tables is None:
+            self._tables = {}
+            for receipt in self.whole():
+                _see(self._tables, receipt)
+        known = self._tables.get(url, {})
+        now = ((part.location, part.table) for part in parts)
+        return {where: known[where] for where, table in now if known.get(where, table) != table}
+
+    def whole(self) -> Iterator[Receipt]:
+        """Those that are as they were written, oldest first."""
+        return (each for each in self.all() if isinstance(each, Receipt))
 
     def newest(self) -> Receipt | None:
         """The last one, where it can be read."""
@@ -119,6 +137,15 @@ class Receipts:
                     yield Altered(number, found) if isinstance(found, str) else found
         except FileNotFoundError:
             return
+
+
+def _see(tables: dict[str, dict[str, str]], receipt: Receipt) -> None:
+    """What the store's tables are called now; where one was begun anew, the others may be, too."""
+    now = {part.location: part.table for part in receipt.parts if part.rows}
+    known = tables.setdefault(receipt.url, {})
+    if any(known.get(where, table) != table for where, table in now.items()):
+        known.clear()
+    known |= now
 
 
 def _read(line: bytes, before: int | None) -> Receipt | str:
@@ -154,11 +181,3 @@ def _tail(descriptor: int) -> tuple[int, bytes]:
         if end and (start or not begin):
             return begin + end, data[start:end]
     return 0, b""
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -51,6 +51,9 @@ class AlarmKind(Enum):
 
     OVERFLOW = "overflow"  # rows came faster than the disk takes them
     DISK_FULL = "disk_full"  # recording has stopped until there is room
+    UNCLEARED = (
+        "uncleared"  # nobody can say or see to it that the disk has room; it goes on as long as it has
+    )
     SPOOL_FAILED = "spool_failed"  # the spool cannot be written; what waits is tried again
     BROKEN = "broken"  # a mistake of ours: what was to be kept then is lost; it goes on
 
@@ -422,8 +425,12 @@ class Recorder:
         now_s = time.monotonic()
         if now_s - self._looked_s >= AGAIN_S:
             self._looked_s = now_s
-            self._roomy = self._spool.make_room()
+            try:
+                self._roomy, uncleared = self._spool.make_room(), None
+            except SpoolUnusable as error:  # a commit that finds none says so itself
+                self._roomy, uncleared = True, f"{error}; recording goes on as long as there is room"
             full = f"recording has stopped: the disk of {self._spool.folder} is nearly full; make room there"
+            self._alarm(AlarmKind.UNCLEARED, uncleared)
             self._alarm(AlarmKind.DISK_FULL, None if self._roomy else full)
         return self._roomy
 

@@ -43,7 +43,8 @@ _COLUMNS: Final = "robot, connection, stream, seq, row, rows, session, layout, d
 DATA: Final = 8  # which of them is its rows
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
-_DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+# The last one: a statement of ours is refused, because the tables are not called as we have called them.
+_DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 _encoder = msgspec.msgpack.Encoder()
 _layout_decoder = msgspec.msgpack.Decoder(Layout)

@@ -1,37 +1,23 @@
-"""The spool: a folder where everything recorded is safe on this disk until it is in the store.
-
-`00000007.db` is a segment; the highest number is written, all others are frozen, and a segment's number is
-the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in the store and goes when room
-is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are not in the store, and it
-stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
-somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
-`00000004.cut.db` is a copy of a segment whose log was damaged, as it was found: commits at its end are lost.
-`receipts.jsonl` says what of each segment is in the store (receipts.py).
-"""
+"""The spool: a folder where everything recorded is safe on this disk until it is in the store."""
 
 import contextlib
-import fcntl
 import logging
-import os
-import re
 import shutil
 import sqlite3
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from enum import Enum
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Final, Self
+from typing import Final, Self
 
 import msgspec
 
 from ml.store import durable
-from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
-from server_gui.core.recording.segment import PAGE_BYTES, SUFFIXES, Segment
-from server_gui.core.recording.wal import lost_commits
+from server_gui.core.recording.segment import Segment
+from server_gui.core.recording.spool_files import Files, Kept, has_log, take, writing
 
 log = logging.getLogger(__name__)
 
@@ -47,16 +33,6 @@ UNFIT: Final = (  # what a segment raises because of the rows themselves
     TypeError,
     ValueError,
 )
-_NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
-
-
-class Kept(Enum):
-    """What has become of a segment; as its file's name says."""
-
-    WAITING = ""
-    UPLOADED = ".uploaded"
-    DAMAGED = ".damaged"
-    CUT = ".cut"  # not the segment itself, but a copy for somebody to look at
 
 
 def _free_bytes(folder: Path) -> int:
@@ -84,21 +60,23 @@ class Spool:
         free_bytes: Callable[[Path], int] = _free_bytes,
     ) -> None:
         self.folder = folder
+        self._files = Files(folder)
         self._reserve_bytes = reserve_bytes
         self._keep_bytes = keep_bytes
         self._free_bytes = free_bytes
+        self.anew: list[str] = []  # in words, where a store is another one than batches went to
         self.missing: str | None = None  # in words, where files that were there are not any more
-        self._lock = _take(folder)
+        self._lock = take(folder)
         try:
-            with _writing(folder):
-                self.id = self._identify()
+            with writing(folder):
+                self.id = self._files.identify()
                 durable.synchronise([folder / "id"])  # with the names of the folders above it
                 self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
                 self.receipts = Receipts(folder / RECEIPTS)
                 self._writers = {self.id}
                 self._settled: set[int] = set()  # numbers of which nothing is to be told any more
-                self._look_at_names()
-                self._look_at_logs()
+                self._files.finish_names()
+                self._files.keep_damaged_logs()
                 self._heads = self._known_heads()
                 self._began_ns: int | None = None
                 self._current = self._resume()
@@ -130,7 +108,7 @@ class Spool:
             SpoolUnusable: nothing was kept; the message says why.
 
         """
-        with _writing(self.folder):
+        with writing(self.folder):
             try:
                 self._current.append(runs, records, heads or {})
             except UNFIT as error:
@@ -176,7 +154,7 @@ class Spool:
     def waiting(self) -> list[int]:
         """Segments that are frozen and not uploaded, oldest first."""
         written = self._current.number  # a higher one may be in the making
-        return [number for number in self._all(Kept.WAITING) if number < written]
+        return [number for number in self._files.all_of(Kept.WAITING) if number < written]
 
     def read(self, number: int) -> Segment:
         """A frozen segment; close it after use.
@@ -185,7 +163,7 @@ class Spool:
             Damaged: it cannot be read, or holds nothing: one that holds nothing is never frozen.
 
         """
-        segment = Segment(self._path(number), number, written=True)
+        segment = Segment(self._files.path(number), number, written=True)
         try:
             if not (segment.rows or segment.cut_commits):
                 raise Damaged(f"the spool's file {segment.path} is damaged: what was written to it is gone")
@@ -201,17 +179,17 @@ class Spool:
             SpoolUnusable: it waits for upload as before.
 
         """
-        self._name(number, Kept.UPLOADED)
+        self._files.rename(number, Kept.UPLOADED)
 
     def set_aside(self, number: int) -> Path:
         """The segment cannot be read: it waits no longer, so that those after it are uploaded; its file."""
-        self._name(number, Kept.DAMAGED)
-        return self._path(number, Kept.DAMAGED)
+        self._files.rename(number, Kept.DAMAGED)
+        return self._files.path(number, Kept.DAMAGED)
 
     def damaged(self) -> list[Path]:
         """Files that were set aside and are still there."""
         wanted = (Kept.DAMAGED, Kept.CUT)
-        return [self._path(number, kept) for number, kept in self._segments() if kept in wanted]
+        return [self._files.path(number, kept) for number, kept in self._files.segments() if kept in wanted]
 
     def untold(self) -> dict[int, str]:
         """Batches that are lost as a whole, in words, and of which there is no receipt: set aside, or gone.
@@ -219,7 +197,7 @@ class Spool:
         Numbers are given one after another, and uploaded segments go oldest first: one that is skipped was
         a batch, unless its receipt says that it was uploaded.
         """
-        files = self._own()
+        files = self._files.own()
         receipt = self.receipts.newest()
         kept = [number for number, kept in files if kept is not Kept.DAMAGED]
         first = min([*kept, *([receipt.batch + 1] if receipt else [])], default=0)
@@ -229,7 +207,7 @@ class Spool:
             self._settled |= found & {each.batch for each in self.receipts.all() if isinstance(each, Receipt)}
         return {
             number: f"batch {number} of the spool {self.folder} cannot be read, and what it held is lost: "
-            f"its file is kept as {self._path(number, Kept.DAMAGED).name}"
+            f"its file is kept as {self._files.path(number, Kept.DAMAGED).name}"
             if number in aside
             else f"batch {number} of the spool {self.folder} is gone: its file is not there, and no receipt "
             "says that it was uploaded"
@@ -238,7 +216,7 @@ class Spool:
 
     def is_aside(self, number: int) -> bool:
         """Whether the segment was set aside, and is still there."""
-        return self._path(number, Kept.DAMAGED).exists()
+        return self._files.path(number, Kept.DAMAGED).exists()
 
     def told(self, number: int) -> None:
         """The store knows that this batch is lost."""
@@ -247,130 +225,59 @@ class Spool:
     def robots_beside(self, number: int) -> set[str]:
         """Whose rows a batch that is lost may have had: those that the ones before and after it know."""
         found: set[str] = set()
-        for beside, kept in self._own():
+        for beside, kept in self._files.own():
             if abs(beside - number) == 1 and kept is not Kept.DAMAGED and beside < self._current.number:
                 with (
                     contextlib.suppress(SpoolUnusable),
-                    contextlib.closing(Segment(self._path(beside, kept), beside, written=True)) as segment,
+                    contextlib.closing(
+                        Segment(self._files.path(beside, kept), beside, written=True)
+                    ) as segment,
                 ):
                     found |= segment.robots()
         return found
 
     def backlog_bytes(self) -> int:
         """What waits for upload, with what is being written."""
-        return sum(Segment.size_bytes(self._path(number)) for number in self._all(Kept.WAITING))
+        return sum(
+            Segment.size_bytes(self._files.path(number)) for number in self._files.all_of(Kept.WAITING)
+        )
 
     def make_room(self) -> bool:
-        """Remove the oldest uploaded segments as far as needed; False where the disk is still nearly full."""
-        paths = [self._path(number, Kept.UPLOADED) for number in self._all(Kept.UPLOADED)]
-        kept = sum(map(Segment.size_bytes, paths))
-        for path in paths:
-            if kept <= self._keep_bytes and self._roomy():
-                break
-            kept -= Segment.size_bytes(path)
-            Segment.remove(path)
-        return self._roomy()
+        """Remove the oldest uploaded segments as far as needed; False where the disk is still nearly full.
+
+        Raises:
+            SpoolUnusable: nobody knows how full it is, or a file cannot be removed.
+
+        """
+        try:
+            paths = [self._files.path(number, Kept.UPLOADED) for number in self._files.all_of(Kept.UPLOADED)]
+            kept = sum(map(Segment.size_bytes, paths))
+            for path in paths:
+                if kept <= self._keep_bytes and self._roomy():
+                    break
+                kept -= Segment.size_bytes(path)
+                Segment.remove(path)
+            return self._roomy()
+        except OSError as error:
+            reason = error.strerror or error
+            raise SpoolUnusable(f"no room can be made in the spool {self.folder}: {reason}") from error
 
     def _roomy(self) -> bool:
         return self._free_bytes(self.folder) >= self._reserve_bytes
 
-    # --- files
-
-    def _path(self, number: int, kept: Kept = Kept.WAITING) -> Path:
-        return self.folder / f"{number:08}{kept.value}.db"
-
-    def _name(self, number: int, kept: Kept) -> None:
-        """Call a segment that has waited by another name, with its log, which a reader may keep open."""
-        with _writing(self.folder):
-            for suffix in SUFFIXES:
-                file = self._path(number).with_name(self._path(number).name + suffix)
-                if file.exists():
-                    file.rename(file.with_name(self._path(number, kept).name + suffix))
-            _sync(self.folder)
-
-    def _look_at_names(self) -> None:
-        """What was cut off when a segment got another name goes on."""
-        for number, kept in self._own():
-            file = self._path(number)
-            left = file.with_name(f"{file.name}-wal").exists() and not file.exists()
-            if left and kept is not Kept.WAITING:
-                self._name(number, kept)
-
-    def _segments(self) -> list[tuple[int, Kept]]:
-        names = (_NAME.fullmatch(path.name) for path in self.folder.iterdir())
-        found = [(int(name[1]), Kept(name[2] or "")) for name in names if name]
-        return sorted(found, key=lambda each: (each[0], each[1].value))
-
-    def _own(self) -> list[tuple[int, Kept]]:
-        """The segments themselves, without copies."""
-        return [(number, kept) for number, kept in self._segments() if kept is not Kept.CUT]
-
-    def _all(self, wanted: Kept) -> list[int]:
-        return [number for number, kept in self._segments() if kept is wanted]
-
-    def _identify(self) -> str:
-        """The name of this spool at the store, given once."""
-        file = self.folder / "id"
-        if not file.exists():
-            draft = file.with_name("id.draft")
-            with open(draft, "w", opener=opener) as out:
-                out.write(f"{uuid.uuid4()}\n")
-                out.flush()
-                os.fsync(out.fileno())
-            draft.rename(file)
-            _sync(self.folder)
-        return file.read_text().strip()
-
-    def _look_at_logs(self) -> None:
-        """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
-        for number in self._all(Kept.WAITING):
-            log_ = self._path(number).with_name(f"{self._path(number).name}-wal")
-            if lost_commits(log_, PAGE_BYTES) and number not in self._all(Kept.CUT):
-                self._copy(number)
-        for number in sorted(set(self._all(Kept.CUT)) & set(self._all(Kept.WAITING))):
-            self._cut(number)
-
-    def _copy(self, number: int) -> None:
-        """The database last: where that is there, all of the copy is."""
-        for suffix in ("-wal", ""):
-            source = self._path(number).with_name(self._path(number).name + suffix)
-            target = self._path(number, Kept.CUT).with_name(self._path(number, Kept.CUT).name + suffix)
-            draft = target.with_name(f"{target.name}.draft")
-            with source.open("rb") as content, open(draft, "wb", opener=opener) as out:
-                shutil.copyfileobj(content, out)
-                out.flush()
-                os.fsync(out.fileno())
-            draft.rename(target)
-        _sync(self.folder)
-
-    def _cut(self, number: int) -> None:
-        """Let the segment itself tell what it has lost, when it goes to the store."""
-        copy = self._path(number, Kept.CUT)
-        lost = lost_commits(copy.with_name(f"{copy.name}-wal"), PAGE_BYTES)
-        with (
-            contextlib.suppress(Damaged),  # then it is set aside as a whole
-            contextlib.closing(Segment(self._path(number), number, written=True)) as segment,
-        ):
-            if not segment.cut_commits:
-                segment.cut(lost)
-                log.error(
-                    "the log of batch %d was damaged: up to %d commits are lost; %s is a copy of both",
-                    number, lost, copy,
-                )  # fmt: skip
-
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}
         # Each begins with what the ones before it knew; the newest may have been cut off at its making.
-        newest = self._own()[-2:]
+        newest = self._files.own()[-2:]
         for number, kept in newest:
             if kept is not Kept.DAMAGED:
-                written = (number, kept) != newest[-1] or _has_log(self._path(number, kept))
+                written = (number, kept) != newest[-1] or has_log(self._files.path(number, kept))
                 heads |= self._heads_of(number, kept, written=written)
         return heads
 
     def _heads_of(self, number: int, kept: Kept, *, written: bool) -> dict[str, JournalHead]:
         try:
-            found = Segment(self._path(number, kept), number, written=written)
+            found = Segment(self._files.path(number, kept), number, written=written)
             with contextlib.closing(found) as segment:
                 self._writers.add(segment.writer or self.id)
                 return segment.heads()
@@ -381,7 +288,7 @@ class Spool:
 
     def _resume(self) -> Segment:
         """The segment to write now: a new one, unless the newest is still empty."""
-        newest, kept = self._own()[-1] if self._own() else (0, Kept.UPLOADED)
+        newest, kept = self._files.own()[-1] if self._files.own() else (0, Kept.UPLOADED)
         receipt = self.receipts.newest()
         known = receipt.batch if receipt else 0
         if known > newest:
@@ -399,58 +306,15 @@ class Spool:
         return self._begin(newest + 1)
 
     def _begin(self, number: int) -> Segment:
-        segment = Segment(self._path(number), number)
+        segment = Segment(self._files.path(number), number)
         try:
-            with _writing(self.folder):
+            with writing(self.folder):
                 if not segment.rows:
                     segment.name(self.writer)
                 segment.append((), (), self._heads)
-                _sync(self.folder)
+                durable.sync(self.folder)
         except BaseException:
             segment.close()
             raise
         self._began_ns = None
         return segment
-
-
-@contextlib.contextmanager
-def _writing(folder: Path) -> Iterator[None]:
-    """Turn what the disk refuses within the block into `SpoolUnusable`."""
-    try:
-        yield
-    except (sqlite3.Error, OSError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise SpoolUnusable(f"the spool {folder} cannot be written: {reason}") from error
-
-
-def _has_log(file: Path) -> bool:
-    log_ = file.with_name(f"{file.name}-wal")
-    return log_.exists() and log_.stat().st_size > 0
-
-
-def _take(folder: Path) -> IO[bytes]:
-    """The folder's lock, which ends with the process, however that ends."""
-    try:
-        closed_folder(folder)
-        lock = open(folder / "lock", "ab", opener=opener)  # noqa: SIM115 - held as long as the spool
-    except OSError as error:
-        raise SpoolUnusable(
-            f"the spool's folder {folder} cannot be used: {error.strerror or error}; "
-            'give another one with spool = "…" in [recorder] of the server\'s file'
-        ) from error
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        lock.close()
-        raise SpoolUnusable(
-            f"another server records into {folder}; end it first, or give this one another folder"
-        ) from error
-    return lock
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -3,13 +3,14 @@
 import contextlib
 import functools
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import msgspec
 import pyarrow as pa
 
+from gateway.cli.text import counted
 from ml.store.errors import NoSuchTable, translated
 from ml.store.store import Store
 from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
@@ -53,6 +54,7 @@ def send(spool: Spool, number: int, store: Store) -> None:
         text = f"{error}; it is kept as {aside.name}, and is not in the store as a whole"
         _tell(spool, number, text, store)
         raise Damaged(text) from error
+    _tell_anew(spool, number, sent.parts, store)
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
     if sent.is_damaged:
         aside = spool.set_aside(number)
@@ -76,15 +78,39 @@ def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
     One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
     """
     lost = _Lost(_WHOLE, text, tuple(sorted(spool.robots_beside(number))), None, None, {"batch": number})
-    origin = {"spool": f"{spool.id}/lost", "batch": number}
-    now_ns = Moment.now().utc_ns
-    rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
-    again = functools.partial(rows.to_reader, None)
-    new = store.append(EVENTS, EVENTS.name, rows.schema, again, f"{spool.id}/lost.{number}", 1)
+    new = _append(store, lost, f"{spool.id}/lost", number, number)
     if spool.is_aside(number):
         spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
     spool.told(number)
     return new
+
+
+def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -> None:
+    """An event, and a word in the spool, where the store is another one than batches of the spool went to."""
+    gone = sorted(spool.receipts.begun_anew(store.url, parts).items())
+    if not gone:
+        return
+    sent = [each for each in spool.receipts.whole() if each.url == store.url]
+    count = len({(each.writer, each.batch) for each in sent})
+    robots = {part.stream.robot for each in sent for part in each.parts if part.stream}
+    text = (
+        f"{counted(count, 'batch', 'batches')} of the spool {spool.folder} went to {store.url}, and that is "
+        f"not the same store any more ({gone[0][0]} was begun anew with batch {number}): it was emptied, or "
+        "another one is in its place. What is recorded goes to this one now; bring the earlier one back, or "
+        "end the collector and run gwrms cloud mend, which brings again what the spool still has"
+    )
+    lost = _Lost(_WHOLE, text, tuple(sorted(robots)), None, None, {"batches": count})
+    _append(store, lost, f"{spool.id}/anew", number, gone[0][1])
+    spool.anew.append(text)
+
+
+def _append(store: Store, lost: "_Lost", writer: str, number: int, named: object) -> bool:
+    """The events that tell a loss, once; False where the store has them already."""
+    origin = {"spool": writer, "batch": number}
+    now_ns = Moment.now().utc_ns
+    rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
+    again = functools.partial(rows.to_reader, None)
+    return store.append(EVENTS, EVENTS.name, rows.schema, again, f"{writer}.{named}", 1)
 
 
 def upload(segment: Segment, spool: str, store: Store) -> Sent:
@@ -129,7 +155,7 @@ def ahead(spool: Spool, store: Store) -> list[str]:
         with contextlib.suppress(NoSuchTable):
             store.mend(location)
             table = store.table(location)
-            newest = max(table.transaction_version(each) or 0 for each in writers)
+            newest = max((table.transaction_version(each) or 0 for each in writers), default=0)
             if newest >= spool.first:
                 found.append(
                     f"{store.url}/{location} has batch {newest} of the spool {spool.folder}, which had only "
@@ -186,13 +212,13 @@ def _complete(
     batch: int,
     look: Callable[[], list[pa.RecordBatch]],
 ) -> None:
-    """Bring what the table lacks of a batch whose number it knows."""
-    rows = look()
+    """Bring what the table lacks of a batch whose number it knows, but for what retention has removed."""
+    rows = missing_rows.newer(look(), store, location)
     if not rows:
         return
     named = missing_rows.name(writer, batch, rows)
     new = store.append(table, location, rows[0].schema, lambda: iter(rows), named, 1)
-    if not new and look():
+    if not new and missing_rows.newer(look(), store, location):
         count = sum(each.num_rows for each in rows)
         raise Contradicted(
             f"{store.url}/{location} had {count} rows of batch {batch}, which were removed since"

@@ -1,15 +1,17 @@
 """The uploader: a thread that brings frozen segments into the store, again and again until they are there."""
 
+import contextlib
 import logging
 import sqlite3
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Self
 
+from gateway.cli.text import counted
 from gateway.client.backoff import Backoff
-from ml.store.errors import StoreError
+from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.store import Store
 from server_gui.core.recording.compaction import Compacting
 from server_gui.core.recording.errors import Damaged, RecordingError
@@ -35,7 +37,7 @@ class UploaderState:
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
-    lost: tuple[str, ...] = ()  # batches that are lost as a whole, in words
+    lost: tuple[str, ...] = ()  # batches that are lost as a whole, or a store that is no more, in words
     ahead: tuple[str, ...] = ()  # where the store has what this spool has lost, in words
 
 
@@ -60,6 +62,7 @@ class Uploader:
         self._wanted = wanted
         self._compacting = compacting
         self._store: Store | None = None
+        self._left: list[str] = []  # what could not be done this time, and kept nothing else from being done
         self._compared = False  # whether the store is ahead of the spool
         self._ending = threading.Event()
         self._asked = threading.Event()
@@ -120,45 +123,63 @@ class Uploader:
             self._compacting.look()
 
     def _empty(self, asked: bool) -> bool:
-        """Upload what waits; False where that failed."""
-        waiting = self._spool.waiting()
-        self._tell(waiting)
+        """Upload what waits; False where not all of it could be."""
+        self._left = []
+        what = "what waits in the spool is not known"
         try:
-            self._look(told=asked or self._wanted())
-        except Exception as error:  # noqa: BLE001 - as below
-            return self._failed("what is lost is not told in the store yet", error)
-        for done, number in enumerate(waiting, 1):
-            if self._ending.is_set() or not (asked or self._wanted()):
-                return True
-            self.worker.beat()
-            try:
-                self._upload(number)
-            except Damaged as error:
-                log.error("batch %d is not uploaded as a whole: %s", number, error)
-                self._tell(waiting[done:])
-                continue
-            except Exception as error:  # noqa: BLE001 - uploading goes on, whatever a library raises
-                return self._failed(f"batch {number} is not in the store yet", error)
-            self._tell(waiting[done:])
-            log.info(
-                "batch %d is in the store after %.1f s, %d wait",
-                number,
-                self.state.upload_s,
-                len(waiting) - done,
-            )
-        return True
+            waiting = self._tell()
+            what = "what is lost is not told in the store yet"
+            with self._alone(what):
+                self._look(told=asked or self._wanted())
+            for number in waiting:
+                if self._ending.is_set() or not (asked or self._wanted()):
+                    break
+                self.worker.beat()
+                what = f"batch {number} is not in the store yet"
+                store = self._store = self._store or self._reach()
+                with self._alone(what):
+                    self._upload(number, store)
+                self._tell()
+        except Exception as error:  # noqa: BLE001 - uploading goes on, whatever a library raises
+            return self._failed(what, error)
+        if self._left:
+            log.warning("%s", self._problem)
+        return not self._left
+
+    @contextlib.contextmanager
+    def _alone(self, what: str) -> Iterator[None]:
+        """Keep what is wrong with one batch alone from the others."""
+        try:
+            yield
+        except (StoreUnreachable, StoreRefused):
+            raise
+        except StoreError as error:  # as where a file of the table is gone that this one is in
+            self._store = None
+            self._left.append(f"{what}: {error}")
+            self.state = replace(self.state, problem=self._problem)
+
+    @property
+    def _problem(self) -> str | None:
+        """What could not be done this time, in words."""
+        if not self._left:
+            return None
+        others = len(self._left) - 1
+        return self._left[0] + (f" (and {counted(others, 'other')} likewise)" if others else "")
 
     def _look(self, *, told: bool) -> None:
         """Alarm for batches that are lost as a whole, and have them `told` in the store."""
         lost = self._spool.untold()
-        for text in lost.values():
-            if text not in self.state.lost:
-                log.error("%s", text)
-                self.state = replace(self.state, lost=(*self.state.lost, text))
+        self._alarm(lost.values())
         if lost and told:
             self._store = self._store or self._reach()
             lost_batches(self._spool, self._store)
-            self.state = replace(self.state, problem=None)
+            self.state = replace(self.state, problem=self._problem)
+
+    def _alarm(self, texts: Iterable[str]) -> None:
+        for text in texts:
+            if text not in self.state.lost:
+                log.error("%s", text)
+                self.state = replace(self.state, lost=(*self.state.lost, text))
 
     def _failed(self, what: str, error: Exception) -> bool:
         self._store = None
@@ -167,12 +188,18 @@ class Uploader:
         self.state = replace(self.state, problem=problem)
         return False
 
-    def _upload(self, number: int) -> None:
+    def _upload(self, number: int, store: Store) -> None:
         began_s = time.monotonic()
-        self._store = self._store or self._reach()
-        send(self._spool, number, self._store)
-        took_s = time.monotonic() - began_s
-        self.state = replace(self.state, uploaded=self.state.uploaded + 1, upload_s=took_s, problem=None)
+        try:
+            send(self._spool, number, store)
+        except Damaged as error:
+            log.error("batch %d is not uploaded as a whole: %s", number, error)
+            return
+        finally:
+            self._alarm(self._spool.anew)
+        took_s, uploaded = time.monotonic() - began_s, self.state.uploaded + 1
+        self.state = replace(self.state, uploaded=uploaded, upload_s=took_s, problem=self._problem)
+        log.info("batch %d is in the store after %.1f s", number, took_s)
 
     def _reach(self) -> Store:
         store = self._connect()
@@ -190,10 +217,12 @@ class Uploader:
         self.state = replace(self.state, ahead=found)
         self._compared = True
 
-    def _tell(self, waiting: list[int]) -> None:
-        backlog = self._spool.backlog_bytes()
+    def _tell(self) -> list[int]:
+        """How much waits now, and which batches."""
+        waiting, backlog = self._spool.waiting(), self._spool.backlog_bytes()
         damaged = tuple(map(str, self._spool.damaged()))
         self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog, damaged=damaged)
+        return waiting
 
 
 def _unknown(error: Exception) -> str:

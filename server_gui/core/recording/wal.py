@@ -1,12 +1,15 @@
 """What SQLite would pass over in silence: commits in a write-ahead log behind a place that is damaged.
 
 A log is read up to the first frame whose checksum is wrong, as if nothing had followed. Where frames of the
-same log follow, they were written, and all but the last commit of them had been synchronised. Layout and
-checksums: https://sqlite.org/fileformat2.html#the_write_ahead_log.
+same log follow, they were written, and all but the last commit of them had been synchronised. The last one
+had been where the log's index says so, of which SQLite writes the header only then: it is there after a kill,
+and after a power cut perhaps an older one or none. Layout and checksums:
+https://sqlite.org/fileformat2.html#the_write_ahead_log, https://sqlite.org/walformat.html#the_wal_index_header.
 """
 
 import functools
 import struct
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
@@ -16,6 +19,8 @@ import numpy.typing as npt
 
 HEADER: Final = struct.Struct(">8I")  # magic, version, page size, checkpoint, two salts, two checksums
 FRAME: Final = struct.Struct(">6I")  # page, size of the database after a commit, two salts, two checksums
+INDEX: Final = struct.Struct("=16xI12x8s2I")  # frames, the log's salts, two checksums; it is there twice
+_SALTS: Final = struct.Struct(">2I")
 _MAGIC: Final = {0x377F0682: "<u4", 0x377F0683: ">u4"}  # how its checksums take words
 _SUM_BYTES: Final = 8
 _SUMMED: Final = 8  # bytes of a frame's header that its checksum is of
@@ -34,30 +39,58 @@ class _Frame(NamedTuple):
 def lost_commits(log: Path, page_bytes: int) -> int:
     """How many commits of this log SQLite will not read, because something before or in them is damaged.
 
-    The last of them may have been under way when the power went: then nobody had been told that it is kept.
+    Without the newest, where nothing says that it was synchronised: it was under way when the power went.
     0 where there is no log, or all of it is whole. `page_bytes` is for a log whose header is damaged.
     """
     try:
         with log.open("rb") as opened:
-            return _lost(opened, page_bytes)
+            lost = _lost(opened, page_bytes)
     except FileNotFoundError:
         return 0
+    if lost and not _was_synchronised(log, lost[-1]):
+        lost.pop()
+    return len(lost)
 
 
-def _lost(log: BinaryIO, page_bytes: int) -> int:
+class _Place(NamedTuple):
+    """Where in a log a commit ends: with which of its frames, counted from 1."""
+
+    frame: int
+    salts: Pair
+
+
+def _lost(log: BinaryIO, page_bytes: int) -> list[_Place]:
     raw = log.read(HEADER.size)
     if len(raw) < HEADER.size:
-        return 0
+        return []
     magic, _, told_bytes, _, *rest = HEADER.unpack(raw)
     salts, known = (rest[0], rest[1]), (rest[2], rest[3])
     order = _MAGIC.get(magic, "")
     is_whole = bool(order) and _sum((0, 0), raw[:-_SUM_BYTES], order) == known
-    lost = 0
-    for frame in _frames(log, told_bytes if is_whole else page_bytes):
+    lost = []
+    for number, frame in enumerate(_frames(log, told_bytes if is_whole else page_bytes), 1):
         is_whole = is_whole and frame.salts == salts and _sum(known, frame.data, order) == frame.sum
         known = frame.sum
-        lost += not is_whole and frame.is_commit and _alike(frame.salts, salts)
+        if not is_whole and frame.is_commit and _alike(frame.salts, salts):
+            lost.append(_Place(number, frame.salts))
     return lost
+
+
+def _was_synchronised(log: Path, commit: _Place) -> bool:
+    """Whether the log's index, as it was left, knows this commit."""
+    try:
+        headers = log.with_name(f"{log.name.removesuffix('-wal')}-shm").read_bytes()[: 2 * INDEX.size]
+    except FileNotFoundError:
+        return False
+    found = [headers[: INDEX.size], headers[INDEX.size :]]
+    return any(len(each) == INDEX.size and _knows(each, commit) for each in found)
+
+
+def _knows(header: bytes, commit: _Place) -> bool:
+    frames, salts, *known = INDEX.unpack(header)
+    words = "<u4" if sys.byteorder == "little" else ">u4"
+    is_whole = _sum((0, 0), header[:-_SUM_BYTES], words) == tuple(known)
+    return is_whole and frames >= commit.frame and _alike(_SALTS.unpack(salts), commit.salts)
 
 
 def _alike(one: Pair, other: Pair) -> bool:

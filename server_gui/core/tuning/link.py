@@ -29,11 +29,20 @@ class Link:
     the link has gone, and with it the lease: both in the network's thread.
     """
 
-    def __init__(self, network: Network, address: Address, tell: Tell, dropped: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        network: Network,
+        address: Address,
+        tell: Tell,
+        dropped: Callable[[], None],
+        client: str = "gwrms gui",
+        processes: ResourceSnapshotParams = PROCESSES,
+    ) -> None:
         self._network = network
         self._tell = tell
         self._dropped = dropped
-        self._client = Client(address, LinkSettings(client="gwrms gui"), self._state_changed)
+        self._processes = processes
+        self._client = Client(address, LinkSettings(client=client), self._state_changed)
         self._arriving = Arriving()
         self._processes_wanted = asyncio.Event()
 
@@ -99,7 +108,7 @@ class Link:
 
     async def _look(self) -> None:
         try:
-            snapshot = await self._client.resources(PROCESSES)
+            snapshot = await self._client.resources(self._processes)
             found = Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns())
             self._arriving.check(found)
         except ClientError as error:

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.cli.plain import plain
 from gateway.cli.text import size
+from gateway.plain import plain
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
-from gateway.cli.plain import plain
+from gateway.plain import plain
 
 
 def ask_open(

@@ -1,7 +1,7 @@
 """Insoles that send text; the first byte says which description it is read by."""
 
-from drivers.insole.csv_lines import InsoleCsvParser
 from drivers.insole.description import CsvDescription, Flag
+from drivers.insole.formats.insole_csv import InsoleCsvParser
 from tests.fuzz.serial_streams import judge
 
 TOKENS = (
@@ -18,7 +18,7 @@ TOKENS = (
     b"-1",
     b"0x1",
 )
-MODULES = ("drivers.insole.csv_lines", "drivers.parsing")
+MODULES = ("drivers.insole.formats.insole_csv", "drivers.parsing")
 DESCRIPTIONS = (
     CsvDescription(),
     CsvDescription(

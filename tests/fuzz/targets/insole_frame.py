@@ -5,11 +5,11 @@ from typing import Any
 import msgspec
 
 from drivers.insole.description import FrameDescription
-from drivers.insole.fixed_frame import CHECKSUMS, InsoleFrameParser
+from drivers.insole.formats.insole_frame import CHECKSUMS, InsoleFrameParser
 from tests.fuzz.serial_streams import judge
 
 TOKENS = (b"\x5a\x5a", b"\xaa", b"\x02", b"\x0f\xf0", b"\0\0\x80\x3f", b"\0\0\xc0\x7f", b"\r\n")
-MODULES = ("drivers.insole.fixed_frame", "drivers.parsing")
+MODULES = ("drivers.insole.formats.insole_frame", "drivers.parsing")
 
 
 def _description(checksum: str, more: dict[str, Any]) -> FrameDescription:

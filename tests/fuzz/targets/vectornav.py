@@ -1,6 +1,6 @@
 """ASCII and binary messages of VectorNav devices, in one stream."""
 
-from drivers.imu.vectornav import VectornavParser
+from drivers.imu.formats.vectornav import VectornavParser
 from tests.fuzz.serial_streams import judge
 
 TOKENS = (
@@ -15,7 +15,7 @@ TOKENS = (
     b"1e999",
     b"-0.1,",
 )
-MODULES = ("drivers.imu.vectornav", "drivers.parsing")
+MODULES = ("drivers.imu.formats.vectornav", "drivers.parsing")
 
 
 def fuzz(data: bytes) -> None:

@@ -1,5 +1,6 @@
 """A node's life: late boot, boot-up again, heartbeat, EMCY, and the words for where it is stuck."""
 
+import contextlib
 import time
 from collections.abc import Callable
 
@@ -88,6 +89,23 @@ def test_after_an_object_that_is_not_answered_no_other_is_asked_for(
         assert isinstance(found[1], DeviceTimeout)
         assert len(found) == 2
         assert sum(data[1:3] == b"\x01\x20" for _can_id, data in fake.seen) == 1
+        gait.stop()
+
+
+def test_when_a_node_answered_last_counts_refusals_and_no_silence(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    objects = {**IDENTITY, (0x2001, 0): b"\x90\x01"}
+    with FakeNode(channel, 5, objects, deaf_to={(0x2009, 0)}):
+        gait = device(bus, describe)
+        assert gait.node.answered_ns == 0
+        gait.start()
+        until(lambda: gait.node.ready)
+        for index, answers in ((0x2001, True), (0x2009, False), (0x2008, True)):
+            asked_ns = time.monotonic_ns()
+            with contextlib.suppress(DriverError):
+                gait.node.upload(index, 0).result(WAIT_S)
+            assert (gait.node.answered_ns > asked_ns) is answers
         gait.stop()
 
 

@@ -3,22 +3,23 @@
 import io
 import json
 import logging
-from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
-from gateway.cli.plain import json_plain, plain
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import Robot
 from gateway.client.errors import RemoteError
+from gateway.plain import json_plain, plain
 from gateway.wire.resource import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
 from server_gui.cli.collect import PlainLines
+from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Failed, Resources
-from server_gui.core.follow.robot import Robot as Known
+from server_gui.core.follow.news import News
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.panels import WIDE, footer, header, resources
 from tests.fake_robot import FakeRobot, Refusal
+from tests.support.desk import FakeCommands
 
 BAD = "zz[/b]\x1b[2J\x9b31m\r\n\u202egnp.exe\x07"
 SHOWN = "zz[/b]\\x1b[2J\\x9b31m\\r\\n\\u202egnp.exe\\x07"
@@ -74,16 +75,16 @@ def test_what_a_robot_refuses_with_commands_no_terminal() -> None:
 
 
 def test_the_terminal_shows_a_process_and_a_problem_as_what_they_are() -> None:
-    known = Known()
+    station = Station("exo-01", BAD, FakeCommands(), lambda call: call(), News())
     processes = [ProcessUse(1, BAD, 1.0, 1), ProcessUse(2, "[red]a", 1.0, 1)]
     usage = (CpuUse(1.0, [1.0], [0.1]), MemoryUse(4, 2, 2, 0), GatewayUse(1.0, 1))
-    known.apply(Resources(ResourceSnapshot(1, *usage, processes), None, 1))
-    known.apply(Failed("a look", BAD))
+    looks = [ResourceSnapshot(1, *usage), ResourceSnapshot(1, *usage, processes)]
+    station.take([*(Resources(look, None, 1) for look in looks), Failed("a look", BAD)])
     console = Console(file=io.StringIO(), width=140, color_system=None)
     for part in (
-        header(known, BAD, WIDE),
-        resources(known, WIDE),
-        footer(known, Controls(known, SimpleNamespace()), BAD),
+        header(station.robot, BAD, WIDE),
+        resources(station, WIDE),
+        footer(station, Controls(station), BAD),
     ):
         console.print(part)
     shown = console.file.getvalue()  # type: ignore[attr-defined]

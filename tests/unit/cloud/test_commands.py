@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import socketserver
 import threading
 from collections.abc import Iterator
@@ -82,6 +83,22 @@ def test_sessions_of_the_store_are_listed_where_the_spool_cannot_be_read(
     assert f"{told} that it alone has are not listed" in said.err
     assert stored.session in said.out
     assert waiting.session not in said.out
+
+
+def test_telemetry_that_has_gone_is_told_where_sessions_are_listed(
+    desk: Desk, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded = record(desk.url, desk.spool)
+    assert recorded.store.folder is not None
+    shutil.rmtree(recorded.store.folder / "telemetry")
+    assert main(["sessions", "ls", "--config", str(desk.config)]) == 1
+    said = capsys.readouterr()
+    assert recorded.session in said.out
+    assert (
+        f"telemetry/000 has gone from {desk.url}, though batches of the spool {desk.spool} went" in said.err
+    )
+    assert main(["sessions", "ls", "--url", desk.url, "--config", str(desk.config)]) == 0
+    assert "no session has telemetry: if some was uploaded, it has gone" in capsys.readouterr().err
 
 
 def test_sessions_are_listed_before_anything_was_uploaded(desk: Desk) -> None:

@@ -18,8 +18,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from ml.store import StoreError, StoreUnreachable
 from ml.store.sessions import Channel, Session
+from server_gui.core.atomic_files import draft
 from server_gui.core.cloud import ros
-from server_gui.core.cloud.atomic_files import draft
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded as Opened
 from server_gui.core.cloud.recordings import Recordings

@@ -9,7 +9,8 @@ import pytest
 
 from ml.store import Store, mending
 from ml.store.errors import StoreError
-from ml.store.upkeep import compact
+from ml.store.tables import TELEMETRY
+from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import mend, verify
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.spool import Spool
@@ -113,6 +114,18 @@ def test_the_same_loss_twice_is_mended_twice(place: Place) -> None:
         place.told("mend")
         assert place.verify() == (0, "")
         assert rows(place.url) == before
+
+
+def test_what_retention_has_removed_is_not_brought_again(place: Place) -> None:
+    store = Store(place.url)
+    times = sorted(store.dataset("telemetry/000").to_table()["utc"].to_pylist())
+    retain(store, [TELEMETRY], times[len(times) // 2])
+    before = rows(place.url)
+    for file in place.store.glob("telemetry/000/robot=*/**/*.parquet"):
+        file.unlink()
+    place.told("mend")
+    assert rows(place.url) == before
+    assert place.verify() == (0, "")
 
 
 def test_what_is_still_there_of_a_damaged_file_is_kept_and_noted(place: Place) -> None:

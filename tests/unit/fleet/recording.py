@@ -107,9 +107,10 @@ def recording(
     shown: list[tuple[str, Event]] = []
     addresses = {name: Address.parse(address) for name, address in robots.items()}
     with Spool(folder, reserve_bytes=0) as spool, Recorder(spool) as recorder, Network() as network:
-        fleet = Fleet(
-            addresses, following, recorder, show=lambda robot, event: shown.append((robot, event)), **facts
-        )
+        fleet = Fleet(following, recorder, **facts)
+        fleet.subscribers.append(lambda robot, event: shown.append((robot, event)))
+        for name, address in addresses.items():
+            fleet.follow(name, address)
         following_all = network.run(fleet.run())
         yield Recording(fleet, recorder, shown)
         assert not following_all.done(), following_all.result()

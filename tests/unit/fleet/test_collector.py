@@ -114,7 +114,10 @@ def test_a_mark_that_cannot_be_kept_is_none(
 
 def test_a_robot_that_joins_later_is_recorded_marked_and_shown(settings: ServerSettings) -> None:
     shown: list[str] = []
-    with FakeRobot() as other, Collector(settings, show=lambda robot, _: shown.append(robot)) as collector:
+    with (
+        FakeRobot() as other,
+        Collector(settings, subscribers=[lambda robot, _: shown.append(robot)]) as collector,
+    ):
         collector.follow("exo-other", Address.parse(other.address)).result(WAIT_S)
         until(collector, lambda: collector.report().result(WAIT_S).robots["exo-other"].rows > 5)
         assert collector.mark("stairs").result(WAIT_S) == 2

@@ -154,6 +154,7 @@ class FakeNode:
         self.log: list[tuple[str, int, bytes | None]] = []
         self.life = NodeLife(None)
         self.ready = True
+        self.answered_ns = 0
         self.distrust: str | None = None  # why nothing may be written to it
         self.before_download: Callable[[int, bytes], None] = lambda index, data: None
         self.before_upload: Callable[[int], None] = lambda index: None
@@ -201,6 +202,7 @@ class FakeNode:
     def _upload(self, index: int, subindex: int) -> bytes:
         self.log.append(("upload", index, None))
         self.before_upload(index)
+        self.answered_ns = time.monotonic_ns()
         if (index, subindex) not in self.objects:
             raise DeviceAbort(f"0x{index:04X}: no such object", 0x0602_0000)
         return self.objects[index, subindex]
@@ -209,6 +211,7 @@ class FakeNode:
         self.log.append(("download", index, data))
         self.before_download(index, data)
         self.objects[index, subindex] = self.store(index, data)
+        self.answered_ns = time.monotonic_ns()
 
     @staticmethod
     def _do(work: Callable[[], Any]) -> "Future[Any]":

@@ -143,6 +143,39 @@ def test_what_is_wrong_is_named_with_table_key_and_remedy(tmp_path: Path, text: 
     assert says in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("subindex", "says"),
+    [
+        ("256", "the subindex goes from 0 to 255"),
+        ("300", "the subindex goes from 0 to 255"),
+        ("999", "the subindex goes from 0 to 255"),
+        ("0x100", "must have the form"),
+        ("65536", "must have the form"),
+        ("-1", "must have the form"),
+    ],
+)
+def test_a_subindex_that_no_object_has_is_refused_with_what_is_allowed(
+    tmp_path: Path, subindex: str, says: str
+) -> None:
+    text = HEAD + JOINT + f'[parameter."knee.x"]\nobject = "0x2000:{subindex}"'
+    with pytest.raises(configs.ConfigError) as caught:
+        config(tmp_path, text)
+    assert str(caught.value).startswith(f'{tmp_path / "robot.toml"}: [parameter."knee.x"] object')
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("subindex", "number"), [("0", 0), ("255", 255), ("0xFF", 255), ("010", 10), ("007", 7)]
+)
+def test_every_subindex_that_an_object_may_have_is_taken(tmp_path: Path, subindex: str, number: int) -> None:
+    gait = '[device.gait]\nbus = "main"\nnode_id = 16\neds = "gait_controller.eds"\n'
+    stop = f'[[stop.controller]]\ncomponent = "gait"\nobject = "0x2001:{subindex}"\nvalue = 0\n'
+    named = f'[parameter."knee.x"]\nobject = "0x2000:{subindex}"'
+    robot = config(tmp_path, HEAD + JOINT + gait + stop + named)
+    assert robot.parameter["knee.x"].address == (0x2000, number)
+    assert robot.stop.controller[0].address == (0x2001, number)
+
+
 def test_two_axes_of_one_drive_share_a_node(tmp_path: Path) -> None:
     robot = config(tmp_path, HEAD + JOINT + JOINT.replace("knee", "hip") + "axis = 1\n")
     assert robot.joint["hip"].node_id == robot.joint["knee"].node_id

@@ -23,6 +23,8 @@ from drivers.joint.quick_stop import StopOutcome
 from gateway import daemon
 from gateway.connections import session
 from gateway.connections.listeners import listen
+from gateway.process.futures import done
+from gateway.service import Service
 from gateway.wire import framing
 from gateway.wire.limits import BAD_LINES, LINE_LIMIT
 from tests.unit.gateway import processes
@@ -85,6 +87,33 @@ def test_a_bad_line_is_answered_and_the_next_one_served(
     assert answer is not None
     assert (answer["error"]["code"], answer["id"]) == (code, id_)
     assert client.answer(9)["monotonic_ns"] > 0
+
+
+@pytest.mark.parametrize("made", [object(), {"text": "\ud800"}, done(object())])
+def test_an_answer_that_cannot_be_encoded_is_answered_as_an_error_and_the_next_request_runs(
+    client: Client, monkeypatch: pytest.MonkeyPatch, made: object
+) -> None:
+    monkeypatch.setattr(Service, "_clock", lambda _service: made)
+    client.send(CLOCK % 1 + b'{"jsonrpc":"2.0","id":2,"method":"parameter.list"}\n')
+    with pytest.raises(Answered, match=r"clock\.read failed inside the gateway: ") as caught:
+        client.answer(1)
+    assert caught.value.code == framing.INTERNAL_ERROR
+    assert client.answer(2)["values"]
+
+
+def test_a_request_that_cannot_even_be_handled_keeps_no_other_waiting(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decode = framing.decode_request
+
+    def fail(line: bytes) -> framing.Request:
+        if b'"id":1,' in line:
+            raise ZeroDivisionError
+        return decode(line)
+
+    monkeypatch.setattr(framing, "decode_request", fail)
+    client.send(CLOCK % 1 + CLOCK % 2)
+    assert client.answer(2)["monotonic_ns"] > 0
 
 
 def test_a_notification_is_done_and_not_answered(client: Client) -> None:

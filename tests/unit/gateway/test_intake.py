@@ -180,6 +180,9 @@ def test_a_stop_of_who_has_gone_before_anybody_could_act_is_done_all_the_same(se
         (b'{"jsonrpc":"2.0","id":3,"method":"robot.stop","params":{"reason":"\xe9\x01"}}\n', 3),
         (b'{"id":"a","method":"robot.stop","params":{"reason":"' + b"x" * 70_000 + b'"}}\n', "a"),
         (b'{"id":4,"method":"robot.stop"', 4),
+        ('{"method":"robot.stop"}'.encode("utf-16-le"), None),
+        ('{"method":"robot.stop"}'.encode("utf-16-be"), None),
+        ('{"method":"robot.stop"}'.encode("utf-32-be"), None),
     ],
 )
 def test_a_stop_is_never_refused_for_its_form(

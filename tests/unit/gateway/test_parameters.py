@@ -1,5 +1,6 @@
 """Parameters through the wire: limits, steps, states, leases, and all or nothing over every node."""
 
+import re
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -14,6 +15,7 @@ import eds
 from drivers.component import Kind
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import ParameterSettings
+from gateway.modules.control import unanswered
 from gateway.modules.control.catalogue import described
 from gateway.modules.control.parameters import Parameter
 from gateway.wire.framing import RpcError
@@ -67,6 +69,42 @@ def test_a_device_that_does_not_tell_is_null_with_the_reason(client: Client, ben
     assert values["gait.step_length"]["value"] is None
     assert "node 16 does not answer" in values["gait.step_length"]["problem"]
     assert values["gait.cycle_time"]["value"] == 1.2
+
+
+def _silent(_index: int) -> None:
+    raise DeviceTimeout("no answer within 0.3 s")
+
+
+def _step_length(client: Client) -> dict[str, Any]:
+    found: dict[str, dict[str, Any]] = client.call("parameter.read", names=["gait.step_length"])["values"]
+    return found["gait.step_length"]
+
+
+def test_a_device_that_missed_a_read_is_asked_again_once_it_has_answered_anybody(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unanswered, "AGAIN_S", 1000.0)
+    bench.gait.node.before_upload = _silent
+    assert "no answer within 0.3 s" in _step_length(client)["problem"]
+    bench.gait.node.before_upload = lambda _index: None
+    asked = len(bench.gait.node.log)
+    problem = _step_length(client)["problem"]
+    said = r"gait did not answer \d+ ms ago, and is asked again in \d+ ms: no answer within 0.3 s"
+    assert re.search(said, problem)
+    assert "is not there" not in problem  # nobody knows that
+    assert len(bench.gait.node.log) == asked
+    bench.gait.node.upload(CYCLE, 0)
+    assert _step_length(client)["value"] == 0.4
+
+
+def test_a_device_that_missed_a_read_is_asked_again_after_a_while(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unanswered, "AGAIN_S", 0.0)
+    bench.gait.node.before_upload = _silent
+    assert _step_length(client)["value"] is None
+    bench.gait.node.before_upload = lambda _index: None
+    assert _step_length(client)["value"] == 0.4
 
 
 def test_a_name_that_does_not_exist_is_named(client: Client) -> None:

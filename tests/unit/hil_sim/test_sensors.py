@@ -8,13 +8,14 @@ import pytest
 
 from drivers.insole.layout import load as load_layout
 from hil_sim.gait.wearer import GRAVITY, Foot, Trunk
-from hil_sim.sensors import insole_cobs, insole_csv, insole_frame, vectornav, witmotion, xsens
-from hil_sim.sensors.bno08x_rvc import BNO08X_RVC, phone_angles
 from hil_sim.sensors.faults import ImuFaults, InsoleFaults
+from hil_sim.sensors.imus import vectornav, witmotion, xsens
+from hil_sim.sensors.imus.bno08x_rvc import BNO08X_RVC, phone_angles
+from hil_sim.sensors.imus.witmotion_can import payloads
+from hil_sim.sensors.insoles import insole_cobs, insole_csv, insole_frame
 from hil_sim.sensors.serial_sensor import Tick
 from hil_sim.sensors.sole import Cell, Pressures, Sole
 from hil_sim.sensors.trunk_imu import Motion, TrunkImu, quaternion
-from hil_sim.sensors.witmotion_can import payloads
 
 START = Tick(1, 0)
 NOBODY = Foot(0.0, 0.1, 0.0)

@@ -13,7 +13,7 @@ from hil_sim.gait.subject import NOMINAL_LEG_LENGTH, WearerSettings
 from hil_sim.gait.walk import Shape, stance_share
 from hil_sim.gait.wearer import GRAVITY
 from hil_sim.sensors.faults import InsoleFaults
-from hil_sim.sensors.insole_cobs import CELLS
+from hil_sim.sensors.insoles.insole_cobs import CELLS
 from hil_sim.sensors.sole import Sole
 from tests.unit.hil_sim.moving import DT, USUAL, Moment, Moving, stride_of
 

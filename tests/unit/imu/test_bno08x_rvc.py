@@ -5,9 +5,11 @@ import math
 import pytest
 
 from drivers.imu import rotation
-from drivers.imu.bno08x_rvc import Bno08xRvcParser, from_angles
+from drivers.imu.formats.bno08x_rvc import Bno08xRvcParser, from_angles
 from tests.unit.imu.encode import bno08x_rvc
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
+
+STREAM = [bno08x_rvc(n, n, -n, n, 1, 2, 1000) for n in range(60)]
 
 # The example of the BNO08X datasheet, section UART-RVC; also in the tests of github.com/klimatt/bno08x-rvc.
 DATASHEET = bytes.fromhex("AA AA DE 01 00 92 FF 25 08 8D FE EC FF D1 03 00 00 00 E7")

@@ -13,8 +13,8 @@ from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings, Role
 from drivers.component import Component, Kind
 from drivers.errors import SettingsError
+from drivers.imu.canopen.cia410 import InclinometerSettings
 from drivers.imu.inclinometer import Inclinometer
-from drivers.imu.settings import InclinometerSettings
 from drivers.samples import State
 from tests.unit.bus.fake_node import FakeNode, Object
 from tests.unit.bus.waiting import until

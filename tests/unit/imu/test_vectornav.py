@@ -5,10 +5,12 @@ import struct
 
 import pytest
 
+from drivers.imu.formats.vectornav import VectornavParser
 from drivers.imu.frame import ImuFrame
-from drivers.imu.vectornav import VectornavParser
 from tests.unit.imu.encode import crc16_xmodem, vectornav_ascii, vectornav_binary
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
+
+STREAM = [vectornav_ascii(f"VNYPR,+{n:03d}.5,-001.0,+000.5") for n in range(60)]
 
 # From VectorNav's own programming library (vnproglib), an example.
 YMR = (

@@ -4,9 +4,11 @@ import math
 
 import pytest
 
-from drivers.imu.witmotion import WitmotionParser
+from drivers.imu.formats.witmotion import WitmotionParser
 from tests.unit.imu.encode import witmotion
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
+
+STREAM = [witmotion(0x51, n, -n, 2048, 2500) + witmotion(0x53, n, 2 * n, 3 * n, 0) for n in range(60)]
 
 # Captured from a WT901, published in the README of github.com/aarushmaddula/bsli-payload-project.
 TIME = bytes.fromhex("55 50 00 00 00 00 05 28 95 01 68")

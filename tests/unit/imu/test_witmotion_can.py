@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from drivers.imu.witmotion_can import WitmotionCanParser, decode
+from drivers.imu.can.witmotion_can import WitmotionCanParser, decode
 from tests.unit.port.streams import assert_same_at_every_split, parse
 
 # Logged from a USB-CAN adapter, published in a comment of 2020-04-17.

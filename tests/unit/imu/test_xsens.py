@@ -5,9 +5,11 @@ import struct
 
 import pytest
 
-from drivers.imu.xsens import XsensParser
+from drivers.imu.formats.xsens import XsensParser
 from tests.unit.imu.encode import mtdata2, xbus
 from tests.unit.port.streams import assert_damage_is_contained, assert_same_at_every_split, parse
+
+STREAM = [mtdata2({0x1020: struct.pack(">H", n), 0x2030: struct.pack(">3f", n, 1, 2)}) for n in range(60)]
 
 # A capture of an MTi-300, decoded by Xsens' MT Manager: github.com/Scottapotamas/xsens-mti, its tests.
 QUATERNION = bytes.fromhex(

@@ -9,7 +9,8 @@ import pytest
 from drivers.component import Component, Kind
 from drivers.errors import SettingsError
 from drivers.insole import layout as layouts
-from drivers.insole.device import Insole, insoles
+from drivers.insole.build import insoles
+from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
@@ -215,3 +216,8 @@ def test_wrong_calibration_is_refused_when_the_robot_is_built(tmp_path: Path) ->
 def test_insole_format_that_needs_a_description_is_refused_without_one() -> None:
     with pytest.raises(SettingsError, match=r"table \[frame\]"):
         Insole("left_insole", InsoleSettings(port="-", format="insole-frame"))
+
+
+def test_a_language_that_nobody_speaks_is_named() -> None:
+    with pytest.raises(ValueError, match="format 'morse' is not known; here are brilliant-star, insole-cobs"):
+        InsoleSettings(port="-", format="morse")

@@ -12,7 +12,8 @@ import pytest
 
 from drivers.imu.device import Imu
 from drivers.imu.settings import ImuSettings
-from drivers.insole.device import Insole, pair
+from drivers.insole.build import pair
+from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.parsing import Parser
 from drivers.samples import State
@@ -21,11 +22,11 @@ from hil_sim.gait.generator import Generator
 from hil_sim.gait.walk import Shape
 from hil_sim.gait.wearer import Foot, Wearer
 from hil_sim.sensors.faults import ImuFaults, InsoleFaults, LineFaults
-from hil_sim.sensors.insole_cobs import CELLS, INSOLE_COBS
+from hil_sim.sensors.imus.witmotion import WITMOTION
+from hil_sim.sensors.insoles.insole_cobs import CELLS, INSOLE
 from hil_sim.sensors.serial_sensor import SerialSensor
 from hil_sim.sensors.sole import Pressures, Sole
 from hil_sim.sensors.trunk_imu import Motion, TrunkImu
-from hil_sim.sensors.witmotion import WITMOTION
 from tests.unit.hil_sim.listener import Listener
 
 SHAPE = Shape(step_length=0.40, cycle_time=1.2, toe_height=0.06, trunk_angle=0.15)
@@ -79,7 +80,7 @@ class Robot:
         self.imu_sender.line.port = Listener(115200, self._feeder(self.imu, self.imu.line.parser))
 
     def _connected(self, insole: Insole) -> SerialSensor[Pressures]:
-        sender = SerialSensor(INSOLE_COBS, LineFaults(), random.Random(0))
+        sender = SerialSensor(INSOLE, LineFaults(), random.Random(0))
         sender.line.port = Listener(230400, self._feeder(insole, insole.line.parser))
         return sender
 

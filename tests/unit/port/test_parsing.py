@@ -4,21 +4,21 @@ from typing import Any
 
 import pytest
 
-from drivers.imu.formats import FORMATS
-from drivers.imu.witmotion_can import WitmotionCanParser
+from drivers.imu.can.witmotion_can import WitmotionCanParser
+from drivers.imu.formats import FORMATS as IMUS
+from drivers.imu.formats.vectornav import VectornavParser
 from drivers.insole import layout as layouts
-from drivers.insole.csv_lines import InsoleCsvParser
 from drivers.insole.description import CsvDescription
-from drivers.insole.formats import parser_maker
+from drivers.insole.formats import FORMATS as INSOLES
+from drivers.insole.formats.insole_csv import InsoleCsvParser
 from drivers.parsing import Parser
 from tests.unit.port.streams import Make
 from tests.unit.sensor_cli.streams import streams
 
+DESCRIBED = {"insole-frame": layouts.load("insole-18"), "insole-csv": layouts.load("insole-8")}
 MAKERS: dict[str, Make[Any]] = {
-    **{name: one.make_parser for name, one in FORMATS.items()},
-    "insole-cobs": parser_maker("insole-cobs", None),
-    "insole-frame": parser_maker("insole-frame", layouts.load("insole-18")),
-    "insole-csv": parser_maker("insole-csv", layouts.load("insole-8")),
+    **{name: one.parser for name, one in IMUS.items()},
+    **{name: one.parser(DESCRIBED.get(name)) for name, one in INSOLES.items()},
 }
 CSV = b"".join(b"%d;%d;L;0;1;2;3;4;5;6;7;8\r\n" % (10 * n, n) for n in range(60))
 
@@ -59,7 +59,7 @@ def test_bytes_between_frames_are_counted_alike_however_they_come() -> None:
     stream = b"$WNYPR,1\r\n$-002.026*60\r\n$VNACC,1$VNYPR,,2,3*6C\r\n"
     dropped = set()
     for size in (1, 3, len(stream)):
-        parser = FORMATS["vectornav"].make_parser()
+        parser = VectornavParser()
         for at in range(0, len(stream), size):
             parser.feed(stream[at : at + size])
         parser.finish()

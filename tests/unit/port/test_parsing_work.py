@@ -7,15 +7,15 @@ import msgspec
 import pytest
 
 from drivers.bus.socketcand import SocketcandParser, frame_of
-from drivers.imu.bno08x_rvc import Bno08xRvcParser
-from drivers.imu.vectornav import VectornavParser
-from drivers.imu.witmotion import WitmotionParser
-from drivers.imu.witmotion_can import WitmotionCanParser
-from drivers.imu.xsens import XsensParser
-from drivers.insole.cobs import InsoleCobsParser
-from drivers.insole.csv_lines import InsoleCsvParser
+from drivers.imu.can.witmotion_can import WitmotionCanParser
+from drivers.imu.formats.bno08x_rvc import Bno08xRvcParser
+from drivers.imu.formats.vectornav import VectornavParser
+from drivers.imu.formats.witmotion import WitmotionParser
+from drivers.imu.formats.xsens import XsensParser
 from drivers.insole.description import CsvDescription, FrameDescription
-from drivers.insole.fixed_frame import InsoleFrameParser
+from drivers.insole.formats.insole_cobs import InsoleCobsParser
+from drivers.insole.formats.insole_csv import InsoleCsvParser
+from drivers.insole.formats.insole_frame import InsoleFrameParser
 from drivers.parsing import GRANT, SAVED, Counters, FrameScanner
 from tests.unit.port.streams import Make
 

@@ -1,5 +1,6 @@
 """Clocks that are set while something is recorded: what came later stays later, each row in its place."""
 
+import contextlib
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -81,6 +82,16 @@ class Robot:
         self._rows += 100
 
 
+@contextlib.contextmanager
+def begun(spool: Spool, facts: Facts | None = None) -> Iterator[tuple[Recorder, Robot]]:
+    """A session with ten rows, which goes on."""
+    with Recorder(spool) as recorder:
+        recorder.begin(ROBOT, facts or Facts())
+        robot = Robot(recorder)
+        robot.rows(10)
+        yield recorder, robot
+
+
 def stored(spool: Spool, url: str) -> tuple[Store, Session]:
     store = Store(url)
     for number in spool.waiting():
@@ -107,10 +118,7 @@ def steps(store: Store, session: Session) -> list[dict[str, object]]:
 def test_a_clock_that_is_set_moves_no_row_and_no_label(
     spool: Spool, folder_url: str, wall: Wall, by_ns: int
 ) -> None:
-    with Recorder(spool) as recorder:
-        recorder.begin(ROBOT, Facts())
-        robot = Robot(recorder)
-        robot.rows(10)
+    with begun(spool) as (_, robot):
         wall.set_by_ns += by_ns
         robot.rows(20)
     store, session = stored(spool, folder_url)
@@ -128,10 +136,7 @@ def test_a_clock_that_is_set_moves_no_row_and_no_label(
 def test_the_next_connection_takes_a_clock_that_was_set_forward(
     spool: Spool, folder_url: str, wall: Wall
 ) -> None:
-    with Recorder(spool) as recorder:
-        recorder.begin(ROBOT, Facts())
-        robot = Robot(recorder)
-        robot.rows(10)
+    with begun(spool) as (_, robot):
         wall.set_by_ns += 3_600 * S
         robot.reconnect()
         robot.rows(10)
@@ -142,10 +147,7 @@ def test_the_next_connection_takes_a_clock_that_was_set_forward(
 
 
 def test_one_that_was_set_back_only_with_the_next_session(spool: Spool, folder_url: str, wall: Wall) -> None:
-    with Recorder(spool) as recorder:
-        recorder.begin(ROBOT, Facts())
-        robot = Robot(recorder)
-        robot.rows(10)
+    with begun(spool) as (recorder, robot):
         wall.set_by_ns -= 3_600 * S
         robot.reconnect()
         robot.rows(10)
@@ -193,10 +195,7 @@ def test_a_better_estimate_of_the_robots_clock_is_followed_and_nothing_goes_back
 def test_events_and_resources_are_in_the_time_of_their_robots_rows(
     spool: Spool, folder_url: str, wall: Wall
 ) -> None:
-    with Recorder(spool) as recorder:
-        recorder.begin(ROBOT, Facts())
-        robot = Robot(recorder)
-        robot.rows(10)
+    with begun(spool) as (recorder, _):
         assert recorder.flush(WAIT_S)
         wall.set_by_ns -= 3_600 * S
         recorder.mark(ROBOT, "here")
@@ -208,9 +207,7 @@ def test_events_and_resources_are_in_the_time_of_their_robots_rows(
 
 
 def test_what_is_learned_after_a_clock_was_set_back_holds(spool: Spool, folder_url: str, wall: Wall) -> None:
-    with Recorder(spool) as recorder:
-        recorder.begin(ROBOT, Facts(parameters={"gain": 1.0}))
-        Robot(recorder).rows(10)
+    with begun(spool, Facts(parameters={"gain": 1.0})) as (recorder, _):
         assert recorder.flush(WAIT_S)
         wall.set_by_ns -= 3_600 * S
         recorder.amend(ROBOT, Facts(parameters={"gain": 2.0}))

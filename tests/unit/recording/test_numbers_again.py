@@ -4,7 +4,6 @@ import contextlib
 import shutil
 import sqlite3
 from collections import Counter
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import msgspec
@@ -207,13 +206,28 @@ def test_rows_of_a_known_batch_that_were_removed_from_the_store_are_brought_agai
     with Spool(tmp_path) as spool, contextlib.closing(spool.read(1)) as segment:
         upload(segment, spool.id, store)
         for again in (0, 1):
-            retain(store, [TELEMETRY], datetime.now(UTC) + timedelta(days=1))
+            store.table(HERE).delete()
             if again:
                 with pytest.raises(Contradicted, match="had 5 rows of batch 1, which were removed since"):
                     upload(segment, spool.id, store)
             else:
                 upload(segment, spool.id, store)
                 assert found(store) == Counter(range(5))
+
+
+def test_what_retention_has_removed_of_a_known_batch_is_not_brought_again(
+    tmp_path: Path, folder_url: str
+) -> None:
+    store = Store(folder_url)
+    record(tmp_path, range(5))
+    with Spool(tmp_path) as spool, contextlib.closing(spool.read(1)) as segment:
+        upload(segment, spool.id, store)
+        [middle] = store.dataset(HERE).to_table().sort_by("seq")["utc"].to_pylist()[2:3]
+        retain(store, [TELEMETRY], middle)
+        store.table(HERE).delete("seq = 4")
+        assert found(store) == Counter([2, 3])
+        upload(segment, spool.id, store)
+        assert found(store) == Counter([2, 3, 4])
 
 
 def test_a_batch_that_arrived_before_its_server_died_is_there_once_and_has_its_receipt(

@@ -2,6 +2,7 @@
 
 import collections
 import dataclasses
+import errno
 import json
 import math
 import threading
@@ -471,6 +472,36 @@ def test_what_no_file_takes_is_lost_alone_with_an_alarm(spool: Spool) -> None:
     found = rows(kept(spool)[0])
     assert len(found) == len(set(found)) == 4
     assert "bad" not in spool.heads
+
+
+def test_where_no_room_can_be_made_recording_goes_on_with_an_alarm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.core.recording.recorder.AGAIN_S", 0.0)
+    failing = [True]
+
+    def free_bytes(_folder: Path) -> int:
+        if failing[0]:
+            raise OSError(errno.EIO, "Input/output error")
+        return 1
+
+    alarms: list[Alarm] = []
+    with Spool(tmp_path, reserve_bytes=1, free_bytes=free_bytes) as spool:
+        with Recorder(spool, alarms.append) as recorder:
+            for seq in range(3):
+                recorder.record("exo-01", 1, batch(seq))
+                assert recorder.flush(WAIT_S)
+            assert [alarm.kind for alarm in recorder.state.alarms] == [AlarmKind.UNCLEARED]
+            failing[0] = False
+            recorder.record("exo-01", 1, batch(3))
+            assert recorder.flush(WAIT_S)
+            assert (recorder.state.alarms, recorder.state.lost) == ((), 0)
+        assert [row[3] for row in rows(kept(spool)[0])] == [0, 1, 2, 3]
+    [alarm] = alarms
+    assert alarm.text == (
+        f"no room can be made in the spool {tmp_path}: Input/output error; "
+        "recording goes on as long as there is room"
+    )
 
 
 def test_a_mistake_of_ours_is_an_alarm_and_the_recorder_goes_on(

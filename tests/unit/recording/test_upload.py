@@ -1,19 +1,21 @@
 """From the spool to the store: every row once, as it was; problems are told, and end."""
 
 import contextlib
+import errno
 import os
 import sqlite3
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import pytest
 
 from gateway.wire.resource import ResourceSnapshot
-from ml.store import Store, StoreUnreachable, durable
+from ml.store import Store, StoreError, StoreUnreachable, durable
 from ml.store.labels import Label
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.columns import Columns
@@ -186,7 +188,7 @@ def test_a_store_that_cannot_be_reached_is_told_and_tried_again(spool: Spool, fo
         assert uploader.state.problem is None
 
 
-@pytest.mark.parametrize("part", ["header", "record", "run"])
+@pytest.mark.parametrize("part", ["header", "schema", "record", "run"])
 def test_a_damaged_batch_keeps_none_after_it_from_the_store(
     spool: Spool, folder_url: str, part: str, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -207,6 +209,7 @@ def test_a_damaged_batch_keeps_none_after_it_from_the_store(
     seqs = sorted(Store(folder_url).dataset(HERE).to_table()["seq"].to_pylist())
     lost, rows, kept = {
         "header": (["the spool's file "], ["0", "2"], [0, 2]),
+        "schema": (["the spool's file "], ["0", "2"], [0, 1, 2]),  # its runs had gone before
         "record": (["row 0 of batch 2, of exo-01, from about 20"], ["0", "2"], [0, 1, 2]),
         "run": (["1 rows of exo-01, stream 7 from notification 1 on, were"], ["0", "1", "2"], [0, 2]),
     }[part]
@@ -260,6 +263,9 @@ def flip(file: Path, column: str) -> None:
 def damage(file: Path, part: str) -> None:
     if part == "header":
         file.write_bytes(b"x" * 10_000)
+        return
+    if part == "schema":  # a column's name, as one flipped bit leaves it
+        file.write_bytes(file.read_bytes().replace(b"    number INTEGER", b"    nulber INTEGER"))
         return
     column = {"record": "content", "run": "data"}[part]
     with contextlib.closing(sqlite3.connect(file)) as database, database:
@@ -324,6 +330,51 @@ def test_what_a_library_raises_is_no_end_and_quotes_nothing(spool: Spool, folder
         until(lambda: uploader.state.problem == "internal error, RuntimeError")
         uploader.now()
         until(lambda: uploader.state.uploaded == 1)
+
+
+def test_a_batch_that_cannot_be_completed_keeps_no_other_from_the_store(
+    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failing = {1, 2}
+
+    def fails(spool: Spool, number: int, store: Store) -> None:
+        if number in failing:
+            raise StoreError(f"a file of the table is gone that batch {number} is in")
+        send(spool, number, store)
+
+    monkeypatch.setattr("server_gui.core.recording.uploader.send", fails)
+    with Recorder(spool) as recorder:
+        for seq in range(4):
+            recorder.record("exo-01", 7, batch(seq))
+            recorder.cut(lambda: None)
+            assert recorder.flush(WAIT_S)
+    last = spool.waiting()[-1]
+    uploader = Uploader(spool, lambda: Store(folder_url))
+    assert not uploader._empty(asked=True)
+    assert spool.waiting() == [1, 2]
+    assert (uploader.state.uploaded, uploader.state.waiting) == (last - 2, 2)
+    assert uploader.state.problem == (
+        "batch 1 is not in the store yet: a file of the table is gone that batch 1 is in "
+        "(and 1 other likewise)"
+    )
+    failing.clear()
+    assert uploader._empty(asked=True)
+    assert uploader.state == replace(uploader.state, problem=None, waiting=0)
+    assert sorted(Store(folder_url).dataset(HERE).to_table()["seq"].to_pylist()) == [0, 1, 2, 3]
+
+
+def test_a_spool_that_cannot_be_listed_is_told_and_ends_no_uploader(
+    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(_folder: Path) -> Iterator[Path]:
+        raise OSError(errno.EIO, "Input/output error")
+
+    uploader = Uploader(spool, lambda: Store(folder_url))
+    with monkeypatch.context() as failing:
+        failing.setattr(Path, "iterdir", refuses)
+        assert not uploader._empty(asked=True)
+    assert uploader.state.problem == f"the spool {spool.folder} cannot be read: Input/output error"
+    assert uploader._empty(asked=True)
 
 
 def test_the_first_upload_after_a_power_cut_mends_the_log_and_compares(spool: Spool, folder_url: str) -> None:

@@ -1,8 +1,10 @@
 """A bit that flips in the spool's write-ahead log: what SQLite then leaves out in silence is told."""
 
+import contextlib
 import os
 import random
 import signal
+import sqlite3
 import time
 from pathlib import Path
 
@@ -21,7 +23,7 @@ from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
 COMMITS, FRAME_BYTES = 30, FRAME.size + PAGE_BYTES
-LOG = "00000001.db-wal"
+LOG, INDEX = "00000001.db-wal", "00000001.db-shm"
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +51,7 @@ def spool(left: Path, tmp_path: Path) -> Path:
     folder = tmp_path / "spool"
     folder.mkdir(mode=0o700)
     for file in left.iterdir():
-        if not file.name.endswith("-shm"):
-            (folder / file.name).write_bytes(file.read_bytes())
+        (folder / file.name).write_bytes(file.read_bytes())
     return folder
 
 
@@ -118,6 +119,39 @@ def test_what_was_being_written_when_the_power_went_is_no_alarm(spool: Path) -> 
     assert lost_commits(spool / LOG, PAGE_BYTES) == 0
     (spool / LOG).write_bytes(content + bytes(2 * FRAME_BYTES))
     assert lost_commits(spool / LOG, PAGE_BYTES) == 0
+
+
+@pytest.mark.parametrize("index", ["gone", "empty", "as it was a commit before"])
+def test_a_commit_that_the_power_cut_has_torn_is_no_alarm(
+    spool: Path, tmp_path: Path, folder_url: str, index: str
+) -> None:
+    """Sectors of it may be there and others not, whatever their order."""
+    known = frames(spool / LOG)
+    before = max(begin for begin, is_commit in known[:-1] if is_commit) + FRAME_BYTES
+    content = bytearray((spool / LOG).read_bytes())
+    if index == "gone":
+        (spool / INDEX).unlink()
+    elif index == "empty":
+        (spool / INDEX).write_bytes(bytes(len((spool / INDEX).read_bytes())))
+    else:
+        (spool / INDEX).write_bytes(indexed(spool, bytes(content[:before]), tmp_path))
+    content[before + FRAME.size : before + FRAME.size + PAGE_BYTES // 2] = bytes(PAGE_BYTES // 2)
+    (spool / LOG).write_bytes(content)
+    assert lost_commits(spool / LOG, PAGE_BYTES) == 0
+    store = Store(folder_url)
+    assert sent(spool, store) == []
+    assert list(verify.batches_missing(store, spool)) == []
+    assert store.dataset(HERE).count_rows() == COMMITS - 1
+
+
+def indexed(spool: Path, log: bytes, folder: Path) -> bytes:
+    """The index that SQLite makes of this log."""
+    copy = folder / "copy.db"
+    copy.write_bytes((spool / LOG.removesuffix("-wal")).read_bytes())
+    copy.with_name("copy.db-wal").write_bytes(log)
+    with contextlib.closing(sqlite3.connect(copy)) as database:
+        database.execute("SELECT count(*) FROM run").fetchone()
+        return copy.with_name("copy.db-shm").read_bytes()
 
 
 def test_frames_of_a_log_that_was_brought_home_are_no_alarm(spool: Path) -> None:

@@ -1,10 +1,10 @@
-"""A second of every device's stream, as an unknown sensor sends it."""
+"""A second of every device's stream, as an unknown sensor sends it: `STREAM` of each format's own test."""
 
-import struct
+import importlib
 from pathlib import Path
 
-from tests.unit.imu import encode as imu
-from tests.unit.insole.encode import Sender, eighteen_cell_frame
+from drivers.imu.formats import FORMATS as IMUS
+from drivers.insole.formats import FORMATS as INSOLES
 
 GRID_EXAMPLE = bytes.fromhex(
     "5a5ae00ad6773866b7013701000038010000380100003801000037010000390100003a0100003a0100003a0100003b01"
@@ -14,22 +14,13 @@ GRID_EXAMPLE = bytes.fromhex(
 
 def streams() -> dict[str, bytes]:
     """Format name → bytes, each cut at both ends."""
-    sender = Sender()
-    numbers = range(60)
-    whole = {
-        "witmotion": [
-            imu.witmotion(0x51, n, -n, 2048, 2500) + imu.witmotion(0x53, n, 2 * n, 3 * n, 0) for n in numbers
-        ],
-        "bno08x-rvc": [imu.bno08x_rvc(n, n, -n, n, 1, 2, 1000) for n in numbers],
-        "xsens": [
-            imu.mtdata2({0x1020: struct.pack(">H", n), 0x2030: struct.pack(">3f", n, 1, 2)}) for n in numbers
-        ],
-        "vectornav": [imu.vectornav_ascii(f"VNYPR,+{n:03d}.5,-001.0,+000.5") for n in numbers],
-        "insole-cobs": [sender.frame([n + cell for cell in range(16)]) for n in numbers],
-        "insole-frame": [eighteen_cell_frame(1 + n % 2, [n] * 18) for n in numbers],
-        "insole-csv": [f"{n},{n + 1},{n + 2},{n + 3}\r\n".encode() for n in numbers],
-    }
-    return {name: b"".join(frames)[7:-5] for name, frames in whole.items()}
+    tests = dict.fromkeys(IMUS, "imu") | dict.fromkeys(INSOLES, "insole")
+    return {name: _stream(f"tests.unit.{folder}.test_{name}") for name, folder in tests.items()}
+
+
+def _stream(module: str) -> bytes:
+    frames: list[bytes] = importlib.import_module(module.replace("-", "_")).STREAM
+    return b"".join(frames)[7:-5]
 
 
 def capture(folder: Path, data: bytes) -> Path:

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from drivers.cli.decode import FORMATS
+from drivers.imu.canopen import FORMATS as CANOPEN_FORMATS
 from gateway import config
 from gateway.modules.component.assembly import assemble
 from hil_sim.sensors.suite import IMUS, INSOLES
@@ -26,5 +27,6 @@ def test_the_readmes_table_of_a_sensor_builds_its_component(tmp_path: Path) -> N
 
 def test_the_document_names_every_format() -> None:
     text = (ROOT / "docs" / "sensors.md").read_text(encoding="utf-8")
-    assert [name for name in (*FORMATS, "cia410") if name not in text] == []
-    assert {imu.removesuffix("-binary") for imu in IMUS} | set(INSOLES) == {*FORMATS, "cia410"}
+    known = {*FORMATS, *CANOPEN_FORMATS}
+    assert [name for name in known if f"`{name}`" not in text and f'"{name}"' not in text] == []
+    assert {imu.removesuffix("-binary") for imu in IMUS} | set(INSOLES) == known

@@ -8,11 +8,18 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
-from server_gui.core.follow.events import STOP, Event, Failed, LinkChanged, Telemetry
+from server_gui.core.follow.events import Event, Failed, LinkChanged, Telemetry
 from server_gui.core.follow.feed import Feed, Following
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
-from server_gui.core.follow.robot import HISTORY_ROWS, Robot
+from server_gui.core.follow.robot import Robot
+from server_gui.core.processing.units import Units
+from server_gui.core.tuning.edits import Change, unit_of
+from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.writing import WriteState
+from server_gui.terminal.controls import Controls
+from server_gui.terminal.keys import Key
+from server_gui.terminal.session import Session
 from server_gui.terminal.summary import Summary
 from tests.fake_robot import FakeRobot
 
@@ -41,13 +48,6 @@ def test_newest_row_wins_and_null_replaces_a_number() -> None:
     assert robot.values == {"a": None}
 
 
-def test_history_is_bounded() -> None:
-    robot = Robot()
-    robot.apply(telemetry({"a": [float(i) for i in range(3 * HISTORY_ROWS)]}))
-    assert len(robot.history["a"]) == HISTORY_ROWS
-    assert robot.history["a"][-1] == 3 * HISTORY_ROWS - 1
-
-
 def test_values_are_stale_half_a_second_after_they_were_taken() -> None:
     robot = Robot()
     assert robot.is_stale(0)
@@ -74,13 +74,6 @@ def test_losses_add_up_over_links() -> None:
     robot.apply(telemetry({"a": [1.0]}, dropped=0))
     robot.apply(telemetry({"a": [1.0]}, dropped=2))
     assert (robot.link.dropped, robot.link.missed) == (9, 1)
-
-
-def test_failed_stop_is_the_last_word_on_the_stop() -> None:
-    robot = Robot()
-    robot.apply(Failed(STOP, "no link"))
-    assert robot.last_stop == Failed(STOP, "no link")
-    assert robot.last_failure is None
 
 
 def test_link_says_why_it_is_down() -> None:
@@ -162,7 +155,7 @@ class Watcher:
         self.events: list[Event] = []
         self._mailbox = Mailbox()
         following = Following("test", ("*.position", "*.state"), ("gait.*",))
-        self.feed = Feed(Address.parse(fake.address), self._mailbox.put, following)
+        self.feed = Feed(Address.parse(fake.address), [self._mailbox.put], following)
         self.following = network.run(self.feed.run())
 
     def until(self, condition: Callable[[], object]) -> None:
@@ -224,29 +217,50 @@ def test_lost_component_is_named_with_its_reason(fake: FakeRobot, network: Netwo
     watcher.until(lambda: watcher.robot.values["left_knee.position"] is None)
 
 
-def test_write_is_told_and_seen_in_the_parameters(fake: FakeRobot, network: Network) -> None:
-    watcher = Watcher(fake, network)
-    watcher.until(lambda: watcher.robot.parameters)
-    network.run(watcher.feed.write({"gait.step_length": 0.45})).result(30)
-    watcher.until(lambda: watcher.robot.last_change)
-    watcher.until(lambda: watcher.robot.parameters["gait.step_length"].value == 0.45)
+def until(session: Session, condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline
+        session.update()
+        time.sleep(0.005)
 
 
-def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, network: Network) -> None:
-    watcher = Watcher(fake, network)
-    watcher.until(lambda: watcher.robot.parameters)
-    network.run(watcher.feed.write({"gait.step_length": 9.0})).result(30)
-    watcher.until(lambda: watcher.robot.last_failure)
-    assert "above 0.6" in str(watcher.robot.last_failure)
+@pytest.fixture
+def session(fake: FakeRobot) -> Iterator[Session]:
+    with Session(Address.parse(fake.address)) as session:
+        until(session, lambda: session.station.robot.parameters and session.is_whole())
+        yield session
 
 
-def test_stop_without_a_link_is_told_as_failed(fake: FakeRobot, network: Network) -> None:
-    watcher = Watcher(fake, network)
-    watcher.until(lambda: watcher.robot.values)
+def press(session: Session, key: Key, times: int = 1) -> Controls:
+    controls = Controls(session.station)
+    for _ in range(times):
+        controls.press(key)
+    return controls
+
+
+def test_a_key_writes_and_the_lease_is_given_back(fake: FakeRobot, session: Session) -> None:
+    press(session, Key.RIGHT)
+    station = session.station
+    until(session, lambda: station.writing.state is WriteState.DONE)
+    until(session, lambda: station.robot.parameters["gait.step_length"].value == 0.42)
+    until(session, lambda: station.control.until_ns is None)
+    assert len(fake.called("control.release")) == 1
+
+
+def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, session: Session) -> None:
+    station = session.station
+    unit = unit_of("gait.step_length", "m", Units())
+    station.write((Change("gait.step_length", unit, 0.4, 9.0, elsewhere=False),))
+    until(session, lambda: station.writing.state is WriteState.FAILED)
+    assert "above 0.6" in station.writing.text
+
+
+def test_stop_without_a_link_is_told_as_not_confirmed(fake: FakeRobot, session: Session) -> None:
     fake.refuse()
-    watcher.until(watcher.robot.is_stale)
-    network.run(watcher.feed.stop("test")).result(30)
-    watcher.until(lambda: isinstance(watcher.robot.last_stop, Failed))
+    until(session, session.station.robot.is_stale)
+    press(session, Key.STOP)
+    until(session, lambda: session.station.stopping.state is StopState.NOT_CONFIRMED)
     assert fake.called("robot.stop") == []
 
 

@@ -1,37 +1,32 @@
 """Keys, controls, drawings: what the terminal does with a robot's state."""
 
-import concurrent.futures
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
+from concurrent.futures import Future
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from gateway.client import Batch, ConnectionState
+from gateway.client import Batch, ConnectionState, LinkLost
 from gateway.wire.component import ComponentInfo, QualityInfo, Snapshot
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Written
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo, Stopped
-from server_gui.core.follow.events import (
-    STOP,
-    Changed,
-    Described,
-    Failed,
-    LinkChanged,
-    Looked,
-    StopAnswered,
-    Telemetry,
-)
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.events import Described, LinkChanged, Looked, Telemetry
+from server_gui.core.follow.news import News
 from server_gui.core.follow.robot import Robot
+from server_gui.core.processing.component import Derived
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait, LegGait
 from server_gui.terminal import headless, marks
 from server_gui.terminal.controls import Controls, neighbour, step_of
 from server_gui.terminal.dashboard import draw
 from server_gui.terminal.keys import Key, KeyParser
+from tests.support.desk import FakeCommands
 
 
 def parameter(
@@ -40,21 +35,11 @@ def parameter(
     return ParameterInfo(name, "m", low, high, largest, True, None, "gait", "0x2001:0", "rw", False)
 
 
-class Recorder:
-    """Notes what was asked for, and answers when the test says so."""
-
-    def __init__(self) -> None:
-        self.writes: list[dict[str, float]] = []
-        self.stops: list[str] = []
-        self.answer: concurrent.futures.Future[None] = concurrent.futures.Future()
-
-    def write(self, changes: Mapping[str, float]) -> "concurrent.futures.Future[None]":
-        self.writes.append(dict(changes))
-        return self.answer
-
-    def stop(self, reason: str) -> "concurrent.futures.Future[None]":
-        self.stops.append(reason)
-        return self.answer
+def a_station(asked: FakeCommands | None = None) -> Station:
+    """With a robot; answers come at once."""
+    station = Station("exo-01", "127.0.0.1:7420", asked or FakeCommands(), lambda call: call(), News())
+    station.robot = a_robot()
+    return station
 
 
 def a_robot(at_ns: int = 0) -> Robot:
@@ -86,11 +71,10 @@ def a_robot(at_ns: int = 0) -> Robot:
     return robot
 
 
-def screen(
-    robot: Robot, controls: Controls, size: tuple[int, int] = (118, 27), gait: Gait | None = None
-) -> str:
+def screen(station: Station, controls: Controls | None = None, size: tuple[int, int] = (118, 27)) -> str:
+    controls = controls or Controls(station)
     console = Console(width=size[0], height=size[1], file=io.StringIO(), record=True, force_terminal=True)
-    console.print(draw(robot, gait or Gait(), controls, "127.0.0.1:7420", size), height=size[1])
+    console.print(draw(station, controls, "127.0.0.1:7420", size), height=size[1])
     return console.export_text()
 
 
@@ -127,49 +111,49 @@ def test_garbage_never_hides_a_stop(garbage: bytes) -> None:
 
 
 def test_arrows_choose_and_move_by_one_step() -> None:
-    asked = Recorder()
-    controls = Controls(a_robot(), asked)
+    asked = FakeCommands()
+    controls = Controls(a_station(asked))
     assert controls.selected == "gait.step_length"
     controls.press(Key.RIGHT)
-    assert asked.writes == [{"gait.step_length": 0.42}]
+    assert asked.named("write") == [({"gait.step_length": 0.42}, None)]
 
 
 def test_key_during_a_write_is_not_queued() -> None:
-    asked = Recorder()
-    controls = Controls(a_robot(), asked)
+    asked = FakeCommands()
+    controls = Controls(a_station(asked))
     controls.press(Key.RIGHT)
     controls.press(Key.RIGHT)
-    assert len(asked.writes) == 1
-    asked.answer.set_result(None)
+    assert len(asked.named("write")) == 1
+    asked.answer(Written(1, {"gait.step_length": 0.4}, {"gait.step_length": 0.42}))
     controls.press(Key.LEFT)
-    assert asked.writes[1:] == [{"gait.step_length": 0.38}]
+    assert asked.named("write")[1:] == [({"gait.step_length": 0.38}, None)]
 
 
 def test_parameter_without_limits_is_not_moved() -> None:
-    asked = Recorder()
-    controls = Controls(a_robot(), asked)
+    asked = FakeCommands()
+    controls = Controls(a_station(asked))
     controls.press(Key.DOWN)
     controls.press(Key.RIGHT)
     assert controls.selected == "gait.free"
-    assert asked.writes == []
+    assert asked.named("write") == []
     assert "gwrms set gait.free" in controls.note
 
 
 def test_parameter_whose_value_is_not_known_is_not_moved() -> None:
-    robot = a_robot()
-    robot.parameters = {"gait.step_length": ParameterValue(None, "m", 0.2, 0.6, None, "no answer")}
-    asked = Recorder()
-    Controls(robot, asked).press(Key.RIGHT)
-    assert asked.writes == []
+    asked = FakeCommands()
+    station = a_station(asked)
+    station.robot.parameters = {"gait.step_length": ParameterValue(None, "m", 0.2, 0.6, None, "no answer")}
+    Controls(station).press(Key.RIGHT)
+    assert asked.named("write") == []
 
 
 def test_stop_goes_out_also_during_a_write_and_each_time() -> None:
-    asked = Recorder()
-    controls = Controls(a_robot(), asked)
+    asked = FakeCommands()
+    controls = Controls(a_station(asked))
     controls.press(Key.RIGHT)
     controls.press(Key.STOP)
     controls.press(Key.STOP)
-    assert len(asked.stops) == 2
+    assert len(asked.named("stop")) == 2
 
 
 @pytest.mark.parametrize(
@@ -231,10 +215,10 @@ def test_scale_stands_above_the_ends_and_the_zero_of_its_needle() -> None:
 def test_live_values_are_shown_in_degrees_and_newtons(
     monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
 ) -> None:
-    robot = a_robot()
-    _feed(robot, {"left_knee.position": [math.radians(30)], "left_insole.force": [512.0]})
+    station = a_station()
+    _feed(station, {"left_knee.position": [math.radians(30)], "left_insole.force": [512.0]})
     monkeypatch.setattr("time.monotonic_ns", lambda: 1_000_000)
-    text = screen(robot, Controls(robot, Recorder()), size)
+    text = screen(station, size=size)
     assert "left knee" in text
     assert "+30.0°" in text
     assert "512 N" in text
@@ -244,69 +228,91 @@ def test_live_values_are_shown_in_degrees_and_newtons(
 
 
 def test_old_values_say_how_old_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = a_robot()
-    _feed(robot, {"left_knee.position": [0.5]})
+    station = a_station()
+    _feed(station, {"left_knee.position": [0.5]})
     monkeypatch.setattr("time.monotonic_ns", lambda: 3_000_000_000)
-    text = screen(robot, Controls(robot, Recorder()))
+    text = screen(station)
     assert "Joints 3.0 s old" in text
     assert "◌ stale" in text
 
 
 def test_missing_value_is_a_dash_and_lost_is_named_with_its_reason() -> None:
-    robot = a_robot()
+    station = a_station()
     lost: QualityInfo = {"state": "lost", "age_ms": 2500.0, "problem": "no heartbeat from node 2"}
-    robot.apply(Looked(Snapshot(0, {}, {}, {"left_knee": lost}), None, 0))
-    _feed(robot, {"left_knee.position": [None]})
-    text = screen(robot, Controls(robot, Recorder()))
+    station.take([Looked(Snapshot(0, {}, {}, {"left_knee": lost}), None, 0)])
+    _feed(station, {"left_knee.position": [None]})
+    text = screen(station)
     assert "✕ lost 2.5 s" in text
     assert "left_knee lost: no heartbeat from node 2" in text
 
 
 def test_dropped_link_is_said_before_anything_else() -> None:
-    robot = a_robot()
-    robot.apply(LinkChanged(ConnectionState.WAITING, "no gateway at 127.0.0.1:7420", 0))
-    text = screen(robot, Controls(robot, Recorder()))
+    station = a_station()
+    station.take([LinkChanged(ConnectionState.WAITING, "no gateway at 127.0.0.1:7420", 0)])
+    text = screen(station)
     assert "✕ waiting" in text
     assert "no gateway at 127.0.0.1:7420" in text
 
 
 def test_write_is_shown_as_read_back() -> None:
-    robot = a_robot()
-    robot.apply(Changed(Written(1, {"gait.step_length": 0.4}, {"gait.step_length": 0.42})))
-    assert "✓ gait.step_length 0.4 → 0.42, read back" in screen(robot, Controls(robot, Recorder()))
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
+    controls.press(Key.RIGHT)
+    assert "writing gait.step_length = 0.42 m" in screen(station, controls)
+    asked.answer(Written(1, {"gait.step_length": 0.4}, {"gait.step_length": 0.42}))
+    assert "✓ 1 parameter written and read back" in screen(station, controls)
+
+
+def test_write_whose_answer_was_lost_is_not_known() -> None:
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
+    controls.press(Key.RIGHT)
+    asked.fail(LinkLost("the link dropped"))
+    assert "✕ NOT KNOWN: the link dropped" in screen(station, controls)
 
 
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        (None, "STOP sent"),
-        (StopAnswered(Stopped({"left_knee": "confirmed"}, True)), "STOP confirmed by all 1 drives"),
+        (lambda _stopped: None, "STOP sent"),
         (
-            StopAnswered(Stopped({"left_knee": "unreachable"}, True)),
+            lambda stopped: stopped.set_result(Stopped({"left_knee": "confirmed"}, True)),
+            "STOP confirmed by all 1 drives",
+        ),
+        (
+            lambda stopped: stopped.set_result(Stopped({"left_knee": "unreachable"}, True)),
             "STOP NOT CONFIRMED: left_knee unreachable",
         ),
-        (StopAnswered(Stopped({}, True)), "STOP NOT CONFIRMED: no drives"),
-        (Failed(STOP, "there is no link"), "STOP NOT CONFIRMED: there is no link"),
+        (lambda stopped: stopped.set_result(Stopped({}, True)), "STOP NOT CONFIRMED: no drive answered"),
+        (
+            lambda stopped: stopped.set_exception(LinkLost("there is no link")),
+            "STOP NOT CONFIRMED: there is no link",
+        ),
     ],
 )
-def test_stop_is_confirmed_only_by_every_drive(answer: StopAnswered | Failed | None, words: str) -> None:
-    robot = a_robot()
-    controls = Controls(robot, Recorder())
+def test_stop_is_confirmed_only_by_every_drive(
+    answer: Callable[["Future[Stopped]"], None], words: str
+) -> None:
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
     controls.press(Key.STOP)
-    if answer is not None:
-        robot.apply(answer)
-    assert words in screen(robot, controls)
+    answer(asked.futures[-1])
+    assert words in screen(station, controls)
 
 
 def test_empty_robot_can_be_drawn() -> None:
-    robot = Robot()
-    assert "not known yet" in screen(robot, Controls(robot, Recorder()))
+    station = a_station()
+    station.robot = Robot()
+    assert "not known yet" in screen(station)
 
 
 def test_headless_line_has_a_dash_for_what_is_missing() -> None:
-    robot = a_robot()
-    _feed(robot, {"left_knee.position": [None], "left_insole.force": [300.4]})
-    line = headless.line(robot, Gait(), 7.0)
+    station = a_station()
+    _feed(station, {"left_knee.position": [None], "left_insole.force": [300.4]})
+    line = headless.line(station.robot, Gait(), 7.0)
     assert "joints – °" in line
     assert "feet 300 N" in line
     assert "– steps/min" in line
@@ -315,12 +321,16 @@ def test_headless_line_has_a_dash_for_what_is_missing() -> None:
 @pytest.mark.parametrize(
     ("size", "words"), [((118, 27), "74 steps/min, stance 61 / 58 %"), ((80, 24), "74 steps/min")]
 )
-def test_dashboard_shows_how_the_wearer_walks(size: tuple[int, int], words: str) -> None:
+def test_dashboard_shows_how_the_wearer_walks(
+    monkeypatch: pytest.MonkeyPatch, size: tuple[int, int], words: str
+) -> None:
     legs = {Leg.LEFT: LegGait(stance=0.612), Leg.RIGHT: LegGait(stance=0.58)}
-    robot = a_robot()
-    assert words in screen(robot, Controls(robot, Recorder()), size, Gait(True, 74.2, legs=legs))
-    assert "steps/min" not in screen(robot, Controls(robot, Recorder()), size)
+    station = a_station()
+    assert "steps/min" not in screen(station, size=size)
+    walks = Derived(gait=Gait(True, 74.2, legs=legs))
+    monkeypatch.setattr(station.processing, "derived", lambda: walks)
+    assert words in screen(station, size=size)
 
 
-def _feed(robot: Robot, columns: dict[str, list[float | None]]) -> None:
-    robot.apply(Telemetry(1, Batch([0], columns, 0, 0, 0, 1, 0), None))
+def _feed(station: Station, columns: dict[str, list[float | None]]) -> None:
+    station.take([Telemetry(1, Batch([0], columns, 0, 0, 0, 1, 0), None)])

@@ -1,0 +1,1 @@
+"""The trunk IMUs: a file each, whose IMUS are its languages by name."""

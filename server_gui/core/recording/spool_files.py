@@ -1,0 +1,176 @@
+"""A spool's folder: who has it, and what its files are called and tell.
+
+`00000007.db` is a segment; the highest number is written, all others are frozen, and a segment's number is
+the batch's sequence number at the store, for ever. `00000006.uploaded.db` is in the store and goes when room
+is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are not in the store, and it
+stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
+somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
+`00000004.cut.db` is a copy of a segment whose log was damaged, as it was found: commits at its end are lost.
+`receipts.jsonl` says what of each segment is in the store (receipts.py).
+"""
+
+import contextlib
+import fcntl
+import logging
+import os
+import re
+import shutil
+import sqlite3
+import uuid
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import IO, Final
+
+from ml.store import durable
+from ml.store.private import closed_folder, opener
+from server_gui.core.recording.errors import Damaged, SpoolUnusable
+from server_gui.core.recording.segment import PAGE_BYTES, SUFFIXES, Segment
+from server_gui.core.recording.wal import lost_commits
+
+log = logging.getLogger(__name__)
+
+_NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
+
+
+class Kept(Enum):
+    """What has become of a segment; as its file's name says."""
+
+    WAITING = ""
+    UPLOADED = ".uploaded"
+    DAMAGED = ".damaged"
+    CUT = ".cut"  # not the segment itself, but a copy for somebody to look at
+
+
+class Files:
+    """The files of the spool in this folder, as they are now."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def path(self, number: int, kept: Kept = Kept.WAITING) -> Path:
+        """Where a segment is, or would be."""
+        return self.folder / f"{number:08}{kept.value}.db"
+
+    def rename(self, number: int, kept: Kept) -> None:
+        """Call a segment that has waited by another name, with its log, which a reader may keep open."""
+        with writing(self.folder):
+            for suffix in SUFFIXES:
+                file = self.path(number).with_name(self.path(number).name + suffix)
+                if file.exists():
+                    file.rename(file.with_name(self.path(number, kept).name + suffix))
+            durable.sync(self.folder)
+
+    def finish_names(self) -> None:
+        """What was cut off when a segment got another name goes on."""
+        for number, kept in self.own():
+            file = self.path(number)
+            left = file.with_name(f"{file.name}-wal").exists() and not file.exists()
+            if left and kept is not Kept.WAITING:
+                self.rename(number, kept)
+
+    def segments(self) -> list[tuple[int, Kept]]:
+        """Their numbers, in order, and what has become of them; raises `SpoolUnusable`."""
+        try:
+            names = [_NAME.fullmatch(path.name) for path in self.folder.iterdir()]
+        except OSError as error:
+            reason = error.strerror or error
+            raise SpoolUnusable(f"the spool {self.folder} cannot be read: {reason}") from error
+        found = [(int(name[1]), Kept(name[2] or "")) for name in names if name]
+        return sorted(found, key=lambda each: (each[0], each[1].value))
+
+    def own(self) -> list[tuple[int, Kept]]:
+        """The segments themselves, without copies."""
+        return [(number, kept) for number, kept in self.segments() if kept is not Kept.CUT]
+
+    def all_of(self, wanted: Kept) -> list[int]:
+        """The numbers of those of which this has become."""
+        return [number for number, kept in self.segments() if kept is wanted]
+
+    def identify(self) -> str:
+        """The name of this spool at the store, given once."""
+        file = self.folder / "id"
+        if not file.exists():
+            draft = file.with_name("id.draft")
+            with open(draft, "w", opener=opener) as out:
+                out.write(f"{uuid.uuid4()}\n")
+                out.flush()
+                os.fsync(out.fileno())
+            draft.rename(file)
+            durable.sync(self.folder)
+        return file.read_text().strip()
+
+    def keep_damaged_logs(self) -> None:
+        """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
+        for number in self.all_of(Kept.WAITING):
+            log_ = self.path(number).with_name(f"{self.path(number).name}-wal")
+            if lost_commits(log_, PAGE_BYTES) and number not in self.all_of(Kept.CUT):
+                self._copy(number)
+        for number in sorted(set(self.all_of(Kept.CUT)) & set(self.all_of(Kept.WAITING))):
+            self._cut(number)
+
+    def _copy(self, number: int) -> None:
+        """The database last: where that is there, all of the copy is."""
+        for suffix in reversed(SUFFIXES):
+            source = self.path(number).with_name(self.path(number).name + suffix)
+            if not source.exists():  # the log's index; SQLite makes it anew
+                continue
+            target = self.path(number, Kept.CUT).with_name(self.path(number, Kept.CUT).name + suffix)
+            draft = target.with_name(f"{target.name}.draft")
+            with source.open("rb") as content, open(draft, "wb", opener=opener) as out:
+                shutil.copyfileobj(content, out)
+                out.flush()
+                os.fsync(out.fileno())
+            draft.rename(target)
+        durable.sync(self.folder)
+
+    def _cut(self, number: int) -> None:
+        """Let the segment itself tell what it has lost, when it goes to the store."""
+        copy = self.path(number, Kept.CUT)
+        lost = lost_commits(copy.with_name(f"{copy.name}-wal"), PAGE_BYTES)
+        with (
+            contextlib.suppress(Damaged),  # then it is set aside as a whole
+            contextlib.closing(Segment(self.path(number), number, written=True)) as segment,
+        ):
+            if not segment.cut_commits:
+                segment.cut(lost)
+                log.error(
+                    "the log of batch %d was damaged: up to %d commits are lost; %s is a copy of both",
+                    number, lost, copy,
+                )  # fmt: skip
+
+
+@contextlib.contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Turn what the disk refuses within the block into `SpoolUnusable`."""
+    try:
+        yield
+    except (sqlite3.Error, OSError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SpoolUnusable(f"the spool {folder} cannot be written: {reason}") from error
+
+
+def has_log(file: Path) -> bool:
+    """Whether something was written to a database and is not in its file yet."""
+    log_ = file.with_name(f"{file.name}-wal")
+    return log_.exists() and log_.stat().st_size > 0
+
+
+def take(folder: Path) -> IO[bytes]:
+    """The folder's lock, which ends with the process, however that ends."""
+    try:
+        closed_folder(folder)
+        lock = open(folder / "lock", "ab", opener=opener)  # noqa: SIM115 - held as long as the spool
+    except OSError as error:
+        raise SpoolUnusable(
+            f"the spool's folder {folder} cannot be used: {error.strerror or error}; "
+            'give another one with spool = "…" in [recorder] of the server\'s file'
+        ) from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        lock.close()
+        raise SpoolUnusable(
+            f"another server records into {folder}; end it first, or give this one another folder"
+        ) from error
+    return lock
