@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
 
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.classic import ClassicPort
 from gateway.connections.intake import Inlet, Intake
 from gateway.connections.places import Places

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.intake import StopNow
 from gateway.handlers import Handlers
 from gateway.process.futures import done, failed

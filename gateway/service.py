@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from gateway import __version__
 from gateway.always_on import Standing
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.session import Answer, Session
 from gateway.handlers import Handlers, on
 from gateway.modules.resource.module import RESOURCE_CHANNELS

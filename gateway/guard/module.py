@@ -9,10 +9,10 @@ from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from drivers.bus.arming import Arming
+from gateway.config.guard import GuardSettings, limit
+from gateway.config.guard_rules import Action
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
-from gateway.guard.rules import Action
-from gateway.guard.settings import GuardSettings, limit
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.handlers import Handlers

@@ -11,7 +11,7 @@ from enum import Enum
 from drivers.bus.values import size_of
 from eds.datatypes import DATA_TYPES
 from gateway.coding import Coding, CodingError, Number, text
-from gateway.config import ParameterSettings
+from gateway.config.robot import ParameterSettings
 from gateway.wire.framing import Kind, RpcError, refuse
 from gateway.wire.parameter import ParameterInfo
 

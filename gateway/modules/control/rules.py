@@ -16,7 +16,7 @@ from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.settings import JointSettings
 from gateway.coding import too_far
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.objects import Node, results
 from gateway.modules.control.parameters import Parameter

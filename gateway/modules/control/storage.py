@@ -14,7 +14,8 @@ from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError, NotPermitted
 from drivers.joint.cia402 import ENERGISED, STATE_WORDS
 from gateway.coding import Number, text
-from gateway.config import RESTORE, STORE, DeviceTable, JointTable, RobotConfig
+from gateway.config.objects import RESTORE, STORE
+from gateway.config.robot import DeviceTable, JointTable, RobotConfig
 from gateway.modules.control.objects import Node, download, read, result
 from gateway.modules.control.parameters import READABLE, Parameter
 from gateway.modules.control.rules import Rules

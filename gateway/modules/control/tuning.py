@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from drivers.errors import DeviceTimeout, DriverError
 from drivers.samples import State
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 from drivers.bus.settings import Role
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.modules.stop.authority import Address, Authority
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive

@@ -32,7 +32,7 @@ TOKENS = (
     b"127",
     b"1.0",
 )
-MODULES = ("gateway.config",)
+MODULES = ("gateway.config.reading", "gateway.config.checks")
 
 
 def fuzz(data: bytes) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from drivers.joint.cia402 import DriveState
 from gateway import coding
-from gateway.config import ParameterSettings
+from gateway.config.robot import ParameterSettings
 from gateway.modules.control import catalogue, offer, parameters, rules
 from gateway.modules.control.parameters import Lock, Parameter
 from gateway.wire.framing import Kind, RpcError
