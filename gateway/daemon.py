@@ -56,7 +56,9 @@ class Daemon:
         self._intake = Intake(self._loop, listener, self._open, lambda: self._service.registry.stop_now)
         self._classic: ClassicPort | None = None
         if classic is not None:
-            self._classic = ClassicPort(self._loop, classic, self._service.registry, self._left)
+            self._classic = ClassicPort(
+                self._loop, classic, self._service.use_resource, self._service.registry.leave, self._left
+            )
 
     @property
     def classic_port(self) -> int | None:

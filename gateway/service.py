@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Protocol, cast
 
@@ -12,8 +12,8 @@ from gateway.config.robot import RobotConfig
 from gateway.connections.session import Answer, Session
 from gateway.handlers import Handlers, on
 from gateway.modules.resource.module import RESOURCE_CHANNELS
+from gateway.modules.stop.first_stop import FirstStop
 from gateway.process.boot import boot_id
-from gateway.process.first_stop import FirstStop
 from gateway.process.futures import gather, then
 from gateway.process.loop import Loop
 from gateway.records.folder import RecordsFolder
@@ -148,6 +148,10 @@ class Service:
 
         return then(module, answer)
 
+    def use_resource(self, user: Hashable) -> "Future[ResourceModule]":
+        """The module that measures the computer, running for `user` until the registry is told to leave."""
+        return cast("Future[ResourceModule]", self.registry.use("resource", user))
+
     def _use(self, name: str, session: Session) -> "Future[Module]":
         # What a client asked for just before it vanished is still done (a stop above all).
         user = None if session.closed else session
@@ -213,7 +217,7 @@ class Service:
         return cast("GuardModule | None", running)
 
     def _cost(self, session: Session, _params: Params) -> "Future[GatewayCost]":
-        resource = cast("Future[ResourceModule]", self._use("resource", session))
+        resource = self.use_resource(None if session.closed else session)
         return then(resource, lambda running: self._look_at_costs(session, running))
 
     def _look_at_costs(self, session: Session, resource: "ResourceModule") -> GatewayCost:
