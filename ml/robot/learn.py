@@ -16,7 +16,7 @@ from sklearn.preprocessing import StandardScaler
 
 from ml.errors import UnusableData
 from ml.features.recipe import Features, Recipe
-from ml.models.scaling import fixed_epochs
+from ml.neural import fixed_epochs
 from ml.robot import familiar
 from ml.robot.learned import Floats, Learned, on_circle, scaled, scores, softmax
 from ml.robot.network import FAR, Rows, outputs

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ml.errors import UnusableData
-from ml.models.scaling import fixed_epochs
+from ml.neural import fixed_epochs
 from ml.robot.learn import BATCH, pointers
 from ml.robot.learned import Learned, scaled
 from ml.robot.network import FAR

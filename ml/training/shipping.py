@@ -20,11 +20,11 @@ from ml.registry.code import features_hash, versions
 from ml.registry.registry import SHIPPED, Registry
 from ml.robot.groups import unit
 from ml.robot.learn import learn
-from ml.robot.simulated import Session, examples, read, stepping
 from ml.robot.task import TASKS, Task
 from ml.store.labels import Source as Said
 from ml.training.dataset import RANGE, Ask, Part
 from ml.training.judging import judge
+from ml.training.simulated import Session, examples, read, stepping
 
 SEED: Final = 0
 HELD_OUT: Final = 4  # one person in so many

@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 
 from gateway.cli.text import say, say_json, table
-from ml.evaluate import BENCHMARKS, Benchmark, Outcome
-from ml.evaluate.report import number, page
+from ml.benchmarks import BENCHMARKS, Benchmark, Outcome
+from ml.benchmarks.report import number, page
 from ml.store.private import private_files
 
 EPILOG = f"""benchmarks

@@ -16,17 +16,17 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from ml.benchmarks.models.falling import FallSettings, fall_trees
+from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
+from ml.benchmarks.models.gait_status import status_model
+from ml.benchmarks.models.terrain import terrain_model
+from ml.benchmarks.models.trees import QuickTrees
 from ml.features import FeatureStream, Recipe, features
 from ml.features.falling import FALLING
 from ml.features.gait_phase import LEFT_PHASE
 from ml.features.gait_status import GAIT_STATUS
 from ml.features.terrain import TERRAIN
-from ml.models.falling import FallSettings, fall_trees
-from ml.models.gait_phase import PhaseModel, PhaseSettings
-from ml.models.gait_status import status_model
-from ml.models.scaling import fixed_epochs
-from ml.models.terrain import terrain_model
-from ml.models.trees import QuickTrees
+from ml.neural import fixed_epochs
 from ml.robot.groups import GROUPS
 from ml.robot.learn import learn
 from ml.robot.learned import Learned

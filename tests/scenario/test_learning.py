@@ -17,12 +17,12 @@ import pytest
 
 from gateway import main
 from ml.robot.groups import GROUPS
-from ml.robot.simulated import Session, read
 from ml.robot.task import TASKS
 from ml.store import NoSuchTable, Store
 from ml.store.labels import Label, Source
 from ml.store.sessions import Session as Stored
 from ml.store.sessions import labels, sessions
+from ml.training.simulated import Session, read
 from server_gui.core.archive.labelling import Labelling
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.settings.server_file import load

@@ -6,9 +6,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+from ml.benchmarks import alarms
+from ml.benchmarks.alarms import Told
 from ml.errors import UnusableData
-from ml.evaluate import alarms
-from ml.evaluate.alarms import Told
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction.rehearsal import Rehearsed, Stretch, rehearse
 from server_gui.core.prediction.replay import Replayed

@@ -1,7 +1,7 @@
 """Simulated sessions as `gwrms sim-record` writes them."""
 
 from ml.errors import UnusableData
-from ml.robot.simulated import read
+from ml.training.simulated import read
 from tests.fuzz.files import as_file
 
 TOKENS = (
@@ -17,7 +17,7 @@ TOKENS = (
     b"true",
     b"9223372036854775808",
 )
-MODULES = ("ml.robot.simulated",)
+MODULES = ("ml.training.simulated",)
 
 
 def fuzz(data: bytes) -> None:

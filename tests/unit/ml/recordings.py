@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate import ipol, sisfall, terrain
+from ml.benchmarks import ipol, sisfall, terrain
 
 Arrays = dict[str, npt.NDArray[Any]]
 STAND, WALK, TURN = range(3)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ml.benchmarks import BENCHMARKS, adapt, fall, ipol, metrics, phase, strides
+from ml.benchmarks.models.falling import FallSettings
+from ml.benchmarks.models.gait_phase import PhaseSettings
+from ml.benchmarks.sisfall import Recording
 from ml.errors import UnusableData
-from ml.evaluate import BENCHMARKS, adapt, fall, ipol, metrics, phase, strides
-from ml.evaluate.sisfall import Recording
-from ml.models.falling import FallSettings
-from ml.models.gait_phase import PhaseSettings
 from server_gui.cli.evaluate import main
 from tests.unit.ml import recordings
 from tests.unit.ml.recordings import Arrays, saved

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ml.evaluate import folds, ipol, metrics
-from ml.evaluate.outcome import Goal
-from ml.evaluate.search import chosen, told
-from ml.evaluate.strides import heel_strikes
+from ml.benchmarks import folds, ipol, metrics
+from ml.benchmarks.outcome import Goal
+from ml.benchmarks.search import chosen, told
+from ml.benchmarks.strides import heel_strikes
 from tests.unit.ml import recordings
 
 PEOPLE = np.array([1, 1, 2, 2, 2, 3, 4, 4, 5])

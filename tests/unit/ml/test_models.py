@@ -8,12 +8,12 @@ import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 from threadpoolctl import threadpool_limits
 
+from ml.benchmarks.models.falling import FAR, FallDetector, FallSettings, trailing_mean
+from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
+from ml.benchmarks.models.gait_status import status_model
+from ml.benchmarks.models.trees import QuickTrees
 from ml.errors import UnusableData
-from ml.models.falling import FAR, FallDetector, FallSettings, trailing_mean
-from ml.models.gait_phase import PhaseModel, PhaseSettings
-from ml.models.gait_status import status_model
-from ml.models.scaling import fixed_epochs
-from ml.models.trees import QuickTrees
+from ml.neural import fixed_epochs
 
 Floats = npt.NDArray[np.float32]
 SMALL = PhaseSettings(hidden=(16, 8), networks=1, first_epochs=15, epochs=15)

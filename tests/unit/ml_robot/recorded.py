@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.robot.groups import GROUPS, unit
-from ml.robot.simulated import TRUTH
+from ml.training.simulated import TRUTH
 
 CHANNELS: Final = tuple(channel for group in GROUPS.values() for channel in group)
 HZ: Final = 100

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from ml.benchmarks import BENCHMARKS, sim, sim_activity, sim_phase
 from ml.errors import UnusableData
-from ml.evaluate import BENCHMARKS, sim, sim_activity, sim_phase
 from ml.robot import familiar, learn
 from server_gui.cli.evaluate import main
 from tests.unit.ml_robot.recorded import written

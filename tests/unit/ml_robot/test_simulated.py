@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ml.errors import UnusableData
-from ml.robot.simulated import examples, read, stepping
 from ml.robot.task import TASKS, recipe_named
 from ml.serving.predictor import replayed
+from ml.training.simulated import examples, read, stepping
 from tests.unit.ml_robot.recorded import CHANNELS, lines, written
 from tests.unit.ml_robot.test_learned import learned
 

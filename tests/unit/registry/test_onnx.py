@@ -12,7 +12,7 @@ from ml.features.recipe import Features
 from ml.registry import onnx
 from ml.registry.registry import Registry
 from ml.robot.learned import NONE, Learned
-from ml.robot.simulated import TRUTH
+from ml.training.simulated import TRUTH
 from tests.unit.ml_robot import recorded
 from tests.unit.registry.models import features, learned
 

@@ -12,13 +12,13 @@ from typing import Final, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import folds
 from ml.errors import UnusableData
-from ml.evaluate import folds
 from ml.features.recipe import Recipe
-from ml.robot import simulated
 from ml.robot.groups import GROUPS, unit
-from ml.robot.simulated import Examples, Session
 from ml.robot.task import Task
+from ml.training import simulated
+from ml.training.simulated import Examples, Session
 
 FOLDS: Final = 3
 MOST: Final = 24_000  # decisions that are learned from and judged: more say no more

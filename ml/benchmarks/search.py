@@ -7,7 +7,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate.folds import Rows, grouped
+from ml.benchmarks.folds import Rows, grouped
 
 S = TypeVar("S")
 Search = bool  # whether the settings are chosen anew, or those fixed in the code are taken

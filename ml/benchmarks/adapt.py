@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import folds, ipol, metrics
+from ml.benchmarks.models.gait_phase import PhaseSettings
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.phase import WHY, WITHIN, errors_of, fitted, percent
+from ml.benchmarks.search import Search, chosen, told
+from ml.benchmarks.strides import Decisions, decisions, lessons
 from ml.errors import UnusableData
-from ml.evaluate import folds, ipol, metrics
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.phase import WHY, WITHIN, errors_of, fitted, percent
-from ml.evaluate.search import Search, chosen, told
-from ml.evaluate.strides import Decisions, decisions, lessons
 from ml.features.gait_status import RATE_HZ
-from ml.models.gait_phase import PhaseSettings
 
 MINUTE_S: Final = 60.0  # of walking
 SETTINGS: Final = PhaseSettings()

@@ -1,6 +1,6 @@
 """Evaluation: benchmarks on recordings of people, real or simulated, who are never on both sides.
 
-benchmarks.py               their names, questions and goals
+catalogue.py                their names, questions and goals
 status.py, phase.py, adapt.py, fall.py, terrain.py    one each
 ipol.py, sisfall.py, arrays.py    how recordings are read and checked
 sim_activity.py, sim_phase.py, sim_falling.py    those on simulated people, one each
@@ -10,8 +10,8 @@ folds.py, search.py, metrics.py   splits, tuning on training subjects alone, fig
 outcome.py, report.py       what was found, and a page about it
 """
 
+from ml.benchmarks.catalogue import BENCHMARKS, Benchmark
+from ml.benchmarks.outcome import Goal, Outcome
 from ml.errors import UnusableData
-from ml.evaluate.benchmarks import BENCHMARKS, Benchmark
-from ml.evaluate.outcome import Goal, Outcome
 
 __all__ = ["BENCHMARKS", "Benchmark", "Goal", "Outcome", "UnusableData"]

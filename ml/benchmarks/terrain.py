@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 from sklearn.model_selection import StratifiedGroupKFold
 
-from ml.evaluate import folds, metrics
-from ml.evaluate.arrays import Arrays
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.search import Search, chosen, told
+from ml.benchmarks import folds, metrics
+from ml.benchmarks.arrays import Arrays
+from ml.benchmarks.models.terrain import TerrainSettings, terrain_model
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.search import Search, chosen, told
 from ml.features.terrain import RATE_HZ, TERRAIN
-from ml.models.terrain import TerrainSettings, terrain_model
 
 MODES: Final = ("level", "stair_up", "stair_down", "incline20_treadmill")
 CHANNELS: Final = (

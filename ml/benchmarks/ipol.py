@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate.arrays import Arrays
+from ml.benchmarks.arrays import Arrays
 from ml.features.gait_status import RATE_HZ
 
 STATUSES: Final = ("stand", "walk", "turn")

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate.arrays import Arrays
+from ml.benchmarks.arrays import Arrays
 from ml.features.falling import RATE_HZ
 
 CHANNELS: Final = ("acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z")

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from sklearn.model_selection import GroupKFold
 from threadpoolctl import threadpool_limits
 
-from ml.models.scaling import fixed_epochs
+from ml.neural import fixed_epochs
 
 Rows = npt.NDArray[np.intp]
 Split = tuple[Rows, Rows]  # rows to train on, rows to judge by

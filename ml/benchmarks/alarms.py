@@ -12,12 +12,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate import fall, folds, ipol, sisfall, status
+from ml.benchmarks import fall, folds, ipol, sisfall, status
+from ml.benchmarks.models.falling import FallDetector
+from ml.benchmarks.models.gait_status import status_model
 from ml.features import features
 from ml.features.falling import FALLING, RATE_HZ
 from ml.features.gait_status import GAIT_STATUS
-from ml.models.falling import FallDetector
-from ml.models.gait_status import status_model
 
 Floats = npt.NDArray[np.float64]
 Causes = Mapping[str, Sequence[tuple[float, float]]]

@@ -8,13 +8,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import folds, ipol, metrics
+from ml.benchmarks.models.gait_status import StatusSettings, status_model
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.search import Search, chosen, told
 from ml.errors import UnusableData
-from ml.evaluate import folds, ipol, metrics
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.search import Search, chosen, told
 from ml.features import features
 from ml.features.gait_status import GAIT_STATUS
-from ml.models.gait_status import StatusSettings, status_model
 
 FIRST: Final = 50  # the first sample of a trial that is judged, and then each STEP later
 STEP: Final = 20

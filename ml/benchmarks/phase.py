@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate import folds, ipol, metrics
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.search import Search, chosen, told
-from ml.evaluate.strides import Decisions, decisions, lessons
-from ml.models.gait_phase import PhaseModel, PhaseSettings
+from ml.benchmarks import folds, ipol, metrics
+from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.search import Search, chosen, told
+from ml.benchmarks.strides import Decisions, decisions, lessons
 
 SETTINGS: Final = PhaseSettings()
 GRID: Final = (

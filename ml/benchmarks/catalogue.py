@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from ml.evaluate import adapt, fall, phase, sim_activity, sim_falling, sim_phase, status, terrain
-from ml.evaluate.outcome import Goal, Outcome
-from ml.evaluate.sim import WHOLE, recipe_of
+from ml.benchmarks import adapt, fall, phase, sim_activity, sim_falling, sim_phase, status, terrain
+from ml.benchmarks.outcome import Goal, Outcome
+from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.features import Recipe
 from ml.features.falling import FALLING
 from ml.features.gait_phase import LEFT_PHASE

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import ipol
 from ml.errors import UnusableData
-from ml.evaluate import ipol
 from ml.features import Recipe, features
 from ml.features.gait_phase import LEFT_PHASE, RIGHT_PHASE
 from ml.features.gait_status import CHANNELS

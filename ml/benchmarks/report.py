@@ -5,8 +5,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-from ml.evaluate.benchmarks import Benchmark
-from ml.evaluate.outcome import Outcome
+from ml.benchmarks.catalogue import Benchmark
+from ml.benchmarks.outcome import Outcome
 
 STYLE: Final = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }

@@ -8,12 +8,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.errors import UnusableData
-from ml.evaluate import metrics
-from ml.evaluate.folds import Split
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.search import Search
-from ml.evaluate.sim import (
+from ml.benchmarks import metrics
+from ml.benchmarks.folds import Split
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.search import Search
+from ml.benchmarks.sim import (
     NOISE,
     SETTINGS,
     WHOLE,
@@ -23,9 +22,10 @@ from ml.evaluate.sim import (
     people,
     recipe_of,
 )
+from ml.errors import UnusableData
 from ml.robot.learn import learn
-from ml.robot.simulated import Examples, examples
 from ml.robot.task import FALLING_TASK
+from ml.training.simulated import Examples, examples
 
 STEP: Final = 2  # grid samples: 40 ms
 STEADY_SHARE: Final = 6  # every so-manieth steady decision is learned from: they are many and alike

@@ -10,7 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline
 
-from ml.models.scaling import scaled
+from ml.neural import scaled
 
 Features = npt.NDArray[np.float32]
 Phases = npt.NDArray[np.float64]

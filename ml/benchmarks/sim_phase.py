@@ -6,12 +6,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate import metrics
-from ml.evaluate.folds import Split
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.phase import WITHIN, percent
-from ml.evaluate.search import Search
-from ml.evaluate.sim import (
+from ml.benchmarks import metrics
+from ml.benchmarks.folds import Split
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.phase import WITHIN, percent
+from ml.benchmarks.search import Search
+from ml.benchmarks.sim import (
     HIPS,
     NO_FEET,
     NOISE,
@@ -27,8 +27,8 @@ from ml.evaluate.sim import (
 from ml.registry.judged import calibrated
 from ml.robot import learn
 from ml.robot.learned import NONE
-from ml.robot.simulated import Examples, stepping
 from ml.robot.task import GAIT_PHASE, SIDES
+from ml.training.simulated import Examples, stepping
 
 STEP: Final = 10  # grid samples: 200 ms
 VARIANTS: Final = (NO_FEET, HIPS)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from sklearn.ensemble import HistGradientBoostingClassifier, VotingClassifier
 from sklearn.neural_network import MLPClassifier
 
-from ml.models.scaling import scaled
+from ml.neural import scaled
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate import folds, sisfall
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.search import Search, chosen, told
+from ml.benchmarks import folds, sisfall
+from ml.benchmarks.models.falling import FAR, FallDetector, FallSettings
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.search import Search, chosen, told
 from ml.features import features
 from ml.features.falling import FALLING, RATE_HZ
-from ml.models.falling import FAR, FallDetector, FallSettings
 
 STEP: Final = 2  # samples between decisions: 40 ms
 FIRST: Final = 25  # samples of a recording before its first decision

@@ -7,11 +7,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.evaluate import metrics
-from ml.evaluate.folds import Split
-from ml.evaluate.outcome import Outcome
-from ml.evaluate.search import Search
-from ml.evaluate.sim import (
+from ml.benchmarks import metrics
+from ml.benchmarks.folds import Split
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.search import Search
+from ml.benchmarks.sim import (
     HIPS_TRUNK,
     NO_FEET,
     NO_TRUNK,
@@ -28,8 +28,8 @@ from ml.evaluate.sim import (
 from ml.registry.judged import calibrated
 from ml.robot.learn import learn
 from ml.robot.learned import NONE, STRANGE
-from ml.robot.simulated import LOST, Examples
 from ml.robot.task import ACTIVITY
+from ml.training.simulated import LOST, Examples
 
 STEP: Final = 10  # grid samples: 200 ms
 NEAR_NS: Final = 500_000_000  # around a change that is not steady
