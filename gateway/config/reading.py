@@ -12,7 +12,6 @@ from drivers.bus.settings import CanSettings
 from drivers.imu.settings import MountedSettings, kind_of
 from drivers.insole.settings import InsoleSettings
 from gateway.config.checks import complaints
-from gateway.config.guard import WATCHES, GuardSettings
 from gateway.config.robot import (
     NAME,
     ControlLoopSettings,
@@ -90,6 +89,8 @@ def _convert(path: Path, document: Table) -> RobotConfig:
 
 def _guard(table: Any) -> Struct:
     """`[guard]` with its rules, each by what it watches."""
+    from gateway.config.guard import GuardSettings  # here and below: for a file that has a guard only
+
     if not isinstance(table, dict) or not isinstance(table.get("rule", {}), dict):
         raise ConfigError("[guard] is a table, and so is each of its rules: write [guard.rule.NAME]")
     rules = {name: _rule(f"[guard.rule.{name}]", name, rule) for name, rule in table.get("rule", {}).items()}
@@ -97,6 +98,8 @@ def _guard(table: Any) -> Struct:
 
 
 def _rule(where: str, name: str, table: Any) -> Struct:
+    from gateway.config.guard import WATCHES
+
     watch = table.get("watch") if isinstance(table, dict) else None
     if not isinstance(watch, str) or watch not in WATCHES:
         raise ConfigError(f"{where} watch: say what it watches, one of {', '.join(WATCHES)}")

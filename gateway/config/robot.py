@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -12,10 +12,12 @@ from drivers.component import Kind
 from drivers.imu.settings import CanImuSettings, MountedSettings, NodeImuSettings
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.settings import JointSettings
-from gateway.config.guard import GuardSettings
 from gateway.config.objects import ObjectName, address_of
 from gateway.config.stop import StopSettings
 from gateway.records.folder import default_folder
+
+if TYPE_CHECKING:
+    from gateway.config.guard import GuardSettings
 
 Node = tuple[str, int]  # a bus by its name, and a node id there
 OnBus = JointSettings | DeviceSettings | CanImuSettings | NodeImuSettings
@@ -119,7 +121,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     imu: dict[str, MountedSettings] = {}
     parameter: dict[str, ParameterSettings] = {}
     stop: StopSettings = StopSettings()
-    guard: GuardSettings | None = None
+    guard: "GuardSettings | None" = None
     control_loop: ControlLoopSettings | None = None
 
     def node_of(self, component: str) -> Node:

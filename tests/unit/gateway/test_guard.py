@@ -145,7 +145,7 @@ with Client(daemon.address) as client:
     assert client.call("robot.describe")["guard"]["configured"] is False
 daemon.end()
 thread.join()
-print(*sorted(name for name in sys.modules if name.startswith("gateway.guard.")))
+print(*sorted(name for name in sys.modules if name.startswith(("gateway.guard.", "gateway.config.guard"))))
 """
     shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert shown.stdout.split() == []

@@ -25,7 +25,6 @@ from gateway.wire.methods import METHODS
 from gateway.wire.stop import ROBOT_RESET, Reset
 from gateway.wire.stream import StreamData
 from tests.unit.gateway.harness import HEAD, Answered, Bench, Client, config
-from tools.draw_wire import drawn
 
 CONTRACT = Path(__file__).with_name("wire_contract.json")
 NAMES_OF_HANDLERS = {"Session": Session, "Future": Future, "msgspec": msgspec}
@@ -171,8 +170,3 @@ def _without_words(schema: Any) -> Any:
     if isinstance(schema, dict):
         return {key: _without_words(one) for key, one in schema.items() if key != "description"}
     return [_without_words(one) for one in schema] if isinstance(schema, list) else schema
-
-
-def test_the_reference_is_drawn_from_the_methods() -> None:
-    page = Path(__file__).parents[3] / "docs" / "reference" / "wire.md"
-    assert page.read_text(encoding="utf-8") == drawn(), "python -m tools.draw_wire > docs/reference/wire.md"

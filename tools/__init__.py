@@ -1,1 +1,0 @@
-"""What draws the references and makes the figures of the docs."""
