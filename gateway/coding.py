@@ -9,9 +9,11 @@ import math
 import struct
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal
+from enum import StrEnum
+from typing import Protocol
 
 from drivers.bus.values import decode, size_of
-from eds.datatypes import DATA_TYPES, DataType
+from eds.datatypes import DATA_TYPE_BY_NAME, DATA_TYPES, DataType
 
 Number = int | float
 
@@ -29,11 +31,6 @@ def scaled(number: Number, scale: float) -> Number:
     if isinstance(number, int) and scale.is_integer():
         return number * int(scale)
     return float(Decimal(repr(number)) * Decimal(repr(scale)))
-
-
-def too_far(before: Number, after: Number, most: float) -> bool:
-    """Whether a change is larger than the largest step; one of exactly that size, in binary, is not."""
-    return abs(after - before) > most * (1 + 1e-9)
 
 
 def text(value: Number) -> str:
@@ -110,3 +107,51 @@ class Coding:
         if not math.isfinite(number):
             raise CodingError(f"{number:g} is no finite {self.type.name}")
         return number
+
+
+def coding_of(type_name: str, scale: float) -> Coding | None:
+    """The coding of a parameter as a robot describes it; `None` where it does not tell its type."""
+    code = DATA_TYPE_BY_NAME.get(type_name)
+    return None if code is None else Coding(code, scale)
+
+
+class Limit(StrEnum):
+    """What a value can be beyond, by its key in the robot's file."""
+
+    MIN = "min"
+    MAX = "max"
+    MAX_STEP = "max_step"
+
+
+class Limited(Protocol):
+    """A parameter, as a robot describes it or as it holds it itself."""
+
+    @property
+    def min(self) -> Number | None: ...
+
+    @property
+    def max(self) -> Number | None: ...
+
+    @property
+    def max_step(self) -> float | None: ...
+
+
+def broken_limit(
+    parameter: Limited, coding: Coding | None, value: Number, before: Number | None = None
+) -> Limit | None:
+    """The first limit that a value is beyond, as the device would hold that limit; `None` where it keeps all.
+
+    `before` is what it would take the place of. A step of exactly the largest, in binary, is none too far.
+    """
+
+    def held(limit: Number) -> Number:
+        return limit if coding is None else coding.nearest(limit)
+
+    least, most, step = parameter.min, parameter.max, parameter.max_step
+    if least is not None and value < held(least):
+        return Limit.MIN
+    if most is not None and value > held(most):
+        return Limit.MAX
+    if step is not None and before is not None and abs(value - before) > step * (1 + 1e-9):
+        return Limit.MAX_STEP
+    return None

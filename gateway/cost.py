@@ -10,7 +10,7 @@ from gateway.connections.session import Session
 from gateway.streaming.outlets import Outlet
 from gateway.streaming.rates import Rates
 from gateway.streaming.streams import Streams
-from gateway.wire.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
+from gateway.wire.cost import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
 
 FRAME_BITS = 47  # of an 11-bit data frame, with the gap behind it and without its data
 

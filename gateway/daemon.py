@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
 
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.classic import ClassicPort
 from gateway.connections.intake import Inlet, Intake
 from gateway.connections.places import Places
@@ -56,7 +56,9 @@ class Daemon:
         self._intake = Intake(self._loop, listener, self._open, lambda: self._service.registry.stop_now)
         self._classic: ClassicPort | None = None
         if classic is not None:
-            self._classic = ClassicPort(self._loop, classic, self._service.registry, self._left)
+            self._classic = ClassicPort(
+                self._loop, classic, self._service.use_resource, self._service.registry.leave, self._left
+            )
 
     @property
     def classic_port(self) -> int | None:

@@ -14,28 +14,23 @@ from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Protocol
 
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
+from gateway.connections.intake import StopNow
+from gateway.handlers import Handlers
 from gateway.process.futures import done, failed
 from gateway.process.loop import Loop, Timer
 from gateway.wire import framing
 
-if TYPE_CHECKING:
-    from gateway.connections.session import Answer, Session
-
 log = logging.getLogger(__name__)
-
-
-# Carries out a stop for whom, and why; may be called from any thread.
-StopNow = Callable[[str, str], "Future[Any]"]
 
 
 class Module(Protocol):
     """What a module is to the daemon. `start` and `stop` may take their time; all else runs in the loop."""
 
     @property
-    def handlers(self) -> "Mapping[str, Callable[[Session, Any], Answer]]": ...
+    def handlers(self) -> Handlers: ...
 
     def start(self) -> None: ...
 

@@ -2,56 +2,65 @@
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol, cast
 
 from gateway import __version__
 from gateway.always_on import Standing
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.session import Answer, Session
-from gateway.connections.stop_lines import STOP
+from gateway.handlers import Handlers, on
 from gateway.modules.resource.module import RESOURCE_CHANNELS
+from gateway.modules.stop.first_stop import FirstStop
 from gateway.process.boot import boot_id
-from gateway.process.first_stop import FirstStop
 from gateway.process.futures import gather, then
 from gateway.process.loop import Loop
 from gateway.records.folder import RecordsFolder
 from gateway.registry import MODULES, Module, Registry, Spec
 from gateway.streaming.budget import Budget
-from gateway.streaming.sources import channel_info, check_globs, merge, narrow
+from gateway.streaming.sources import Selection, channel_info, check_globs, merge, narrow
 from gateway.streaming.streams import Streams
-from gateway.wire import framing, messages
+from gateway.wire import framing
+from gateway.wire.cost import GATEWAY_COST, GatewayCost
+from gateway.wire.method import Done, Params
+from gateway.wire.methods import METHODS
+from gateway.wire.robot import (
+    CLOCK_READ,
+    HELLO,
+    ROBOT_DESCRIBE,
+    Clock,
+    Description,
+    GuardInfo,
+    Hello,
+    HelloParams,
+)
+from gateway.wire.stop import ROBOT_STOP
+from gateway.wire.stream import STREAM_START, STREAM_STOP, StreamStarted, StreamStartParams, StreamStopParams
 
 if TYPE_CHECKING:
     from gateway.cost import Costs
+    from gateway.guard.module import GuardModule
+    from gateway.modules.component.module import ComponentModule
+    from gateway.modules.control.module import ControlModule, Described
+    from gateway.modules.resource.module import ResourceModule
 
 log = logging.getLogger(__name__)
 
 CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are configured
 
-# Which module answers what; the rest is the service's own.
-MODULE_OF: Mapping[str, str] = {
-    "resource.snapshot": "resource",
-    "resource.overruns": "blame",
-    "component.snapshot": "component",
-    "status.snapshot": "status",
-    "robot.stop": "control",
-    "control.acquire": "control",
-    "control.release": "control",
-    "parameter.list": "control",
-    "parameter.read": "control",
-    "parameter.write": "control",
-    "parameter.confirm": "control",
-    "parameter.revert": "control",
-    "parameter.store": "control",
-    "parameter.restore": "control",
-    "robot.reset": "control",
-    "robot.enable": "control",
-    "journal.tail": "control",
-}
-
 MAY_MOVE = ("component", "status")  # who looks at these may have to stop the robot
+
+
+class Streamed(Protocol):
+    """A module whose channels can be streamed."""
+
+    @property
+    def absent(self) -> Mapping[str, str]:
+        """Components that are not there, and why."""
+
+    def selections(self) -> list[Selection]:
+        """All its channels, by their sources."""
 
 
 class Service:
@@ -67,14 +76,14 @@ class Service:
         self._boot_id = boot_id()
         self._first_stop = FirstStop(config)
         self._guard_problem = "it has not started yet"
-        self._own: Mapping[str, Callable[[Session, Any], Answer]] = {
-            "hello": self._hello,
-            "clock.read": lambda _session, _params: self._clock(),
-            "robot.describe": self._describe,
-            "gateway.cost": self._cost,
-            "stream.start": self._stream_start,
-            "stream.stop": self._stream_stop,
-        }
+        self.handlers = Handlers(
+            on(HELLO, self._hello),
+            on(CLOCK_READ, self._read_clock),
+            on(ROBOT_DESCRIBE, self._describe),
+            on(GATEWAY_COST, self._cost),
+            on(STREAM_START, self._stream_start),
+            on(STREAM_STOP, self._stream_stop),
+        )
 
     def resume(self) -> None:
         """Begin what needs no client: a configured guard, and what the last gateway left unfinished."""
@@ -97,7 +106,7 @@ class Service:
 
     def objection(self) -> str | None:
         """Why the gateway must not end now, in words; `None` where it may."""
-        guard: Any = self.registry.running("guard") if self._config.guard is not None else None
+        guard = self._running_guard()
         return None if guard is None else guard.objection()
 
     @property
@@ -123,22 +132,25 @@ class Service:
             RpcError: the method or its parameters cannot be served.
 
         """
-        method = messages.METHODS.get(request.method)
+        method = METHODS.get(request.method)
         if method is None:
             raise framing.unknown_method(request.method)
         params = framing.decode_params(request.params, method.params)
-        own = self._own.get(request.method)
-        if own is not None:
-            return own(session, params)
-        if request.method == STOP and self.registry.running("control") is None:
+        if method.module is None:
+            return self.handlers.answer(method, session, params)
+        if method is ROBOT_STOP and self.registry.running(method.module) is None:
             self._first_stop.begin()
-        module, asked_ns = self._use(MODULE_OF[request.method], session), session.asked_ns
+        module, asked_ns = self._use(method.module, session), session.asked_ns
 
         def answer(running: Module) -> Answer:
             session.asked_ns = asked_ns  # others may have been asked for while the module was starting
-            return running.handlers[request.method](session, params)
+            return running.handlers.answer(method, session, params)
 
         return then(module, answer)
+
+    def use_resource(self, user: Hashable) -> "Future[ResourceModule]":
+        """The module that measures the computer, running for `user` until the registry is told to leave."""
+        return cast("Future[ResourceModule]", self.registry.use("resource", user))
 
     def _use(self, name: str, session: Session) -> "Future[Module]":
         # What a client asked for just before it vanished is still done (a stop above all).
@@ -147,7 +159,7 @@ class Service:
             self.registry.use("control", user)  # so that a stop does not wait for its module
         return self.registry.use(name, user)
 
-    def _hello(self, session: Session, params: messages.HelloParams) -> messages.Hello:
+    def _hello(self, session: Session, params: HelloParams) -> Hello:
         if params.protocol != framing.PROTOCOL:
             raise framing.refuse(
                 framing.Kind.BAD_PARAMS,
@@ -163,19 +175,21 @@ class Service:
         session.named = params.client
         session.who = f"{params.client} ({session.peer})"
         robot = self._config.robot.name
-        return messages.Hello(framing.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)
+        return Hello(framing.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)
 
-    def _clock(self) -> messages.Clock:
-        return messages.Clock(time.monotonic_ns(), time.time_ns(), self._boot_id)
+    def _read_clock(self, _session: Session, _params: Params) -> Clock:
+        return self._clock()
 
-    def _describe(self, session: Session, _params: messages.Params) -> Answer:
-        def describe(control: Any) -> Answer:
-            return then(control.describe(), self._description)
+    def _clock(self) -> Clock:
+        return Clock(time.monotonic_ns(), time.time_ns(), self._boot_id)
 
-        return then(self._use("control", session), describe)
+    def _describe(self, session: Session, _params: Params) -> "Future[Description]":
+        control = cast("Future[ControlModule]", self._use("control", session))
+        described = then(control, lambda running: running.describe())
+        return then(described, self._description)
 
-    def _description(self, robot: Any) -> messages.Description:
-        return messages.Description(
+    def _description(self, robot: "Described") -> Description:
+        return Description(
             robot=self._config.robot.name,
             boot_id=self._boot_id,
             role=self._config.gateway.role.value,
@@ -192,40 +206,46 @@ class Service:
             version=__version__,
         )
 
-    def _guard_info(self) -> messages.GuardInfo:
+    def _guard_info(self) -> GuardInfo:
         if self._config.guard is None:
-            return messages.GuardInfo()
-        guard: Any = self.registry.running("guard")
-        if guard is None:
-            return messages.GuardInfo(configured=True, problem=self._guard_problem)
-        info: messages.GuardInfo = guard.info()
-        return info
+            return GuardInfo()
+        guard = self._running_guard()
+        return GuardInfo(configured=True, problem=self._guard_problem) if guard is None else guard.info()
 
-    def _cost(self, session: Session, _params: messages.Params) -> Answer:
-        return then(self._use("resource", session), lambda resource: self._look_at_costs(session, resource))
+    def _running_guard(self) -> "GuardModule | None":
+        running = self.registry.running("guard") if self._config.guard is not None else None
+        return cast("GuardModule | None", running)
 
-    def _look_at_costs(self, session: Session, resource: Any) -> messages.GatewayCost:
+    def _cost(self, session: Session, _params: Params) -> "Future[GatewayCost]":
+        resource = self.use_resource(None if session.closed else session)
+        return then(resource, lambda running: self._look_at_costs(session, running))
+
+    def _look_at_costs(self, session: Session, resource: "ResourceModule") -> GatewayCost:
         from gateway.cost import Costs  # for who asks
 
         costs = self._sessions.get(session) or Costs()
         if not session.closed:
             self._sessions[session] = costs
-        component: Any = self.registry.running("component")
+        component = cast("ComponentModule | None", self.registry.running("component"))
         buses = {} if component is None else component.robot.buses
         phases = self.registry.phases
         return costs.look(
             resource.own_rss_bytes(), phases, buses, self._sessions, self.streams, self._budget.info
         )
 
-    def _stream_start(self, session: Session, params: messages.StreamStartParams) -> Answer:
-        modules: dict[str, Future[Any]] = {name: self._use(name, session) for name in params.modules}
+    def _stream_start(self, session: Session, params: StreamStartParams) -> "Future[StreamStarted]":
+        modules: dict[str, Future[Streamed]] = {
+            name: cast("Future[Streamed]", self._use(name, session)) for name in params.modules
+        }
 
-        def start(running: dict[str, Any]) -> messages.StreamStarted:
-            for module in running.values():
+        def start(found: "dict[str, Streamed | Exception]") -> StreamStarted:
+            running: list[Streamed] = []
+            for module in found.values():
                 if isinstance(module, Exception):
                     raise module
-            everything = merge(one for module in running.values() for one in module.selections())
-            absent = {name: why for module in running.values() for name, why in module.absent.items()}
+                running.append(module)
+            everything = merge(one for module in running for one in module.selections())
+            absent = {name: why for module in running for name, why in module.absent.items()}
             names = [name for one in everything for name in one.names]
             check_globs("channel", names, params.channels, absent)
             chosen = narrow(everything, params.channels)
@@ -235,17 +255,17 @@ class Service:
                 raise framing.refuse(
                     framing.Kind.UNAVAILABLE, "there is no channel to stream; see robot.describe"
                 )
-            return messages.StreamStarted(self.streams.start(session, chosen, params.rate_hz))
+            return StreamStarted(self.streams.start(session, chosen, params.rate_hz))
 
         return then(gather(modules), start)
 
-    def _stream_stop(self, session: Session, params: messages.StreamStopParams) -> messages.Done:
+    def _stream_stop(self, session: Session, params: StreamStopParams) -> Done:
         if not self.streams.stop(session, params.stream):
             raise framing.refuse(
                 framing.Kind.UNKNOWN_NAME,
                 f"this connection has no stream {params.stream}; it may have ended before",
             )
-        return messages.Done()
+        return Done()
 
 
 def _control_failed(why: str) -> None:

@@ -15,7 +15,8 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
-from gateway.wire.messages import ResourceSnapshotParams, Stopped
+from gateway.wire.resource import ResourceSnapshotParams
+from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.feeds import Feeds, Record

@@ -11,7 +11,6 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from drivers.bus.bus_state import BusState, bus_state
 from drivers.bus.frames import ERROR, FrameHandler, Transport
@@ -22,9 +21,6 @@ from drivers.bus.settings import CanSettings, Role
 from drivers.bus.switching import FastSwitching
 from drivers.errors import Unavailable
 from drivers.urgency import make_urgent
-
-if TYPE_CHECKING:
-    from drivers.bus.node import Node
 
 TICK_S = 0.05  # how long the thread waits for a frame before it looks at the clock
 FIRST_RETRY_S = 0.1
@@ -73,7 +69,7 @@ class CanBus:
         self.opened = 0  # times
         self.failed_handlers = 0  # those of users' ticks are among them
         self.unclaimed: set[int] = set()  # identifiers that came and nobody asked for
-        self.nodes: dict[int, Node] = {}  # one object a node id, whoever uses it
+        self.nodes: dict[int, BusUser] = {}  # one object a node id, whoever uses it
         self._handlers: dict[int, FrameHandler] = {}
         self._subscribers: dict[int, tuple[FrameHandler, ...]] = {}
         self._users: tuple[BusUser, ...] = ()

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, cast
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import REMOTE
@@ -415,7 +415,8 @@ def shared_node(bus: CanBus, node_id: int, description: Description, times: Node
 
     Raises `SettingsError` where two tables describe the same node with different files.
     """
-    node = bus.nodes.setdefault(node_id, Node(bus, node_id, description, times))
+    # Nobody else puts one there.
+    node = cast("Node", bus.nodes.setdefault(node_id, Node(bus, node_id, description, times)))
     if node.description.path != description.path:
         raise SettingsError(
             f"node {node_id} on bus {bus.name} is described by {node.description.path.name} and by "

@@ -7,7 +7,10 @@ from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, budget, exact, say, say_json, table
-from gateway.wire.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo, StopInfo
+from gateway.wire.component import ChannelInfo
+from gateway.wire.parameter import ParameterInfo
+from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo
+from gateway.wire.stop import StopInfo
 
 PAGE = 100  # columns
 

@@ -8,7 +8,8 @@ from gateway.cli.reach import check_names, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.trial import wait_for_decision
 from gateway.coding import Number
-from gateway.wire.messages import Description, ParameterInfo, ParameterValue, Written
+from gateway.wire.parameter import ParameterInfo, ParameterValue, Written
+from gateway.wire.robot import Description
 
 LONGEST_TRIAL_S = 300.0
 

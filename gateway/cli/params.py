@@ -11,13 +11,13 @@ from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.trial import wait_for_decision
 from gateway.client import Robot
 from gateway.coding import Number
-from gateway.connections.limits import LINE_LIMIT
 from gateway.parameter_files.comparison import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
 from gateway.parameter_files.contents import FileProblem, Scope
 from gateway.parameter_files.formats import format_of, read_file
 from gateway.records import durable
 from gateway.wire.framing import encode_request
-from gateway.wire.messages import ParameterValue, ParameterWriteParams
+from gateway.wire.limits import LINE_LIMIT
+from gateway.wire.parameter import PARAMETER_WRITE, ParameterValue, ParameterWriteParams
 
 USAGE = """\
 usage: gwrms params save FILE [GLOB ...]
@@ -161,7 +161,7 @@ def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number
     changes = {
         row.name: row.file for row in rows if row.verdict is Verdict.DIFFERENT and row.file is not None
     }
-    size = len(encode_request(0, "parameter.write", ParameterWriteParams(changes))) if changes else 0
+    size = len(encode_request(0, PARAMETER_WRITE.name, ParameterWriteParams(changes))) if changes else 0
     if size > LINE_LIMIT:
         raise FileProblem(
             f"{file}: nothing was sent, {_counted(len(changes), 'change')} are too many for one request "

@@ -13,6 +13,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from gateway import config
+from gateway.config.robot import GatewaySettings
 from gateway.connections.listeners import Listeners, inherited, listen, rest
 from gateway.daemon import Daemon
 from gateway.process import notify
@@ -105,7 +106,7 @@ def _robot(options: argparse.Namespace) -> config.RobotConfig:
     return replace(robot, gateway=replace(robot.gateway, **changed))
 
 
-def _listeners(gateway: config.GatewaySettings, handed: Listeners | None) -> Listeners:
+def _listeners(gateway: GatewaySettings, handed: Listeners | None) -> Listeners:
     """Those that were handed over; what is missing is opened."""
     port = listen(gateway.host, gateway.port) if handed is None else handed.port
     classic = None if handed is None else handed.classic

@@ -9,14 +9,9 @@ import msgspec
 from gateway.cli.reach import channel_names, check_names, parser, reach
 from gateway.cli.text import NONE, age, exact, measured, percent, say, say_json, size, table
 from gateway.client import Robot
-from gateway.wire.messages import (
-    ControlProcess,
-    Description,
-    QualityInfo,
-    ResourceSnapshot,
-    ResourceSnapshotParams,
-    Snapshot,
-)
+from gateway.wire.component import QualityInfo, Snapshot
+from gateway.wire.resource import ControlProcess, ResourceSnapshot, ResourceSnapshotParams
+from gateway.wire.robot import Description
 
 BETWEEN_LOOKS_S = 0.5  # what CPU percentages are taken over
 INCLUDE = ("disk", "network", "thermal", "kernel", "cmdline", "control")

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.listeners import BACKLOG, CLASSIC, PORT
 
 MARK = "# Written by gwrms install-service; put changes into `systemctl edit`, or write it again."

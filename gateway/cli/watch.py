@@ -9,7 +9,9 @@ from gateway.cli.arguments import number
 from gateway.cli.reach import channel_names, check_names, parser, reach
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
-from gateway.wire.messages import ChannelInfo, Description, ModuleName
+from gateway.wire.component import ChannelInfo
+from gateway.wire.robot import Description
+from gateway.wire.stream import ModuleName
 
 Row = tuple[int, dict[str, float | None]]
 

@@ -11,24 +11,14 @@ from gateway.client.client import Client
 from gateway.client.clock import ClockOffset
 from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
-from gateway.wire.messages import (
-    Confirmed,
-    Description,
-    Enabled,
-    GatewayCost,
-    JournalEntries,
-    ModuleName,
-    Overruns,
-    ParameterValues,
-    Reset,
-    ResourceSnapshot,
-    ResourceSnapshotParams,
-    Reverted,
-    Snapshot,
-    Stopped,
-    Stored,
-    Written,
-)
+from gateway.wire.component import Snapshot
+from gateway.wire.control import JournalEntries
+from gateway.wire.cost import GatewayCost
+from gateway.wire.parameter import Confirmed, ParameterValues, Reverted, Stored, Written
+from gateway.wire.resource import Overruns, ResourceSnapshot, ResourceSnapshotParams
+from gateway.wire.robot import Description
+from gateway.wire.stop import Enabled, Reset, Stopped
+from gateway.wire.stream import ModuleName
 
 Result = TypeVar("Result")
 THREAD_NAME = "robot link"

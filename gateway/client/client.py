@@ -8,38 +8,55 @@ from gateway.client.address import Address
 from gateway.client.errors import LinkLost, NotConnected, RemoteError
 from gateway.client.link import Link, LinkSettings, OnState
 from gateway.client.subscription import Subscription
-from gateway.wire.messages import (
+from gateway.wire.component import COMPONENT_SNAPSHOT, STATUS_SNAPSHOT, Snapshot, SnapshotParams
+from gateway.wire.control import (
+    CONTROL_ACQUIRE,
+    CONTROL_RELEASE,
+    JOURNAL_TAIL,
     AcquireParams,
-    ComponentParams,
-    Confirmed,
-    Description,
-    Done,
-    Enabled,
-    EnableParams,
-    GatewayCost,
     JournalEntries,
     Lease,
-    ModuleName,
-    Overruns,
+    ReleaseParams,
+    TailParams,
+)
+from gateway.wire.cost import GATEWAY_COST, GatewayCost
+from gateway.wire.method import Params
+from gateway.wire.parameter import (
+    PARAMETER_CONFIRM,
+    PARAMETER_READ,
+    PARAMETER_RESTORE,
+    PARAMETER_REVERT,
+    PARAMETER_STORE,
+    PARAMETER_WRITE,
+    ComponentParams,
+    Confirmed,
     ParameterParams,
     ParameterValues,
     ParameterWriteParams,
-    Params,
-    ReleaseParams,
-    Reset,
-    ResourceSnapshot,
-    ResourceSnapshotParams,
     Reverted,
-    Snapshot,
-    SnapshotParams,
-    StopParams,
-    Stopped,
     Stored,
-    StreamStartParams,
-    TailParams,
     WriteNumberParams,
     Written,
 )
+from gateway.wire.resource import (
+    RESOURCE_OVERRUNS,
+    RESOURCE_SNAPSHOT,
+    Overruns,
+    ResourceSnapshot,
+    ResourceSnapshotParams,
+)
+from gateway.wire.robot import ROBOT_DESCRIBE, Description
+from gateway.wire.stop import (
+    ROBOT_ENABLE,
+    ROBOT_RESET,
+    ROBOT_STOP,
+    Enabled,
+    EnableParams,
+    Reset,
+    StopParams,
+    Stopped,
+)
+from gateway.wire.stream import ModuleName, StreamStartParams
 
 WRITE_TIMEOUT_S = 30.0  # a transaction over several drives, verified and perhaps rolled back
 STORE_TIMEOUT_S = 120.0  # devices write their memory, and are compared before and after
@@ -90,27 +107,27 @@ class Client:
 
     async def describe(self) -> Description:
         """What the robot is made of."""
-        return await self.link.call("robot.describe", Params(), Description)
+        return await self.link.call(ROBOT_DESCRIBE, Params())
 
     async def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
         """CPU, memory and processes; percentages are None the first time on a link."""
-        return await self.link.call("resource.snapshot", params or ResourceSnapshotParams(), ResourceSnapshot)
+        return await self.link.call(RESOURCE_SNAPSHOT, params or ResourceSnapshotParams())
 
     async def components(self, *channels: str) -> Snapshot:
         """The newest value of the channels (globs; none means all)."""
-        return await self.link.call("component.snapshot", SnapshotParams(list(channels) or None), Snapshot)
+        return await self.link.call(COMPONENT_SNAPSHOT, SnapshotParams(list(channels) or None))
 
     async def cost(self) -> GatewayCost:
         """What monitoring costs the robot; rates are since the last call, None the first time."""
-        return await self.link.call("gateway.cost", Params(), GatewayCost)
+        return await self.link.call(GATEWAY_COST, Params())
 
     async def overruns(self) -> Overruns:
         """Late cycles of the robot's control loop since the last call; watched while the link lasts."""
-        return await self.link.call("resource.overruns", Params(), Overruns)
+        return await self.link.call(RESOURCE_OVERRUNS, Params())
 
     async def status(self) -> Snapshot:
         """The merged set that status prediction needs."""
-        return await self.link.call("status.snapshot", Params(), Snapshot)
+        return await self.link.call(STATUS_SNAPSHOT, Params())
 
     @contextlib.asynccontextmanager
     async def subscribe(
@@ -133,17 +150,15 @@ class Client:
 
     async def read(self, *names: str) -> ParameterValues:
         """Parameters (globs; none means all) as the devices hold them now."""
-        return await self.link.call(
-            "parameter.read", ParameterParams(list(names) or None), ParameterValues, WRITE_TIMEOUT_S
-        )
+        return await self.link.call(PARAMETER_READ, ParameterParams(list(names) or None), WRITE_TIMEOUT_S)
 
     async def acquire(self, ttl_s: float = 60.0) -> Lease:
         """Become the one writer for `ttl_s` seconds (at most 300); again to stay it."""
-        return await self.link.call("control.acquire", AcquireParams(ttl_s), Lease)
+        return await self.link.call(CONTROL_ACQUIRE, AcquireParams(ttl_s))
 
     async def release(self) -> None:
         """Let others write."""
-        await self.link.call("control.release", ReleaseParams(), Done)
+        await self.link.call(CONTROL_RELEASE, ReleaseParams())
 
     async def write(self, changes: Mapping[str, float], trial_s: float | None = None) -> Written:
         """Change parameters, all or none, read back. Needs the lease.
@@ -156,20 +171,20 @@ class Client:
 
         """
         return await self.link.call(
-            "parameter.write", ParameterWriteParams(dict(changes), trial_s), Written, WRITE_TIMEOUT_S
+            PARAMETER_WRITE, ParameterWriteParams(dict(changes), trial_s), WRITE_TIMEOUT_S
         )
 
     async def confirm(self, write: int) -> Confirmed:
         """Keep what is on trial; raises `RemoteError` where it has ended, or is not what was written."""
         number = WriteNumberParams(write)
-        ended = await self.link.call("parameter.confirm", number, Confirmed, WRITE_TIMEOUT_S)
+        ended = await self.link.call(PARAMETER_CONFIRM, number, WRITE_TIMEOUT_S)
         self._trying.discard(write)
         return ended
 
     async def revert(self, write: int) -> Reverted:
         """Take back what is on trial; raises `RemoteError` where it has ended, or could not be taken back."""
         number = WriteNumberParams(write)
-        ended = await self.link.call("parameter.revert", number, Reverted, WRITE_TIMEOUT_S)
+        ended = await self.link.call(PARAMETER_REVERT, number, WRITE_TIMEOUT_S)
         self._trying.discard(write)
         return ended
 
@@ -208,15 +223,15 @@ class Client:
             RemoteError: refused, and why; with `device_timeout` nobody knows whether it stored.
 
         """
-        return await self.link.call("parameter.store", ComponentParams(component), Stored, STORE_TIMEOUT_S)
+        return await self.link.call(PARAMETER_STORE, ComponentParams(component), STORE_TIMEOUT_S)
 
     async def restore(self, component: str) -> Stored:
         """Make a device take its defaults at its next reset (1011h). Needs the lease; raises as `store`."""
-        return await self.link.call("parameter.restore", ComponentParams(component), Stored, STORE_TIMEOUT_S)
+        return await self.link.call(PARAMETER_RESTORE, ComponentParams(component), STORE_TIMEOUT_S)
 
     async def journal(self, count: int = 20) -> JournalEntries:
         """The newest entries of the robot's journal, oldest first."""
-        return await self.link.call("journal.tail", TailParams(count), JournalEntries)
+        return await self.link.call(JOURNAL_TAIL, TailParams(count))
 
     @contextlib.asynccontextmanager
     async def writing(self, ttl_s: float = 60.0) -> AsyncIterator[None]:
@@ -250,14 +265,14 @@ class Client:
             ClientError: the robot did not answer; consider it NOT stopped.
 
         """
-        return await self.link.call("robot.stop", StopParams(reason), Stopped, STOP_TIMEOUT_S)
+        return await self.link.call(ROBOT_STOP, StopParams(reason), STOP_TIMEOUT_S)
 
     async def reset(self) -> Reset:
         """End a held stop: every drive led to switch on disabled, never further. Needs the lease.
 
         Look at `held`: the stop stays where it is not known of every drive that it cannot move.
         """
-        return await self.link.call("robot.reset", Params(), Reset, LEADING_TIMEOUT_S)
+        return await self.link.call(ROBOT_RESET, Params(), LEADING_TIMEOUT_S)
 
     async def enable(self, *joints: str) -> Enabled:
         """Enable drives (globs; none means all), as the master of their bus. Needs the lease.
@@ -265,4 +280,4 @@ class Client:
         Look at `problems`: where there are any, what was begun has been stopped again.
         """
         params = EnableParams(list(joints) or None)
-        return await self.link.call("robot.enable", params, Enabled, LEADING_TIMEOUT_S)
+        return await self.link.call(ROBOT_ENABLE, params, LEADING_TIMEOUT_S)

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TypeVar
 
 import msgspec
 
@@ -17,20 +16,16 @@ from gateway.client.connection import UNREADABLE, Connection
 from gateway.client.errors import CallTimeout, ClientError, LinkLost, NotConnected, ProtocolError, RemoteError
 from gateway.client.subscription import Subscription
 from gateway.wire.framing import PROTOCOL
-from gateway.wire.messages import (
+from gateway.wire.method import Method, P, Params, R
+from gateway.wire.robot import CLOCK_READ, HELLO, Hello, HelloParams
+from gateway.wire.stream import (
     STREAM_DATA,
-    Clock,
-    Done,
-    Hello,
-    HelloParams,
-    Params,
+    STREAM_START,
+    STREAM_STOP,
     StreamData,
-    StreamStarted,
     StreamStartParams,
     StreamStopParams,
 )
-
-Answer = TypeVar("Answer")
 
 
 class ConnectionState(Enum):
@@ -132,10 +127,8 @@ class Link:
         """What the robot has sent over all connections, whatever became of it."""
         return self._received_bytes + (self._connection.received_bytes if self._connection else 0)
 
-    async def call(
-        self, method: str, params: object, answer: type[Answer], timeout_s: float | None = None
-    ) -> Answer:
-        """One request and its result as `answer`; see `Connection.call`.
+    async def call(self, method: Method[P, R], params: P, timeout_s: float | None = None) -> R:
+        """One request and its result; see `Connection.call`.
 
         Raises:
             NotConnected: there is no connection now, and nothing was sent.
@@ -143,8 +136,8 @@ class Link:
         """
         if self._connection is None:
             why = f" ({self.problem})" if self.problem is not None else ""
-            raise NotConnected(f"there is no link to {self.address} now{why}; {method} was not sent")
-        return await self._ask(self._connection, method, params, answer, timeout_s)
+            raise NotConnected(f"there is no link to {self.address} now{why}; {method.name} was not sent")
+        return await self._ask(self._connection, method, params, timeout_s)
 
     async def subscribe(self, request: StreamStartParams, depth: int) -> Subscription:
         """Start a stream now, or as soon as there is a connection.
@@ -174,7 +167,7 @@ class Link:
         if subscription.stream is not None and self._streams.pop(subscription.stream, None) is not None:
             # Without a connection there is no stream either.
             with contextlib.suppress(NotConnected, LinkLost):
-                await self.call("stream.stop", StreamStopParams(subscription.stream), Done)
+                await self.call(STREAM_STOP, StreamStopParams(subscription.stream))
 
     # --- supervision
 
@@ -223,7 +216,7 @@ class Link:
 
     async def _greet(self, connection: Connection) -> None:
         params = HelloParams(self.settings.client, PROTOCOL, self.settings.token)
-        hello = await self._ask(connection, "hello", params, Hello)
+        hello = await self._ask(connection, HELLO, params)
         if hello.protocol != PROTOCOL:
             raise ProtocolError(
                 f"{self.address} speaks protocol {hello.protocol}, this program speaks {PROTOCOL}; "
@@ -237,7 +230,7 @@ class Link:
         """Ask for the robot's clock; silence for too long ends the connection."""
         sent_ns = time.monotonic_ns()
         try:
-            clock = await self._ask(connection, "clock.read", Params(), Clock, self.settings.silence_s)
+            clock = await self._ask(connection, CLOCK_READ, Params(), self.settings.silence_s)
         except CallTimeout as error:
             silent_s = (time.monotonic_ns() - connection.received_ns) / 1e9
             if silent_s < self.settings.silence_s:
@@ -257,11 +250,12 @@ class Link:
 
     async def _start_stream(self, connection: Connection, subscription: Subscription) -> None:
         def named(result: msgspec.Raw) -> None:
-            stream = self._read(result, StreamStarted, "stream.start").stream
+            stream = self._read(result, STREAM_START).stream
             self._streams[stream] = subscription
             subscription.restarted(stream, self.connections)
 
-        await connection.call("stream.start", subscription.request, self.settings.call_timeout_s, named)
+        request, timeout_s = subscription.request, self.settings.call_timeout_s
+        await connection.call(STREAM_START.name, request, timeout_s, named)
 
     def _notified(self, method: str, params: msgspec.Raw) -> None:
         if method != STREAM_DATA:
@@ -283,19 +277,19 @@ class Link:
     async def _ask(
         self,
         connection: Connection,
-        method: str,
-        params: object,
-        answer: type[Answer],
+        method: Method[P, R],
+        params: P,
         timeout_s: float | None = None,
-    ) -> Answer:
-        result = await connection.call(method, params, timeout_s or self.settings.call_timeout_s)
-        return self._read(result, answer, method)
+    ) -> R:
+        result = await connection.call(method.name, params, timeout_s or self.settings.call_timeout_s)
+        return self._read(result, method)
 
-    def _read(self, result: msgspec.Raw, answer: type[Answer], method: str) -> Answer:
+    def _read(self, result: msgspec.Raw, method: Method[P, R]) -> R:
         try:
-            return msgspec.json.decode(result, type=answer)
+            return msgspec.json.decode(result, type=method.result)
         except UNREADABLE as error:
-            raise ProtocolError(f"{self.address} answered {method} with something else: {error}") from error
+            said = f"{self.address} answered {method.name} with something else: {error}"
+            raise ProtocolError(said) from error
 
     def _end_streams(self, reason: ClientError | None) -> None:
         for subscription in self._subscriptions:

@@ -8,17 +8,16 @@ exchange, `null` where it is forgotten or was the first.
 
 import logging
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import msgspec
 
 from gateway.connections.acceptor import Acceptor
 from gateway.process.futures import done, then
 from gateway.process.loop import READ, WRITE, Loop, Timer
-from gateway.registry import Registry
-from gateway.wire.messages import ResourceSnapshot, ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshot, ResourceSnapshotParams
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +39,17 @@ class Entry(msgspec.Struct, frozen=True, gc=False):
     mem: int
 
 
+class Measuring(Protocol):
+    """The resource module, as far as it is needed here; a meter's percentages are since its own last look."""
+
+    def meter(self) -> Any: ...
+
+    def look(self, meter: Any, params: ResourceSnapshotParams) -> "Future[ResourceSnapshot]": ...
+
+
+M = TypeVar("M", bound=Measuring)
+
+
 class _Exchange:
     """One address's exchange: its meter, and what of the list it has not fetched yet."""
 
@@ -48,7 +58,7 @@ class _Exchange:
         self._meter: Any = None
         self._rest = b""
 
-    def next_piece(self, resource: Any) -> "Future[bytes]":
+    def next_piece(self, resource: Measuring) -> "Future[bytes]":
         """The next bytes of the list; where none are left, a new list's length."""
         if self._rest:
             piece, self._rest = self._rest[:PIECE_BYTES], self._rest[PIECE_BYTES:]
@@ -69,12 +79,20 @@ class ClassicPort:
     """The second listening socket, its calls and exchanges."""
 
     def __init__(
-        self, loop: Loop, listener: socket.socket, registry: Registry, left: Callable[[], None]
+        self,
+        loop: Loop,
+        listener: socket.socket,
+        use: "Callable[[Hashable], Future[M]]",
+        leave: Callable[[Hashable], None],
+        left: Callable[[], None],
     ) -> None:
-        """`left` is called whenever a client has gone."""
+        """`use` gives the module, running until its user leaves; `left` is told when a client has gone."""
         self._loop = loop
         self._listener = listener
-        self._registry = registry
+        self._next_piece: Callable[[_Exchange], Future[bytes]] = lambda exchange: then(
+            use(exchange), exchange.next_piece
+        )
+        self._leave = leave
         self._left = left
         self._calls: set[_Call] = set()
         self._exchanges: dict[str, _Exchange] = {}
@@ -116,10 +134,10 @@ class ClassicPort:
         if exchange.expiry is not None:
             exchange.expiry.cancel()
         exchange.expiry = self._loop.call_later(EXPIRES_S, lambda: self._expire(source))
-        return then(self._registry.use("resource", exchange), exchange.next_piece)
+        return self._next_piece(exchange)
 
     def _expire(self, source: str) -> None:
-        self._registry.leave(self._exchanges.pop(source))
+        self._leave(self._exchanges.pop(source))
         self._left()
 
 

@@ -14,14 +14,16 @@ from typing import Any
 
 from drivers.urgency import make_urgent
 from gateway.connections.acceptor import Acceptor
-from gateway.connections.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
 from gateway.connections.sharing import TimeSharing
 from gateway.connections.stop_lines import StopSplitter
 from gateway.process.loop import HANGUP, READ, Loop, Timer
-from gateway.registry import StopNow
 from gateway.wire import framing
+from gateway.wire.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
+from gateway.wire.stop import Stopped
 
 log = logging.getLogger(__name__)
+
+StopNow = Callable[[str, str], Future[Stopped]]  # carries out a stop for whom, and why; from any thread
 
 RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it …
 UNKNOWN_BYTES = 2 * 1024  # … and of whoever has just come, or has cost something just now
@@ -60,7 +62,7 @@ class Heard:
         self.stamp_ns = time.monotonic_ns()
         self.stops: list[framing.StopRequest] = []  # which are one stop …
         self.stop: framing.StopRequest | None = None  # … the newest of them
-        self.stopped: Future[Any] | None = None  # what answers it, or `None` where nobody could act on it yet
+        self.stopped: Future[Stopped] | None = None  # what answers it; `None`: nobody could act on it yet
         self.lines: list[tuple[int, bytes | framing.BadLine]] = []  # with when they came in (monotonic, ns)
         self.refusals: list[bytes] = []  # of what was too much, ready to be sent
         self.ended = False  # the client will say nothing more
@@ -340,7 +342,7 @@ class Inlet:
                 self.unanswered += 1
         return heard
 
-    def _stop(self, request: framing.StopRequest) -> Future[Any] | None:
+    def _stop(self, request: framing.StopRequest) -> Future[Stopped] | None:
         """Act at once, where somebody can."""
         stop_now = self._stop_now()
         if stop_now is None:

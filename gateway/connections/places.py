@@ -3,9 +3,9 @@
 import time
 from collections.abc import Callable, Iterable
 
-from gateway.connections.limits import CLIENTS, CLIENTS_OF_ONE_ADDRESS, STOPPERS
 from gateway.connections.session import Session
 from gateway.wire import framing
+from gateway.wire.limits import CLIENTS, CLIENTS_OF_ONE_ADDRESS, STOPPERS
 
 FRESH_S = 0.3  # how long one of these that has spoken keeps its place whoever comes, from its own coming on
 SILENT_S = 10.0  # who has said nothing for so long since it came makes room where all places are taken

@@ -17,16 +17,17 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from gateway.connections.intake import FOREIGN, Heard, Inlet
-from gateway.connections.limits import BAD_LINES, MOST_STOPS, OUTPUT_BYTES, PENDING, SPEAK_S
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import STOP
 from gateway.process.futures import outcome
 from gateway.process.loop import WRITE, Loop, Timer
 from gateway.wire import framing
+from gateway.wire.limits import BAD_LINES, MOST_STOPS, OUTPUT_BYTES, PENDING, SPEAK_S
+from gateway.wire.robot import CLOCK_READ, HELLO
 
 log = logging.getLogger(__name__)
 
-GREETINGS = frozenset({"hello", "clock.read"})
+GREETINGS = frozenset({HELLO.name, CLOCK_READ.name})
 STREAM_BYTES = 64 * 1024  # output not yet taken before streams hold back
 LAST_ANSWERS_S = 10.0  # how long a client that will say nothing more is waited for
 

@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from gateway.connections.limits import OUTPUTS_BYTES
 from gateway.process.loop import Loop
+from gateway.wire.limits import OUTPUTS_BYTES
 
 log = logging.getLogger(__name__)
 

@@ -10,8 +10,8 @@ from typing import Any, Final
 import msgspec
 from msgspec import UNSET, Raw, UnsetType
 
-from gateway.connections.limits import ID_LENGTH, REASON_LENGTH
 from gateway.wire.framing import Id, Line, LineSplitter, StopRequest
+from gateway.wire.limits import ID_LENGTH, REASON_LENGTH
 
 STOP: Final = "robot.stop"
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.guard.checks import ALARMS
+from gateway.config.guard import ALARMS
 from gateway.guard.watcher import State
 from gateway.process.loop import Loop
 

@@ -4,8 +4,8 @@ import time
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.bus_state import BusState
+from gateway.config.guard_rules import BusRule, SyncRule
 from gateway.guard.inputs import AGAIN_NS, Changed, Pulse, SilenceWatcher
-from gateway.guard.rules import BusRule, SyncRule
 from gateway.guard.watcher import GRACE_NS, Watcher
 
 _ENDING = (BusState.PASSIVE, BusState.OFF)  # of our controller: it all but takes part no more

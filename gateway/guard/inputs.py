@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.bus.emcy import Emcy
+from gateway.config.guard_rules import EmcyRule, Rule
 from gateway.guard.judging import Joined, Judging
-from gateway.guard.rules import EmcyRule, Rule
 from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
 
 Changed = Callable[[Watcher, Change], None]

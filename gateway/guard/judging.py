@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatch
 
-from gateway.guard.conditions import Band, Drift, Heat, StoppingPoint
-from gateway.guard.rules import (
+from gateway.config.guard import WATCHES, limit
+from gateway.config.guard_rules import (
     DriftRule,
     HeatRule,
     InputRule,
@@ -18,7 +18,7 @@ from gateway.guard.rules import (
     SymmetryRule,
     with_unit,
 )
-from gateway.guard.settings import WATCHES, limit
+from gateway.guard.conditions import Band, Drift, Heat, StoppingPoint
 from gateway.guard.symmetry import Asymmetry
 
 Measure = Callable[[int, float], float]  # a value at its stamp (ns) becomes what is compared

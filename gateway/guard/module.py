@@ -4,22 +4,22 @@ All else that a rule leads to, the held stop, the journal and what clients see, 
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from drivers.bus.arming import Arming
+from gateway.config.guard import GuardSettings, limit
+from gateway.config.guard_rules import Action
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
-from gateway.guard.rules import Action
-from gateway.guard.settings import GuardSettings, limit
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
-from gateway.wire import messages
+from gateway.handlers import Handlers
+from gateway.wire.robot import GuardInfo, GuardRuleInfo
 
 if TYPE_CHECKING:
     from drivers.joint.drive import JointDrive
-    from gateway.connections.session import Answer, Session
     from gateway.modules.component.module import ComponentModule
     from gateway.modules.control.module import ControlModule
     from gateway.registry import Context
@@ -40,7 +40,7 @@ class GuardModule:
         self._source = GuardSource(tuple(self._settings.rule))
         self._count = 0
         self._ended = False
-        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {}
+        self.handlers = Handlers()
 
     def start(self) -> None:
         """Begin to watch, and arm the drives as they come up."""
@@ -83,9 +83,9 @@ class GuardModule:
             self._control.journal.append(WHO, "end refused", reason=why)
         return why
 
-    def info(self) -> messages.GuardInfo:
+    def info(self) -> GuardInfo:
         """As `robot.describe` shows it."""
-        return messages.GuardInfo(
+        return GuardInfo(
             configured=True,
             heartbeat_ms=self._settings.heartbeat_ms,
             rules=[_info(name, wiring) for name, wiring in self._wirings.items()],
@@ -179,9 +179,9 @@ def _worst(wiring: Wiring) -> Watcher:
     return max(wiring.watchers, key=lambda one: (one.state, one.last.stamp_ns))
 
 
-def _info(name: str, wiring: Wiring) -> messages.GuardRuleInfo:
+def _info(name: str, wiring: Wiring) -> GuardRuleInfo:
     rule, worst = wiring.rule, _worst(wiring)
-    return messages.GuardRuleInfo(
+    return GuardRuleInfo(
         name=name,
         watch=rule.watch,
         limit=limit(rule),

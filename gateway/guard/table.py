@@ -7,8 +7,8 @@ from typing import Any
 from msgspec import NODEFAULT, Meta
 from msgspec.structs import FieldInfo, fields
 
-from gateway.guard.rules import UNIT, Rule
-from gateway.guard.settings import WATCHES
+from gateway.config.guard import WATCHES
+from gateway.config.guard_rules import UNIT, Rule
 
 _COMMON = frozenset(field.name for field in fields(Rule))
 

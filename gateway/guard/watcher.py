@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from gateway.guard.rules import Blind, Rule
+from gateway.config.guard_rules import Blind, Rule
 
 GRACE_NS = 3_000_000_000  # how long a device that nobody has heard yet may take to come up
 

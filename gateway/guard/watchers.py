@@ -10,6 +10,17 @@ from typing import TYPE_CHECKING, cast
 from drivers.component import Component, Kind
 from drivers.errors import DeviceAbort, DeviceTimeout
 from drivers.samples import Sample
+from gateway.config.guard import quantities
+from gateway.config.guard_rules import (
+    BusRule,
+    EmcyRule,
+    LatencyRule,
+    Rule,
+    SilenceRule,
+    StoppingRule,
+    SymmetryRule,
+    SyncRule,
+)
 from gateway.guard.buses import BusWatcher, SyncWatcher
 from gateway.guard.inputs import (
     Changed,
@@ -21,17 +32,6 @@ from gateway.guard.inputs import (
     UnseenWatcher,
 )
 from gateway.guard.judging import Beside, judging
-from gateway.guard.rules import (
-    BusRule,
-    EmcyRule,
-    LatencyRule,
-    Rule,
-    SilenceRule,
-    StoppingRule,
-    SymmetryRule,
-    SyncRule,
-)
-from gateway.guard.settings import quantities
 from gateway.guard.watcher import Watcher
 
 if TYPE_CHECKING:

@@ -4,9 +4,9 @@ import fnmatch
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from gateway.config.guard import BUS, WATCHES, quantities
+from gateway.config.guard_rules import Rule, SymmetryRule
 from gateway.guard.inputs import Changed
-from gateway.guard.rules import Rule, SymmetryRule
-from gateway.guard.settings import BUS, WATCHES, quantities
 from gateway.guard.watcher import Watcher
 from gateway.guard.watchers import Wire, make
 

@@ -1,15 +1,19 @@
 """The status module: the merged, minimal set that status prediction needs, from resource and component."""
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, cast
 
+from gateway.handlers import Handlers, on
 from gateway.modules.resource.module import RESOURCE_CHANNELS, ResourceModule, columns
 from gateway.process.futures import then
 from gateway.streaming.sources import Selection, narrow
-from gateway.wire.messages import Params, ResourceSnapshot, Snapshot
+from gateway.wire.component import STATUS_SNAPSHOT, Snapshot
+from gateway.wire.method import Params
+from gateway.wire.resource import ResourceSnapshot
 
 if TYPE_CHECKING:
-    from gateway.connections.session import Answer, Session
+    from gateway.connections.session import Session
     from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context
 
@@ -33,7 +37,7 @@ class StatusModule:
     def __init__(self, context: "Context") -> None:
         self._component = cast("ComponentModule", context.needs["component"])
         self._resource = cast("ResourceModule", context.needs["resource"])
-        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"status.snapshot": self._snapshot}
+        self.handlers = Handlers(on(STATUS_SNAPSHOT, self._snapshot))
 
     def start(self) -> None:
         """Nothing of its own runs."""
@@ -51,10 +55,10 @@ class StatusModule:
     def _components(self) -> list[Selection]:
         return narrow(self._component.selections(), COMPONENT_GLOBS)
 
-    def _snapshot(self, session: "Session", _params: Params) -> "Answer":
+    def _snapshot(self, session: "Session", _params: Params) -> "Future[Snapshot]":
         chosen = self._components()
         ready = self._component.when_known(chosen)
-        measured = then(ready, lambda _none: self._resource.measure(session, "status.snapshot"))
+        measured = then(ready, lambda _none: self._resource.measure(session, STATUS_SNAPSHOT.name))
         return then(measured, lambda host: self._answer(chosen, host))
 
     def _answer(self, chosen: list[Selection], host: ResourceSnapshot) -> Snapshot:

@@ -5,9 +5,8 @@ from enum import StrEnum
 
 from msgspec import Struct
 
-from eds.datatypes import DATA_TYPE_BY_NAME
-from gateway.coding import Coding, CodingError, Number, text, too_far
-from gateway.wire.messages import ParameterInfo, ParameterValue
+from gateway.coding import Coding, CodingError, Limit, Number, broken_limit, coding_of, text
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 
 class Verdict(StrEnum):
@@ -27,6 +26,13 @@ class Verdict(StrEnum):
 UNLIKE = frozenset(Verdict) - {Verdict.SAME, Verdict.NOT_IN_FILE}
 CANNOT_CHANGE = frozenset({Verdict.READ_ONLY, Verdict.NOT_ON_ROBOT})
 REFUSED = frozenset({Verdict.OUT_OF_LIMITS, Verdict.TOO_FAR, Verdict.UNREADABLE})
+
+
+_BROKEN: Mapping[Limit, tuple[Verdict, str]] = {
+    Limit.MIN: (Verdict.OUT_OF_LIMITS, "below"),
+    Limit.MAX: (Verdict.OUT_OF_LIMITS, "above"),
+    Limit.MAX_STEP: (Verdict.TOO_FAR, "at most"),
+}
 
 
 class Row(Struct, frozen=True):
@@ -56,7 +62,9 @@ def _row(name: str, value: Number, info: ParameterInfo | None, held: ParameterVa
     if held is None or held.value is None:
         why = info.problem or (held.problem if held is not None else None) or "it was not read"
         return Row(name, info.unit, value, None, Verdict.UNREADABLE, why)
-    coding = Coding(DATA_TYPE_BY_NAME[info.type], info.scale)
+    coding = coding_of(info.type, info.scale)
+    if coding is None:
+        return Row(name, info.unit, value, held.value, Verdict.UNREADABLE, "its type is not known")
     try:
         data = coding.encode(value)
     except CodingError as error:
@@ -74,12 +82,10 @@ def _objections(
     """Why the robot would refuse to change it, the most lasting reason first."""
     if info.read_only is not None:
         yield Verdict.READ_ONLY, info.read_only
-    if info.min is not None and stored < coding.nearest(info.min):
-        yield Verdict.OUT_OF_LIMITS, f"below {text(info.min)}"
-    if info.max is not None and stored > coding.nearest(info.max):
-        yield Verdict.OUT_OF_LIMITS, f"above {text(info.max)}"
-    if info.max_step is not None and too_far(held, stored, info.max_step):
-        yield Verdict.TOO_FAR, f"at most {text(info.max_step)}"
+    broken = broken_limit(info, coding, stored, held)
+    if broken is not None:
+        verdict, word = _BROKEN[broken]
+        yield verdict, f"{word} {text(getattr(info, broken))}"
 
 
 def _not_in_file(info: ParameterInfo, held: ParameterValue | None) -> Row:

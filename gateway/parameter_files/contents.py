@@ -8,7 +8,9 @@ from msgspec import UNSET
 
 from gateway.coding import Number
 from gateway.streaming.sources import matches
-from gateway.wire.messages import ComponentInfo, Description, ParameterInfo
+from gateway.wire.component import ComponentInfo
+from gateway.wire.parameter import ParameterInfo
+from gateway.wire.robot import Description
 
 COMMANDS = ("commanded", "controlword", "storage")  # as `ParameterInfo.read_only` calls them
 

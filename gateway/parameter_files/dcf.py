@@ -17,7 +17,8 @@ from gateway.parameter_files.contents import (
     is_configuration,
     is_meant,
 )
-from gateway.wire.messages import ComponentInfo, ParameterInfo
+from gateway.wire.component import ComponentInfo
+from gateway.wire.parameter import ParameterInfo
 
 
 def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:

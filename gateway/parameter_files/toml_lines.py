@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gateway.coding import Number
 from gateway.parameter_files.contents import FileProblem, Saved, Scope, device, is_configuration, is_meant
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 
 _TABLES = ("robot", "eds", "parameters")
 

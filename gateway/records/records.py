@@ -7,7 +7,7 @@ from gateway.process.boot import boot_id
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import Journal
 from gateway.records.undo import UndoFile
-from gateway.wire.messages import RecordsInfo
+from gateway.wire.control import RecordsInfo
 
 log = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 
 from gateway.process.loop import Loop, Timer
-from gateway.wire.messages import BudgetInfo
+from gateway.wire.cost import BudgetInfo
 
 log = logging.getLogger(__name__)
 

@@ -7,16 +7,13 @@ import itertools
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import msgspec
 
 from gateway.connections.session import Session
 from gateway.wire import framing
-from gateway.wire.messages import STREAM_DATA
-
-if TYPE_CHECKING:
-    from gateway.streaming.streams import Feed
+from gateway.wire.stream import STREAM_DATA
 
 _encoder = msgspec.json.Encoder()
 
@@ -50,10 +47,19 @@ def encode_batch(
     return Batch(len(stamps), msgspec.Raw(stamp_bytes), msgspec.Raw(column_bytes), size, shed)
 
 
+class Rate(Protocol):
+    """What a feed gives: of the rows that are asked for, one of `shed`."""
+
+    rate_hz: float
+    channels: int
+    values_a_second: float
+    shed: int
+
+
 class Outlet:
     """One subscriber of a feed; `most_bytes` is what may wait for it."""
 
-    def __init__(self, number: int, session: Session, feed: "Feed", most_bytes: int) -> None:
+    def __init__(self, number: int, session: Session, feed: Rate, most_bytes: int) -> None:
         self.number = number
         self.session = session
         self.feed = feed

@@ -10,9 +10,9 @@ from msgspec import UNSET
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.connections.limits import GLOBS, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
+from gateway.wire.component import ChannelInfo
 from gateway.wire.framing import Kind, refuse
-from gateway.wire.messages import ChannelInfo
+from gateway.wire.limits import GLOBS, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
 
 _WILD = frozenset("*?[")
 

@@ -1,7 +1,7 @@
 """The wire: JSON-RPC 2.0, one UTF-8 message a line; framing, envelopes, errors. Pure, no I/O.
 
-The parameters and results of each method are in `messages.py`. Numbers that are not finite never reach the
-wire: msgspec encodes NaN and infinities as `null`.
+Methods are declared in the files beside this one. Numbers that are not finite never reach the wire: msgspec
+encodes NaN and infinities as `null`.
 """
 
 import json
@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, TypeVar
 import msgspec
 from msgspec import UNSET, Raw, Struct, UnsetType
 
-from gateway.connections.limits import LINE_LIMIT, NAME_LENGTH
+from gateway.wire.limits import LINE_LIMIT, NAME_LENGTH
 from gateway.wording import plainly
 
 PROTOCOL: Final = 1

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.units import Units
 from server_gui.core.tuning.edits import Change, refusal, unit_of

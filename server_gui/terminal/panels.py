@@ -12,7 +12,7 @@ from rich.text import Text
 
 from gateway.client import ConnectionState
 from gateway.plain import plain
-from gateway.wire.messages import ParameterInfo, ParameterValue
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg

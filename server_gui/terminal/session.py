@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Self
 
 from gateway.client import Address
-from gateway.wire.messages import ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshotParams
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, Looked, Telemetry
 from server_gui.core.follow.feed import Feed, Following

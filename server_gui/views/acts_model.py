@@ -8,7 +8,7 @@ from typing import Any, Final
 from PySide6.QtCore import Qt
 
 from gateway.plain import plain
-from gateway.wire.messages import Number
+from gateway.wire.method import Number
 from server_gui.core.audit.acts import Act
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import brief, exact

@@ -4,7 +4,8 @@ from typing import Final
 
 from msgspec import UNSET
 
-from gateway.wire.messages import GatewayCost, ResourceSnapshot
+from gateway.wire.cost import GatewayCost
+from gateway.wire.resource import ResourceSnapshot
 from server_gui.core.desk.station import Station
 
 MIB: Final = 1 << 20

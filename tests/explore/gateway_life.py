@@ -10,7 +10,7 @@ import msgspec
 from gateway import config
 from gateway.daemon import Daemon
 from gateway.wire import framing
-from gateway.wire.messages import METHODS
+from gateway.wire.methods import METHODS
 from tests.explore.net import Connection, Listener
 from tests.explore.world import World
 

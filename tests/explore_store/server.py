@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from gateway.client import ClockOffset, ConnectionState
-from gateway.wire.messages import JournalEntries
+from gateway.wire.control import JournalEntries
 from ml.store import Store
 from ml.store.labels import Label
 from server_gui.core.fleet.robot_recording import Keeping

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from gateway.records.journal import Journal
-from gateway.wire.messages import JournalEntries
+from gateway.wire.control import JournalEntries
 from server_gui.core.follow.events import Journalled
 
 

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.wire.messages import Stopped
+from gateway.wire.stop import Stopped
 from ml.store import Store, StoreError
 from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
 
 from gateway.client import ConnectionState
-from gateway.wire.messages import LayoutInfo
+from gateway.wire.component import LayoutInfo
 from server_gui.app import App
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.news import NewsKind

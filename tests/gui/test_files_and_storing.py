@@ -10,7 +10,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog
 
 from gateway.client import LinkLost, RemoteError
-from gateway.wire.messages import ComponentInfo, Stored, Written
+from gateway.wire.component import ComponentInfo
+from gateway.wire.parameter import Stored, Written
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel

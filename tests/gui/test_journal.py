@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.client import ConnectionState
-from gateway.wire.messages import QualityInfo, Snapshot
+from gateway.wire.component import QualityInfo, Snapshot
 from server_gui.core.audit.acts import OPEN, Act, acts
 from server_gui.core.audit.journal import KEPT, Audit
 from server_gui.core.follow.events import Journalled, LinkChanged, Looked

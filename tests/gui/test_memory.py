@@ -13,7 +13,8 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Batch, ClockOffset, ConnectionState
-from gateway.wire.messages import ProcessUse, Written
+from gateway.wire.parameter import Written
+from gateway.wire.resource import ProcessUse
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged, Telemetry
 from server_gui.views.main_window import MainWindow

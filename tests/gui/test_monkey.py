@@ -18,7 +18,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import ConnectionState, NotConnected
-from gateway.wire.messages import Confirmed, Lease, ProcessUse, Reset, Reverted, Stopped, Stored, Written
+from gateway.wire.control import Lease
+from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
+from gateway.wire.resource import ProcessUse
+from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme

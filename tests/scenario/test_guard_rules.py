@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gateway.guard.settings import WATCHES
+from gateway.config.guard import WATCHES
 from gateway.guard.watcher import State
 from hil_sim.drive.power_state import Command, PowerState
 from hil_sim.exoskeleton import Exoskeleton

@@ -22,7 +22,7 @@ from drivers.bus.frames import ERROR
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.config import RobotConfig, load
-from gateway.guard.rules import Rule
+from gateway.config.guard_rules import Rule
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.modules.component.assembly import Robot, assemble

@@ -11,28 +11,20 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from gateway.client import Batch, ClockOffset, ConnectionState
-from gateway.wire.messages import (
-    ChannelInfo,
-    Clock,
-    ComponentInfo,
+from gateway.wire.component import ChannelInfo, ComponentInfo, LayoutInfo, QualityInfo, Snapshot
+from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues
+from gateway.wire.resource import (
     CpuUse,
-    Description,
     DiskUse,
     GatewayUse,
-    GuardInfo,
-    LayoutInfo,
     MemoryUse,
     NetworkUse,
-    ParameterInfo,
-    ParameterValue,
-    ParameterValues,
     ProcessUse,
-    QualityInfo,
     ResourceSnapshot,
-    Snapshot,
-    StopInfo,
     Throttling,
 )
+from gateway.wire.robot import Clock, Description, GuardInfo
+from gateway.wire.stop import StopInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, Event, LinkChanged, Looked, Resources, Telemetry

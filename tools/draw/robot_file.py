@@ -13,7 +13,9 @@ from drivers.imu.canopen.cia410 import InclinometerSettings
 from drivers.imu.settings import CanImuSettings, ImuSettings
 from drivers.insole import formats as insole_formats
 from drivers.insole.settings import InsoleSettings
-from gateway.config import (
+from gateway.config.guard import GuardSettings
+from gateway.config.guard_rules import Rule
+from gateway.config.robot import (
     ControlLoopSettings,
     DeviceTable,
     GatewaySettings,
@@ -21,9 +23,7 @@ from gateway.config import (
     ParameterSettings,
     RobotSettings,
 )
-from gateway.guard.rules import Rule
-from gateway.guard.settings import GuardSettings
-from gateway.modules.stop.settings import ControllerStop, StopSettings
+from gateway.config.stop import ControllerStop, StopSettings
 from tools.draw.structs import Key, docstring, table, written
 
 PAGE: Final = "robot-toml.md"

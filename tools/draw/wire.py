@@ -1,14 +1,14 @@
 """docs/reference/wire.md: every method of the wire, from where the methods are declared."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from msgspec import Struct
 
-from gateway.service import MODULE_OF
 from gateway.wire.framing import CODES, PROTOCOL, ErrorData
-from gateway.wire.messages import METHODS, STREAM_DATA, StreamData
+from gateway.wire.method import AnyMethod
+from gateway.wire.methods import METHODS
+from gateway.wire.stream import STREAM_DATA, StreamData
 from tools.draw.structs import docstring, mentioned, sent, table
 
 PAGE: Final = "wire.md"
@@ -25,7 +25,9 @@ Whatever is missing or stale is `null`. In Python, [`gateway.client`](../how-to/
 ```
 
 *Module* says which part of the gateway answers; it is started by the first request, and stopped after the
-last client has left. What a client may ask for is bounded: [limits](limits.md)."""
+last client has left. *lease*: only the client that holds it may ask. *urgent*: acts before all that waits.
+*in turn*: devices or the kernel are asked, for one client after the other. What a client may ask for is
+bounded: [limits](limits.md)."""
 _STREAM: Final = f"""## Streams
 
 `stream.start` answers with a number; then notifications `{STREAM_DATA}` come until `stream.stop` or the end
@@ -35,44 +37,36 @@ _ERRORS: Final = """## Errors
 An error has a message for people, which says what to do, and `data` with its kind for programs."""
 
 
-@dataclass(frozen=True, slots=True)
-class Declared:
-    """One method, as it is declared."""
-
-    name: str
-    module: str
-    params: type[Struct]
-    result: type[Struct]
-
-
-def methods() -> Iterator[Declared]:
-    """Every method. No other function here knows how methods are declared."""
-    for name, method in METHODS.items():
-        yield Declared(name, MODULE_OF.get(name, SERVICE), method.params, method.result)
-
-
 def draw() -> str:
     """The page."""
-    declared = list(methods())
+    declared = list(METHODS.values())
     parts = [_HEAD, "## Methods", _overview(declared), *map(_section, declared)]
     parts += [_STREAM, _fields(StreamData), _ERRORS, _kinds(), _fields(ErrorData), "## Objects"]
     return "\n\n".join([*parts, *_objects(declared)]) + "\n"
 
 
-def _overview(declared: list[Declared]) -> str:
-    lines = ["| method | module | takes |", "|---|---|---|"]
+def _overview(declared: list[AnyMethod]) -> str:
+    lines = ["| method | module | | takes |", "|---|---|---|---|"]
     for one in declared:
         anchor = one.name.replace(".", "")
-        lines.append(f"| [`{one.name}`](#{anchor}) | {one.module} | {_parameters(one)} |")
+        known = ", ".join(word for word, holds in _words(one) if holds)
+        module = one.module or SERVICE
+        lines.append(f"| [`{one.name}`](#{anchor}) | {module} | {known} | {_parameters(one)} |")
     return "\n".join(lines)
 
 
-def _parameters(method: Declared) -> str:
+def _words(method: AnyMethod) -> Iterator[tuple[str, bool]]:
+    yield "lease", method.needs_lease
+    yield "urgent", method.urgent
+    yield "in turn", method.in_turn
+
+
+def _parameters(method: AnyMethod) -> str:
     names = [f"**`{key.name}`**" if key.default is None else f"`{key.name}`" for key in sent(method.params)]
     return ", ".join(names) or "nothing"
 
 
-def _section(method: Declared) -> str:
+def _section(method: AnyMethod) -> str:
     parts = [f"### `{method.name}`"]
     if any(sent(method.params)):
         parts += [docstring(method.params), table(sent(method.params), "takes")]
@@ -93,7 +87,7 @@ def _kinds() -> str:
     return "\n".join(["| kind | code |", "|---|---|", *rows])
 
 
-def _objects(declared: list[Declared]) -> Iterator[str]:
+def _objects(declared: list[AnyMethod]) -> Iterator[str]:
     """The structs that results are made of, by their names."""
     found: Mapping[str, type[Struct]] = {
         part.__name__: part

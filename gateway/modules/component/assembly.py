@@ -19,7 +19,7 @@ from drivers.insole.build import build_insole, join_insoles
 from drivers.joint.drive import JointDrive
 from drivers.joint.settings import JointSettings
 from drivers.site import Site
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.process.lean import standing_in, without
 
 T = TypeVar("T")

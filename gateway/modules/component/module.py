@@ -7,17 +7,19 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from msgspec import UNSET, UnsetType
 
 from drivers.component import Component
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel, State
+from gateway.handlers import Handlers, on
 from gateway.modules.component.assembly import Robot, assemble, facts
 from gateway.process.futures import done, then
 from gateway.streaming.sources import Selection, Source, channel_info, check_globs, narrow, whole
-from gateway.wire.messages import (
+from gateway.wire.component import (
+    COMPONENT_SNAPSHOT,
     ChannelInfo,
     ComponentInfo,
     LayoutInfo,
@@ -27,7 +29,7 @@ from gateway.wire.messages import (
 )
 
 if TYPE_CHECKING:
-    from gateway.connections.session import Answer, Session
+    from gateway.connections.session import Session
     from gateway.registry import Context
 
 COLD_S = 1.0
@@ -65,7 +67,7 @@ class ComponentModule:
         self._context = context
         self._warm_ns = 0
         self._waiting: list[tuple[Callable[[], bool], Future[None]]] = []
-        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"component.snapshot": self._snapshot}
+        self.handlers = Handlers(on(COMPONENT_SNAPSHOT, self._snapshot))
 
     def start(self) -> None:
         """Build and start everything; a component that cannot start is left out, and it is said why."""
@@ -157,7 +159,7 @@ class ComponentModule:
         channels += [one.channels for one in self.sources]
         return [channel_info(channel) for some in channels for channel in some]
 
-    def _snapshot(self, _session: "Session", params: SnapshotParams) -> "Answer":
+    def _snapshot(self, _session: "Session", params: SnapshotParams) -> "Future[Snapshot]":
         selections = self.selections()
         names = [name for one in selections for name in one.names]
         check_globs("channel", names, params.channels, self.absent)

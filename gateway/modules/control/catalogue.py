@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from eds import Description
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Number, scaled
-from gateway.config import STORE, ParameterSettings, RobotConfig
+from gateway.config.objects import STORE
+from gateway.config.robot import ParameterSettings, RobotConfig
 from gateway.modules.control.offer import offered
 from gateway.modules.control.parameters import Parameter, contradiction
 from gateway.streaming.sources import Wanted, check_globs

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from gateway.process.loop import Loop, Timer
+from gateway.wire.control import Lease
 from gateway.wire.framing import Kind, refuse
-from gateway.wire.messages import Lease
 
 if TYPE_CHECKING:
     from gateway.connections.session import Session

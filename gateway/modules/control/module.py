@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
+from gateway.handlers import Handlers, on
 from gateway.modules.control.lease import RENEWED, TAKEN, Leases
-from gateway.modules.control.storage import RESTORING, STORING, Command
+from gateway.modules.control.storage import RESTORING, STORING
 from gateway.modules.control.tuning import Tuning
 from gateway.modules.stop.authority import Authority
 from gateway.modules.stop.drive import Drive
@@ -15,10 +16,53 @@ from gateway.modules.stop.stop_control import StopControl
 from gateway.process.futures import then
 from gateway.records.journal import Journal, Share
 from gateway.records.records import Records
-from gateway.wire import messages
+from gateway.wire.component import ChannelInfo, ComponentInfo
+from gateway.wire.control import (
+    CONTROL_ACQUIRE,
+    CONTROL_RELEASE,
+    JOURNAL_TAIL,
+    AcquireParams,
+    JournalEntries,
+    Lease,
+    RecordsInfo,
+    ReleaseParams,
+    TailParams,
+)
+from gateway.wire.method import Done, Params
+from gateway.wire.parameter import (
+    PARAMETER_CONFIRM,
+    PARAMETER_LIST,
+    PARAMETER_READ,
+    PARAMETER_RESTORE,
+    PARAMETER_REVERT,
+    PARAMETER_STORE,
+    PARAMETER_WRITE,
+    ComponentParams,
+    Confirmed,
+    ParameterInfo,
+    ParameterParams,
+    ParameterValues,
+    ParameterWriteParams,
+    Reverted,
+    Stored,
+    TrialInfo,
+    WriteNumberParams,
+    Written,
+)
+from gateway.wire.stop import (
+    ROBOT_ENABLE,
+    ROBOT_RESET,
+    ROBOT_STOP,
+    Enabled,
+    EnableParams,
+    Reset,
+    StopInfo,
+    StopParams,
+    Stopped,
+)
 
 if TYPE_CHECKING:
-    from gateway.connections.session import Answer, Session
+    from gateway.connections.session import Session
     from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context
 
@@ -27,12 +71,12 @@ if TYPE_CHECKING:
 class Described:
     """The part of `robot.describe` that comes from the component and control modules."""
 
-    components: list[messages.ComponentInfo]
-    channels: list[messages.ChannelInfo]
-    parameters: list[messages.ParameterInfo]
-    stop: messages.StopInfo
-    trials: list[messages.TrialInfo]
-    records: messages.RecordsInfo
+    components: list[ComponentInfo]
+    channels: list[ChannelInfo]
+    parameters: list[ParameterInfo]
+    stop: StopInfo
+    trials: list[TrialInfo]
+    records: RecordsInfo
 
 
 class ControlModule:
@@ -44,21 +88,22 @@ class ControlModule:
         self._leases = Leases(context.loop, self._lease_changed)
         self._awake: set[str] = set()  # why the bus is kept, clients or not
         self.armed: Callable[[str], bool] = lambda _name: False  # the guard's, where there is one
-        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
-            "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
-            "control.release": self._release,
-            "parameter.list": lambda _session, params: self._tuning.listed(params.names),
-            "parameter.read": lambda session, params: self._tuning.read(params.names, session),
-            "parameter.write": self._write,
-            "parameter.confirm": self._confirm,
-            "parameter.revert": self._revert,
-            "parameter.store": lambda session, params: self._store(STORING, session, params.component),
-            "parameter.restore": lambda session, params: self._store(RESTORING, session, params.component),
-            "robot.stop": lambda session, params: self.stop_robot(session.who, str(params.reason)),
-            "robot.reset": lambda session, _params: self._reset(session),
-            "robot.enable": lambda session, params: self._enable(session, params.joints),
-            "journal.tail": lambda _session, params: self._tail(params.n),
-        }
+        self.handlers = Handlers(
+            on(CONTROL_ACQUIRE, self._acquire),
+            on(CONTROL_RELEASE, self._release),
+            on(JOURNAL_TAIL, self._tail),
+            on(PARAMETER_LIST, self._list),
+            on(PARAMETER_READ, self._read),
+            on(PARAMETER_WRITE, self._write),
+            on(PARAMETER_CONFIRM, self._confirm),
+            on(PARAMETER_REVERT, self._revert),
+            on(PARAMETER_STORE, self._store),
+            on(PARAMETER_RESTORE, self._restore),
+            on(ROBOT_STOP, self._stop_asked),
+            on(ROBOT_RESET, self._reset),
+            on(ROBOT_ENABLE, self._enable),
+            require=self._leases.require,
+        )
 
     def start(self) -> None:
         config, loop = self._context.config, self._context.loop
@@ -121,30 +166,58 @@ class ControlModule:
         if what != TAKEN:
             self._tuning.trials.revert_of(session, what)
 
-    def _tail(self, count: int) -> "Future[messages.JournalEntries]":
-        return then(self._records.journal.tail(count), lambda tail: messages.JournalEntries(*tail))
+    # What clients ask for
 
-    def _release(self, session: "Session", params: messages.ReleaseParams) -> messages.Done:
+    def _acquire(self, session: "Session", params: AcquireParams) -> Lease:
+        return self._leases.acquire(session, params.ttl_s)
+
+    def _release(self, session: "Session", params: ReleaseParams) -> Done:
         self._leases.release(session, params.lease)
-        return messages.Done()
+        return Done()
 
-    def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Future[messages.Written]":
-        self._leases.require(session)
+    def _tail(self, _session: "Session", params: TailParams) -> "Future[JournalEntries]":
+        return then(self._records.journal.tail(params.n), lambda tail: JournalEntries(*tail))
+
+    def _list(self, _session: "Session", params: ParameterParams) -> ParameterValues:
+        return self._tuning.listed(params.names)
+
+    def _read(self, session: "Session", params: ParameterParams) -> "Future[ParameterValues]":
+        return self._tuning.read(params.names, session)
+
+    def _write(self, session: "Session", params: ParameterWriteParams) -> "Future[Written]":
         return self._tuning.write(params.changes, session, params.trial_s)
 
-    def _confirm(
-        self, session: "Session", params: messages.WriteNumberParams
-    ) -> "Future[messages.Confirmed]":
-        self._leases.require(session)
+    def _confirm(self, _session: "Session", params: WriteNumberParams) -> "Future[Confirmed]":
         return self._tuning.trials.confirm(params.write)
 
-    def _revert(self, session: "Session", params: messages.WriteNumberParams) -> "Future[messages.Reverted]":
-        self._leases.require(session)
+    def _revert(self, _session: "Session", params: WriteNumberParams) -> "Future[Reverted]":
         return self._tuning.trials.revert(params.write)
 
-    def _store(self, command: Command, session: "Session", component: str) -> "Future[messages.Stored]":
-        self._leases.require(session)
-        return self._tuning.store(command, session, component)
+    def _store(self, session: "Session", params: ComponentParams) -> "Future[Stored]":
+        return self._tuning.store(STORING, session, params.component)
+
+    def _restore(self, session: "Session", params: ComponentParams) -> "Future[Stored]":
+        return self._tuning.store(RESTORING, session, params.component)
+
+    def _stop_asked(self, session: "Session", params: StopParams) -> "Future[Stopped]":
+        return self.stop_robot(session.who, str(params.reason))
+
+    def _reset(self, session: "Session", _params: Params) -> "Future[Reset]":
+        return self._stop.reset(session.who, session.asked_ns)
+
+    def _enable(self, session: "Session", params: EnableParams) -> "Future[Enabled]":
+        return self._stop.enable(
+            session.who,
+            session.asked_ns,
+            params.joints,
+            lambda: self._lost_lease(session),
+            self._tuning.enabling_objection,
+        )
+
+    def _lost_lease(self, session: "Session") -> str | None:
+        return None if self._leases.held_by(session) else "the lease of who asked for it has ended"
+
+    # For the guard
 
     @property
     def drives(self) -> Mapping[str, Drive]:
@@ -160,27 +233,10 @@ class ControlModule:
         """Who knows whether anything may move."""
         return self._stop.authority
 
-    def stop_robot(self, who: str, reason: str) -> "Future[messages.Stopped]":
+    def stop_robot(self, who: str, reason: str) -> "Future[Stopped]":
         """Quick stop on every drive, held until it is reset. From any thread."""
         return self._stop.stop(who, reason)
 
     def trip(self, who: str, reason: str) -> None:
         """The same for the guard, whose stop leaves one that is held already as it is. From any thread."""
         self._stop.trip(who, reason)
-
-    def _reset(self, session: "Session") -> "Future[messages.Reset]":
-        self._leases.require(session)
-        return self._stop.reset(session.who, session.asked_ns)
-
-    def _enable(self, session: "Session", joints: list[str] | None) -> "Future[messages.Enabled]":
-        self._leases.require(session)
-        return self._stop.enable(
-            session.who,
-            session.asked_ns,
-            joints,
-            lambda: self._lost_lease(session),
-            self._tuning.enabling_objection,
-        )
-
-    def _lost_lease(self, session: "Session") -> str | None:
-        return None if self._leases.held_by(session) else "the lease of who asked for it has ended"

@@ -10,17 +10,8 @@ from eds.datatypes import DATA_TYPES
 from eds.naming import object_name, remark
 from eds.report import pdo_rows
 from gateway.coding import NUMBERS
-from gateway.config import (
-    AXIS_OFFSET,
-    CONTROLWORD,
-    RESTORE,
-    STORE,
-    DeviceTable,
-    JointTable,
-    Node,
-    ParameterSettings,
-    RobotConfig,
-)
+from gateway.config.objects import AXIS_OFFSET, CONTROLWORD, RESTORE, STORE
+from gateway.config.robot import DeviceTable, JointTable, Node, ParameterSettings, RobotConfig
 from gateway.modules.control.parameters import WRITABLE, Lock, Parameter, contradiction
 from gateway.streaming.sources import matches
 

@@ -4,16 +4,15 @@ The limits of the robot's file and of the EDS both count, the stricter wins. Wha
 read-only until the robot's file releases it.
 """
 
-import operator
 from dataclasses import dataclass
 from enum import Enum
 
 from drivers.bus.values import size_of
 from eds.datatypes import DATA_TYPES
-from gateway.coding import Coding, CodingError, Number, text
-from gateway.config import ParameterSettings
+from gateway.coding import Coding, CodingError, Limit, Number, broken_limit, text
+from gateway.config.robot import ParameterSettings
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 
 READABLE = ("rw", "rwr", "rww", "ro", "const")
 WRITABLE = ("rw", "rwr", "rww")
@@ -41,7 +40,7 @@ _REMEDIES = {
     Lock.STORAGE: "storing and restoring are commands of their own: gwrms store, gwrms restore",
     Lock.CONTROLWORD: "it enables drives, and is never written as a parameter",
 }
-_LIMITS = (("min", operator.lt, "below the minimum"), ("max", operator.gt, "above the maximum"))
+_BEYOND = {Limit.MIN: "below the minimum", Limit.MAX: "above the maximum"}
 
 
 def contradiction(least: Number | None, most: Number | None, where: str) -> str | None:
@@ -91,6 +90,10 @@ class Parameter:
         return None if self.lock is None else self.lock.value
 
     @property
+    def max_step(self) -> float | None:
+        return self.settings.max_step
+
+    @property
     def info(self) -> ParameterInfo:
         """As `robot.describe` shows it."""
         settings = self.settings
@@ -100,7 +103,7 @@ class Parameter:
             unit=settings.unit,
             min=self.min,
             max=self.max,
-            max_step=settings.max_step,
+            max_step=self.max_step,
             live=settings.live,
             states=None if settings.states is None else list(settings.states),
             component=self.component,
@@ -179,8 +182,8 @@ class Parameter:
             raise self.refusal(Kind.MISMATCH, f"the device holds what is no value: {error}") from error
 
     def _check_limits(self, value: Number, said: str) -> None:
-        for which, is_beyond, word in _LIMITS:
-            limit: Number | None = getattr(self, which)
-            if limit is not None and is_beyond(value, self.coding.nearest(limit)):
-                text_ = f"{said} is {word} {text(limit)} {self.settings.unit}"
-                raise self.refusal(Kind.OUT_OF_LIMIT, text_, limit)
+        broken = broken_limit(self, self.coding, value)
+        if broken is not None:
+            limit: Number = getattr(self, broken)
+            text_ = f"{said} is {_BEYOND[broken]} {text(limit)} {self.settings.unit}"
+            raise self.refusal(Kind.OUT_OF_LIMIT, text_, limit)

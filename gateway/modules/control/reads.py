@@ -18,7 +18,7 @@ from gateway.connections.turns import Client, Turns
 from gateway.modules.control.parameters import Parameter
 from gateway.process.futures import done, outcome, then
 from gateway.process.loop import Loop
-from gateway.wire.messages import ParameterValue, ParameterValues
+from gateway.wire.parameter import ParameterValue, ParameterValues
 
 DEVICES: Final = 2  # that are read at the same time; such as keep us waiting do not count
 OBJECTS: Final = 8  # of one device in a row

@@ -15,8 +15,8 @@ from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
 from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.settings import JointSettings
-from gateway.coding import too_far
-from gateway.config import RobotConfig
+from gateway.coding import Limit, broken_limit
+from gateway.config.robot import RobotConfig
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.objects import Node, results
 from gateway.modules.control.parameters import Parameter
@@ -106,8 +106,11 @@ class Rules:
     def check_value(self, parameter: Parameter, held: bytes, new: bytes) -> None:
         """Raise `RpcError` where `new` must not be written over `held`, whatever the drives do."""
         value = parameter.accepts(new)
-        most, unit = parameter.settings.max_step, parameter.settings.unit
-        if most is not None and too_far(before := parameter.decode(held), value, most):
+        most, unit = parameter.max_step, parameter.settings.unit
+        if most is None:
+            return
+        before = parameter.decode(held)
+        if broken_limit(parameter, parameter.coding, value, before) is Limit.MAX_STEP:
             step = abs(value - before)
             text = f"from {before:g} {unit} it may change by {most:g} {unit} at once, not by {step:g}"
             raise parameter.refusal(Kind.OUT_OF_LIMIT, text, most)

@@ -14,7 +14,8 @@ from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError, NotPermitted
 from drivers.joint.cia402 import ENERGISED, STATE_WORDS
 from gateway.coding import Number, text
-from gateway.config import RESTORE, STORE, DeviceTable, JointTable, RobotConfig
+from gateway.config.objects import RESTORE, STORE
+from gateway.config.robot import DeviceTable, JointTable, RobotConfig
 from gateway.modules.control.objects import Node, download, read, result
 from gateway.modules.control.parameters import READABLE, Parameter
 from gateway.modules.control.rules import Rules
@@ -24,7 +25,7 @@ from gateway.process.futures import then
 from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import Stored
+from gateway.wire.parameter import Stored
 
 if TYPE_CHECKING:
     from gateway.modules.component.module import ComponentModule

@@ -16,6 +16,7 @@ from gateway.modules.control.rules import Rules, allowed_states
 from gateway.modules.control.taking_back import AS_IT_SHOULD_BE, TAKEN_BACK, Attempt
 from gateway.modules.stop.authority import Address, Permit
 from gateway.wire.framing import Kind, RpcError, internal_error, refuse
+from gateway.wire.parameter import PARAMETER_WRITE
 
 ENDING = "the gateway is ending"
 NOT_WRITTEN = "not written"
@@ -89,7 +90,7 @@ class Transaction:
         except RpcError as error:
             raise self._roll_back(error) from error
         except Exception as error:
-            raise self._roll_back(internal_error("parameter.write", error)) from error
+            raise self._roll_back(internal_error(PARAMETER_WRITE.name, error)) from error
         return Outcome(
             {one.name: self._value_before(one) for one in self._changes},
             {one.name: one.parameter.decode(one.data) for one in self._changes},

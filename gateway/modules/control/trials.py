@@ -19,7 +19,7 @@ from gateway.process.futures import back, done, outcome, then
 from gateway.process.loop import Loop, Timer
 from gateway.records.undo import Undo, UndoFile
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import Confirmed, Reverted, TrialInfo
+from gateway.wire.parameter import Confirmed, Reverted, TrialInfo
 
 if TYPE_CHECKING:
     from gateway.connections.session import Session

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from drivers.errors import DeviceTimeout, DriverError
 from drivers.samples import State
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
@@ -37,7 +37,7 @@ from gateway.process.loop import Loop
 from gateway.records.records import Records
 from gateway.records.undo import Undo
 from gateway.wire.framing import Kind, RpcError, refuse
-from gateway.wire.messages import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
+from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
 
 if TYPE_CHECKING:
     from gateway.connections.session import Session

@@ -6,17 +6,19 @@ taken in the loop, one a frame and at most one each `LOOK_S`.
 
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, cast
 
+from gateway.handlers import Handlers, on
 from gateway.modules.resource.overruns import NOTHING, Blame, Deadline, Judge, Late
 from gateway.modules.resource.tasks import TICK_NS, Id, Look, Tasks
 from gateway.wire.framing import Kind, refuse
-from gateway.wire.messages import Overrun, Overruns, Params, RanInstead
+from gateway.wire.method import Params
+from gateway.wire.resource import RESOURCE_OVERRUNS, Overrun, Overruns, RanInstead
 
 if TYPE_CHECKING:
     from drivers.bus.bus import CanBus
-    from gateway.connections.session import Answer, Session
+    from gateway.connections.session import Session
     from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context
 
@@ -44,7 +46,7 @@ class BlameModule:
         self._stopped = False
         self._cycles = 0  # since the last look
         self._looked_ns = self._met_ns = 0
-        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.overruns": self._answer}
+        self.handlers = Handlers(on(RESOURCE_OVERRUNS, self._answer))
 
     def start(self) -> None:
         settings = self._settings

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from typing import NamedTuple, Protocol
 
-from gateway.wire.messages import MemoryUse
+from gateway.wire.resource import MemoryUse
 
 
 class ProcessTimes:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import psutil
 
-from gateway.wire.messages import KernelFacts, Throttling
+from gateway.wire.resource import KernelFacts, Throttling
 
 SYS = Path("/sys")
 _SLOWING = (

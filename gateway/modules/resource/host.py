@@ -11,7 +11,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from gateway.modules.resource.counters import CoreTimes, Counters, ProcessTimes
-from gateway.wire.messages import (
+from gateway.wire.resource import (
     ControlProcess,
     CpuUse,
     DiskUse,

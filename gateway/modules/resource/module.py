@@ -15,13 +15,14 @@ import msgspec
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
 from gateway.connections.turns import Turns
+from gateway.handlers import Handlers, on
 from gateway.process.futures import back, done, pass_on, then
 from gateway.streaming.sources import Selection, whole
 from gateway.wire.framing import Kind, refuse
-from gateway.wire.messages import ResourceSnapshot, ResourceSnapshotParams
+from gateway.wire.resource import RESOURCE_SNAPSHOT, ResourceSnapshot, ResourceSnapshotParams
 
 if TYPE_CHECKING:
-    from gateway.connections.session import Answer, Session
+    from gateway.connections.session import Session
     from gateway.modules.resource.host import Host, Meter
     from gateway.process.loop import Timer
     from gateway.registry import Context
@@ -128,7 +129,7 @@ class ResourceModule:
         self._meters: dict[tuple[Session, str], Meter] = {}
         self._turns = Turns[_Wish]()
         self._measuring = False  # for a client
-        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"resource.snapshot": self._snapshot}
+        self.handlers = Handlers(on(RESOURCE_SNAPSHOT, self._snapshot))
 
     def start(self) -> None:
         from gateway.modules.resource.host import Host  # how it measures is loaded with the first question
@@ -178,7 +179,7 @@ class ResourceModule:
         """As it goes on the wire."""
         if "control" in params.include and not self._control:
             raise refuse(Kind.BAD_PARAMS, "control: the robot's file names no processes in [control_loop]")
-        meter = self._meter_of(session, "resource.snapshot")
+        meter = self._meter_of(session, RESOURCE_SNAPSHOT.name)
         return self._for(session, lambda: msgspec.Raw(_encoder.encode(meter.snapshot(params))))
 
     def _for(self, session: "Session", work: Callable[[], T]) -> "Future[T]":

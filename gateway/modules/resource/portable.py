@@ -6,7 +6,7 @@ from collections.abc import Collection
 import psutil
 
 from gateway.modules.resource.counters import CoreTimes, ProcessTimes
-from gateway.wire.messages import MemoryUse
+from gateway.wire.resource import MemoryUse
 
 _ATTRIBUTES = ("name", "cpu_times", "memory_info", "create_time")
 

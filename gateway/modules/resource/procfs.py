@@ -13,7 +13,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from gateway.modules.resource.counters import CoreTimes, ProcessTimes
-from gateway.wire.messages import MemoryUse
+from gateway.wire.resource import MemoryUse
 
 KEPT_MOST = 4096  # descriptors, and no more than half of those that the process may have
 SELECTABLE = 1024  # select(2), which serial drivers wait in, takes lower numbers only: ours leave them free

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gateway.modules.resource.tasks import Look, Tasks
 from gateway.streaming.rates import Rates
-from gateway.wire.messages import ControlProcess, ThreadUse
+from gateway.wire.resource import ControlProcess, ThreadUse
 
 _MINOR, _MAJOR = 7, 9  # faults in /proc/<pid>/stat, counted from the state
 _SWITCHES = re.compile(r"(voluntary|nonvoluntary)_ctxt_switches:\s+(\d+)")

@@ -13,8 +13,8 @@ from drivers.joint.quick_stop import FIRST_PATIENCE_S, READ_PERIOD_S, StopOutcom
 from eds import Description
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Coding, CodingError
+from gateway.config.stop import ControllerStop
 from gateway.modules.stop.machine import Finding
-from gateway.modules.stop.settings import ControllerStop
 from gateway.modules.stop.target import OneAtATime, Report
 from gateway.process.futures import failed
 

@@ -16,7 +16,7 @@ from gateway.modules.stop.reset import as_led, state_words
 from gateway.process.futures import back, done, failed, gather, then
 from gateway.process.loop import Loop
 from gateway.records.journal import Journal
-from gateway.wire.messages import Enabled
+from gateway.wire.stop import Enabled
 
 Objection = Callable[[], str | None]  # why it must not go on, `None` where it may
 

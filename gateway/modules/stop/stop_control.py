@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 from drivers.bus.settings import Role
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 from gateway.modules.stop.authority import Address, Authority
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
@@ -33,8 +33,8 @@ from gateway.process.loop import Loop
 from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.streaming.sources import check_globs, matches
-from gateway.wire import messages
 from gateway.wire.framing import Kind, refuse
+from gateway.wire.stop import DriveReaction, Enabled, Reset, StopInfo, Stopped
 
 if TYPE_CHECKING:
     from gateway.modules.component.module import ComponentModule
@@ -58,7 +58,7 @@ class Asked:
 
     who: str
     reason: str
-    answer: "Future[messages.Stopped]" = field(default_factory=Future)
+    answer: "Future[Stopped]" = field(default_factory=Future)
 
 
 def _newest_of_each(stops: Iterable[Asked]) -> list[Asked]:
@@ -144,7 +144,7 @@ class StopControl:
 
     # Stop
 
-    def stop(self, who: str, reason: str) -> "Future[messages.Stopped]":
+    def stop(self, who: str, reason: str) -> "Future[Stopped]":
         """Quick stop on every drive, controllers too, held until it is reset."""
         return self._ask(Input.STOP, Asked(who, reason))
 
@@ -158,7 +158,7 @@ class StopControl:
         with contextlib.suppress(Ended):
             self.authority.feed(what, partial(self._act, asked, target), at_ns=stamp_ns, target=target)
 
-    def _ask(self, what: Input, asked: Asked) -> "Future[messages.Stopped]":
+    def _ask(self, what: Input, asked: Asked) -> "Future[Stopped]":
         self.authority.feed(what, partial(self._act, asked, ""))
         return asked.answer
 
@@ -224,12 +224,12 @@ class StopControl:
         stopped = self._answers.follow(first, self._record.kept)
         stopped.add_done_callback(lambda found: self._answered(stops, found))
 
-    def _answered(self, stops: "Sequence[_Waiting]", stopped: "Future[messages.Stopped]") -> None:
+    def _answered(self, stops: "Sequence[_Waiting]", stopped: "Future[Stopped]") -> None:
         for one in stops:
             self.authority.feed(Input.ANSWERED, _nothing, number=one.number)
         found = outcome(stopped)
         newest = next((one.asked for one in reversed(stops) if one.recorded), None)
-        if isinstance(found, messages.Stopped) and newest is not None and not self._closed:
+        if isinstance(found, Stopped) and newest is not None and not self._closed:
             keys = ("controllers", "fallbacks", "problem")
             more = {key: value for key in keys if (value := getattr(found, key))}
             self._journal.append(newest.who, "stop answered", Share.ACT, result=found.drives, **more)
@@ -238,7 +238,7 @@ class StopControl:
 
     # Reset; in the loop.
 
-    def reset(self, who: str, asked_ns: int) -> "Future[messages.Reset]":
+    def reset(self, who: str, asked_ns: int) -> "Future[Reset]":
         """Lead every drive to SWITCH ON DISABLED; a held stop ends where all is shown to rest.
 
         It came in at `asked_ns`: what is older than the newest stop is not done.
@@ -266,7 +266,7 @@ class StopControl:
         if ended.exception() is not None:
             self.authority.feed(Input.UNPROVED, _nothing, number=number)
 
-    def _prove(self, who: str, number: int, descent: Descent) -> "Future[messages.Reset]":
+    def _prove(self, who: str, number: int, descent: Descent) -> "Future[Reset]":
         removed: list[Future[None]] = []
 
         def act(step: Step) -> None:
@@ -288,9 +288,7 @@ class StopControl:
         nodes |= {name: one.node for name, one in self._controllers.targets.items()}
         return [name for name, node in nodes.items() if not node.ready]
 
-    def _removed(
-        self, who: str, number: int, descent: Descent, failure: Exception | None
-    ) -> "Future[messages.Reset]":
+    def _removed(self, who: str, number: int, descent: Descent, failure: Exception | None) -> "Future[Reset]":
         what = Input.REMOVED if failure is None else Input.KEPT
         step = self.authority.feed(what, self._release, number=number)
         if Action.RELEASE in step.actions:
@@ -310,9 +308,9 @@ class StopControl:
         elif Action.RECORD in step.actions:
             self._record.write_again()
 
-    def _told(self, who: str, descent: Descent) -> "Future[messages.Reset]":
+    def _told(self, who: str, descent: Descent) -> "Future[Reset]":
         """The answer, once it is written down."""
-        reset = messages.Reset(descent.drives, descent.problems, held=self.held)
+        reset = Reset(descent.drives, descent.problems, held=self.held)
         problems = {"problems": reset.problems} if reset.problems else {}
         written = self._journal.append(
             who, "reset", Share.ACT, result=reset.drives, held=reset.held, **problems
@@ -338,7 +336,7 @@ class StopControl:
         globs: list[str] | None,
         objection: Callable[[], str | None],
         on_trial: Callable[[Sequence[str]], str | None],
-    ) -> "Future[messages.Enabled]":
+    ) -> "Future[Enabled]":
         """Enable the joints that the globs mean, as long as there is no `objection`.
 
         `on_trial` says why the end of a trial could not be written back to a drive that is enabled.
@@ -371,13 +369,13 @@ class StopControl:
         answer.add_done_callback(lambda _answer: self.authority.feed(Input.ENABLED, _nothing, number=number))
         return answer
 
-    def _explained(self, who: str, joints: list[str], enabling: Enabling) -> "Future[messages.Enabled]":
+    def _explained(self, who: str, joints: list[str], enabling: Enabling) -> "Future[Enabled]":
         """What cannot be journaled is not begun."""
         entry = gather(
             {"journal": back(self._loop, self._journal.append(who, "enabling", Share.ASKED, joints=joints))}
         )
 
-        def begin(written: Mapping[str, Exception | None]) -> "Future[messages.Enabled]":
+        def begin(written: Mapping[str, Exception | None]) -> "Future[Enabled]":
             error = written["journal"]
             if error is not None:
                 raise refuse(Kind.UNAVAILABLE, f"it cannot be journaled, so nothing was enabled: {error}")
@@ -387,10 +385,10 @@ class StopControl:
 
     # Words
 
-    def info(self, armed: Callable[[str], bool]) -> messages.StopInfo:
+    def info(self, armed: Callable[[str], bool]) -> StopInfo:
         """As `robot.describe` shows it."""
         held = self._record.held if self.held else None
-        return messages.StopInfo(
+        return StopInfo(
             held=self.held,
             reason=None if held is None else held.reason,
             since_ns=None if held is None or held.boot_id != boot_id() else held.monotonic_ns,
@@ -434,11 +432,11 @@ def _nothing(_step: Step) -> None:
     """What follows is begun by who has asked."""
 
 
-def _reaction(drive: Drive, armed: bool) -> messages.DriveReaction:
+def _reaction(drive: Drive, armed: bool) -> DriveReaction:
     """What a drive does by itself, as it said when it came up."""
     options = {} if drive.reading is None else drive.reading.options
     quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
-    return messages.DriveReaction(
+    return DriveReaction(
         quick_stop_option=quick_stop,
         abort_connection_option=abort_connection,
         armed=armed,

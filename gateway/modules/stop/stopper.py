@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from drivers.bus.arming import ACTING
 from drivers.joint.quick_stop import StopOutcome
+from gateway.config.stop import Fallback
 from gateway.modules.stop.drive import Drive, quick_stop
-from gateway.modules.stop.settings import Fallback
 from gateway.modules.stop.target import OneAtATime, Report
 from gateway.process.futures import done, then
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from gateway.wire.messages import Description
+from gateway.wire.robot import Description
 from server_gui.core.archive.collected_journals import Found, Kept
 from server_gui.core.audit import chains
 from server_gui.core.audit.acts import Act, acts

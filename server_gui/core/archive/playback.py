@@ -12,7 +12,9 @@ import numpy as np
 from msgspec import UNSET
 
 from gateway.client import Batch, ConnectionState
-from gateway.wire.messages import ChannelInfo, Clock, ComponentInfo, Description, GuardInfo, StopInfo
+from gateway.wire.component import ChannelInfo, ComponentInfo
+from gateway.wire.robot import Clock, Description, GuardInfo
+from gateway.wire.stop import StopInfo
 from server_gui.core.archive.recall import Said
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown

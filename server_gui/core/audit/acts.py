@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.wire.messages import Number
+from gateway.wire.method import Number
 
 Entry = Mapping[str, Any]
 OPEN: Final = "NOT KNOWN how it ended"

@@ -6,7 +6,7 @@ from functools import cache
 from importlib import resources
 from typing import Final
 
-from gateway.wire.messages import LayoutInfo
+from gateway.wire.component import LayoutInfo
 from server_gui.core.follow.robot import Robot
 
 Cell = tuple[float, float]  # x forward from the heel, y left, m

@@ -9,16 +9,12 @@ from typing import Final
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
-from gateway.wire.messages import (
-    Description,
-    GatewayCost,
-    Lease,
-    ParameterInfo,
-    ResourceSnapshot,
-    Stopped,
-    Stored,
-    Written,
-)
+from gateway.wire.control import Lease
+from gateway.wire.cost import GatewayCost
+from gateway.wire.parameter import ParameterInfo, Stored, Written
+from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.robot import Description
+from gateway.wire.stop import Stopped
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.rings import Rings
 from server_gui.core.follow.events import (

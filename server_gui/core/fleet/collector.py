@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Struct
 
 from gateway.client import Address
-from gateway.wire.messages import ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshotParams
 from ml.store import Store
 from server_gui.core.fleet.control_socket import Answers, door
 from server_gui.core.fleet.fleet import Fleet, Subscriber

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from gateway.wire.messages import Stopped
+from gateway.wire.stop import Stopped
 from server_gui.core.fleet.stop_links import StopRobot
 from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
 from server_gui.core.prediction.service import Predicting

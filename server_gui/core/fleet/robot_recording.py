@@ -3,7 +3,7 @@
 import msgspec
 
 from gateway.client import ConnectionState
-from gateway.wire.messages import Description
+from gateway.wire.robot import Description
 from server_gui.core.fleet import session_facts
 from server_gui.core.follow.events import (
     Described,

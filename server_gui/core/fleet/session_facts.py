@@ -7,7 +7,8 @@ import msgspec
 from msgspec.structs import replace
 
 from gateway.wire.framing import PROTOCOL
-from gateway.wire.messages import Description, KernelFacts
+from gateway.wire.resource import KernelFacts
+from gateway.wire.robot import Description
 from server_gui.core.recording.records import Facts
 
 

@@ -4,7 +4,7 @@ import concurrent.futures
 from collections.abc import Callable, Sequence
 
 from gateway.client import Address
-from gateway.wire.messages import Stopped
+from gateway.wire.stop import Stopped
 from server_gui.core.follow.network import Network
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.core.tuning.link import Link

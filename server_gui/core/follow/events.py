@@ -6,14 +6,12 @@ from dataclasses import dataclass
 import msgspec
 
 from gateway.client import Batch, ClockOffset, ConnectionState
-from gateway.wire.messages import (
-    Description,
-    GatewayCost,
-    JournalEntries,
-    ParameterValues,
-    ResourceSnapshot,
-    Snapshot,
-)
+from gateway.wire.component import Snapshot
+from gateway.wire.control import JournalEntries
+from gateway.wire.cost import GatewayCost
+from gateway.wire.parameter import ParameterValues
+from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.robot import Description
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,8 @@ from gateway.client import (
     RemoteError,
 )
 from gateway.client.backoff import Backoff
-from gateway.wire.messages import Description, ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshotParams
+from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
     Described,
     Event,

@@ -5,7 +5,10 @@ import time
 from dataclasses import dataclass, field
 
 from gateway.client import ConnectionState
-from gateway.wire.messages import Description, ParameterValue, QualityInfo, ResourceSnapshot
+from gateway.wire.component import QualityInfo
+from gateway.wire.parameter import ParameterValue
+from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
     Described,
     Event,

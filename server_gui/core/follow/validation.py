@@ -11,7 +11,7 @@ from typing import Any, Final
 import msgspec
 
 from gateway.client import Batch, ProtocolError
-from gateway.wire.messages import Description
+from gateway.wire.robot import Description
 from server_gui.core.follow.events import Described, Event, Journalled, Looked, Resources, Telemetry
 
 MOST_ROWS: Final = 10_000  # of one notification: a gateway sends what came in milliseconds

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Self
 
 from gateway.client import Address
-from gateway.wire.messages import ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshotParams
 from ml.robot.groups import GROUPS
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.feed import ONCE, Feed, Following, Tell

@@ -2,7 +2,7 @@
 
 import time
 
-from gateway.wire.messages import Description
+from gateway.wire.robot import Description
 from server_gui.core.follow.events import Described, Event, LinkChanged, Looked, Refused, Resources, Telemetry
 from server_gui.core.processing.communication import LinkMonitor, LinkQuality
 from server_gui.core.processing.component import ComponentProcessing, Derived

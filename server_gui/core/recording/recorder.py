@@ -11,7 +11,8 @@ from enum import Enum
 from typing import Any, Final, NamedTuple, Self
 
 from gateway.client import Batch
-from gateway.wire.messages import Description, ResourceSnapshot
+from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.robot import Description
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES
 from server_gui.core.recording import records
 from server_gui.core.recording.batching import EventKind, Notification

@@ -3,7 +3,8 @@
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 
-from gateway.wire.messages import Description, ResourceSnapshot
+from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.robot import Description
 from ml.store.tables import PREDICTIONS
 from server_gui.core.follow import validation
 from server_gui.core.recording import records

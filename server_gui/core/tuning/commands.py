@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Protocol
 
-from gateway.wire.messages import Confirmed, Lease, Reset, Reverted, Stopped, Stored, Written
+from gateway.wire.control import Lease
+from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
+from gateway.wire.stop import Reset, Stopped
 
 
 class Commands(Protocol):

@@ -8,7 +8,8 @@ from gateway.parameter_files.comparison import Row, Verdict, compare
 from gateway.parameter_files.contents import FileProblem, Saved, Scope, WhichDevice
 from gateway.parameter_files.formats import format_of, read_file
 from gateway.records import durable
-from gateway.wire.messages import Description, ParameterInfo, ParameterValue
+from gateway.wire.parameter import ParameterInfo, ParameterValue
+from gateway.wire.robot import Description
 
 Held = Mapping[str, ParameterValue]
 

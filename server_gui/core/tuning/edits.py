@@ -3,10 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from gateway.wire.messages import Number, ParameterInfo, ParameterValue
+from gateway.coding import Limit, broken_limit, coding_of
+from gateway.wire.method import Number
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 from server_gui.core.processing.units import Unit, Units
 
 Values = Mapping[str, ParameterValue]
+_BROKEN: Mapping[Limit, str] = {
+    Limit.MIN: "below the smallest allowed, {}",
+    Limit.MAX: "above the largest allowed, {}",
+    Limit.MAX_STEP: "further than one write may go, {}: take two steps",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +107,7 @@ def refusal(value: float, old: Number | None, info: ParameterInfo | None, unit: 
     """Why a robot would refuse this value (SI), in words and `unit`; None where nothing speaks against it."""
     if info is None:
         return "the robot has no such parameter any more"
-    if info.min is not None and value < info.min:
-        return f"below the smallest allowed, {unit.editable(info.min)} {unit.symbol}"
-    if info.max is not None and value > info.max:
-        return f"above the largest allowed, {unit.editable(info.max)} {unit.symbol}"
-    if info.max_step is not None and old is not None and abs(value - old) > info.max_step * (1 + 1e-9):
-        step = f"{unit.editable(info.max_step)} {unit.symbol}"
-        return f"further than one write may go, {step}: take two steps"
-    return None
+    broken = broken_limit(info, coding_of(info.type, info.scale), value, old)
+    if broken is None:
+        return None
+    return _BROKEN[broken].format(f"{unit.editable(getattr(info, broken))} {unit.symbol}")

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import ClockOffset
-from gateway.wire.messages import Description, Number, QualityInfo
+from gateway.wire.component import QualityInfo
+from gateway.wire.method import Number
+from gateway.wire.robot import Description
 from server_gui.core.audit.journal import Audit
 
 Entry = Mapping[str, Any]

@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from gateway.wire.messages import Lease
+from gateway.wire.control import Lease
 
 
 @dataclass(slots=True)

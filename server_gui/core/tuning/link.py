@@ -8,16 +8,10 @@ from concurrent.futures import Future
 from typing import Final
 
 from gateway.client import Address, Client, ClientError, ConnectionState, LinkSettings
-from gateway.wire.messages import (
-    Confirmed,
-    Lease,
-    Reset,
-    ResourceSnapshotParams,
-    Reverted,
-    Stopped,
-    Stored,
-    Written,
-)
+from gateway.wire.control import Lease
+from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
+from gateway.wire.resource import ResourceSnapshotParams
+from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import Costs, Failed, Resources
 from server_gui.core.follow.feed import Tell
 from server_gui.core.follow.network import Network

@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 from enum import Enum
 
-from gateway.wire.messages import Stopped
+from gateway.wire.stop import Stopped
 
 
 class StopState(Enum):

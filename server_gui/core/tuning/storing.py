@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.wire.messages import Description
+from gateway.wire.robot import Description
 from server_gui.core.follow.robot import Robot
 from server_gui.core.tuning.flash import devices
 from server_gui.core.tuning.writing import Trial

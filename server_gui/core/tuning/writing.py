@@ -8,7 +8,8 @@ from enum import Enum
 from typing import Final
 
 from gateway.client import NotConnected, RemoteError
-from gateway.wire.messages import Number, Written
+from gateway.wire.method import Number
+from gateway.wire.parameter import Written
 from server_gui.core.tuning.edits import Change
 
 UNDO: Final = 100  # writes that can be taken back one after another

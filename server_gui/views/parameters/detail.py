@@ -7,7 +7,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QSlider
 
-from gateway.wire.messages import Number, ParameterInfo
+from gateway.wire.method import Number
+from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.units import Unit

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.parameter_files.comparison import Verdict
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.units import Unit

@@ -9,7 +9,8 @@ from gateway.client.connection import Connection
 from gateway.client.errors import ClientError
 from gateway.client.link import Link, LinkSettings
 from gateway.client.subscription import Subscription
-from gateway.wire.messages import METHODS, StreamStartParams
+from gateway.wire.methods import METHODS
+from gateway.wire.stream import StreamStartParams
 
 TOKENS = (
     b'{"jsonrpc":"2.0","id":1,"result":',
@@ -56,4 +57,4 @@ async def _hear(data: bytes) -> None:
 
 async def _ask(link: Link, connection: Connection, name: str) -> None:
     with contextlib.suppress(ClientError):
-        await link._ask(connection, name, {}, METHODS[name].result)
+        await link._ask(connection, METHODS[name], {})

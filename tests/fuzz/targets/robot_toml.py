@@ -32,7 +32,12 @@ TOKENS = (
     b"127",
     b"1.0",
 )
-MODULES = ("gateway.config",)
+MODULES = (
+    "gateway.config.checks",
+    "gateway.config.objects",
+    "gateway.config.reading",
+    "gateway.config.robot",
+)
 
 
 def fuzz(data: bytes) -> None:

@@ -1,7 +1,8 @@
 """What a client may send to the gateway: lines out of bytes, requests and their parameters out of lines."""
 
 from gateway.wire import framing
-from gateway.wire.messages import METHODS, StopParams
+from gateway.wire.methods import METHODS
+from gateway.wire.stop import StopParams
 
 TOKENS = (
     b'{"jsonrpc":"2.0","id":1,"method":"',

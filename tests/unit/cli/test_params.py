@@ -11,12 +11,12 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from eds import dcf
-from gateway.connections.limits import LINE_LIMIT
 from gateway.main import main
 from gateway.modules.control.parameters import Lock
 from gateway.parameter_files.comparison import Verdict, compare
 from gateway.parameter_files.contents import COMMANDS
-from gateway.wire.messages import ParameterInfo, ParameterValue
+from gateway.wire.limits import LINE_LIMIT
+from gateway.wire.parameter import ParameterInfo, ParameterValue
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, config, serving
 
 EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'

@@ -11,7 +11,7 @@ from gateway.cli.text import say, say_json, table, warn
 from gateway.client import Robot
 from gateway.client.errors import RemoteError
 from gateway.plain import json_plain, plain
-from gateway.wire.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
+from gateway.wire.resource import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
 from server_gui.cli.collect import PlainLines
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Failed, Resources

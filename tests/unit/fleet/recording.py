@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.client import Address
-from gateway.wire.messages import ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshotParams
 from server_gui.core.fleet.fleet import Fleet
 from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import ONCE, Following

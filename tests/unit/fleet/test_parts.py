@@ -7,7 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
-from gateway.wire.messages import ComponentInfo, ParameterInfo
+from gateway.wire.component import ComponentInfo
+from gateway.wire.parameter import ParameterInfo
 from server_gui.core.fleet.link_statistics import SECOND_NS, LinkReport, LinkStatistics
 from server_gui.core.fleet.session_facts import configuration_hash, facts
 from server_gui.core.follow.events import LinkChanged, Resources, Telemetry

@@ -15,7 +15,8 @@ from gateway.modules.resource import blame as module
 from gateway.modules.resource.blame import BlameModule
 from gateway.modules.resource.overruns import Deadline, Judge, Late, Reason
 from gateway.modules.resource.tasks import Spent, Tasks
-from gateway.wire.messages import Overrun, Overruns, RanInstead
+from gateway.wire.method import Params
+from gateway.wire.resource import RESOURCE_OVERRUNS, Overrun, Overruns, RanInstead
 from tests.unit.gateway.harness import HEAD, Bench, Client, config, serving
 from tests.unit.gateway.recorded import Process, Recorded, Thread, single
 
@@ -117,7 +118,7 @@ class Turn:
             callback()
 
     def ask(self, session: Any) -> Any:
-        return self.module.handlers["resource.overruns"](session, None)
+        return self.module.handlers.answer(RESOURCE_OVERRUNS, session, Params())
 
     def end(self) -> None:
         self.module.stop()

@@ -14,8 +14,8 @@ from gateway.modules.component.module import ComponentSource
 from gateway.process.loop import Loop
 from gateway.streaming import budget
 from gateway.streaming.budget import MOST, OVER_LOOKS, UNDER_LOOKS, Budget
+from gateway.streaming.feeds import SampleFeed, TickFeed
 from gateway.streaming.sources import whole
-from gateway.streaming.streams import SampleFeed, TickFeed
 from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, FakeComponent, config, serving, until
 from tests.unit.gateway.test_streams import outlet, rows, taken
 

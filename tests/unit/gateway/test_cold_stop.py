@@ -9,7 +9,7 @@ import pytest
 from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
-from gateway.process.first_stop import FirstStop
+from gateway.modules.stop.first_stop import FirstStop
 from gateway.registry import Context, Spec
 from tests.unit.gateway.harness import DEADLINE_S, Bench, Client, config, serving, until
 
@@ -176,7 +176,7 @@ def test_where_the_stop_s_own_modules_run_nothing_is_sent_beside_them(
 ) -> None:
     with serving(config(tmp_path)) as address, Client(address) as client:
         client.call("robot.describe")
-        monkeypatch.setattr("gateway.process.first_stop.SHARED", ("virtual",))
+        monkeypatch.setattr("gateway.modules.stop.first_stop.SHARED", ("virtual",))
         assert client.call("robot.stop")["held"]
         assert wires.opened == []
 

@@ -17,7 +17,7 @@ from gateway.process.loop import Loop
 from gateway.streaming.budget import Budget
 from gateway.streaming.rates import Rates
 from gateway.streaming.streams import Streams
-from gateway.wire.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
+from gateway.wire.cost import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
 from tests.unit.gateway.harness import Bench, Client, config, serving, until
 
 Connect = Callable[[], Client]

@@ -22,11 +22,11 @@ from hypothesis import strategies as st
 from drivers.joint.quick_stop import StopOutcome
 from gateway import daemon
 from gateway.connections import session
-from gateway.connections.limits import BAD_LINES, LINE_LIMIT
 from gateway.connections.listeners import listen
 from gateway.process.futures import done
 from gateway.service import Service
 from gateway.wire import framing
+from gateway.wire.limits import BAD_LINES, LINE_LIMIT
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
 

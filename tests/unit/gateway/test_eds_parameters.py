@@ -13,11 +13,12 @@ from drivers.samples import Quality
 from eds.datatypes import DATA_TYPES
 from eds.naming import identifier
 from gateway.coding import EXACT_COUNTS, Coding, CodingError, Number
-from gateway.config import ConfigError, DeviceTable, JointTable
+from gateway.config import ConfigError
+from gateway.config.robot import DeviceTable, JointTable
 from gateway.modules.control.catalogue import Catalogue, resolve
 from gateway.modules.control.parameters import Lock, Parameter
 from gateway.wire.framing import RpcError
-from gateway.wire.messages import ParameterInfo
+from gateway.wire.parameter import ParameterInfo
 from tests.unit.gateway.harness import DISABLED, HEAD, ROBOT, Bench, Client, config, serving
 
 KNEE = """

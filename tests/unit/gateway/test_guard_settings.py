@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from gateway.config import ConfigError, RobotConfig
-from gateway.guard.rules import Action, Blind, HeatRule, LevelRule
-from gateway.guard.settings import limit
+from gateway.config.guard import limit
+from gateway.config.guard_rules import Action, Blind, HeatRule, LevelRule
 from tests.unit.gateway.harness import ROBOT, config
 
 IMU = '[imu.trunk]\nport = "/dev/null-imu"\nbaudrate = 115200\nformat = "witmotion"\naxes = ["x", "y", "z"]\n'

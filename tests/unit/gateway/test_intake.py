@@ -13,16 +13,17 @@ import pytest
 
 from gateway.connections import intake, stop_lines
 from gateway.connections.intake import Heard, Inlet, Pace
-from gateway.connections.limits import BAD_LINES, MOST_STOPS, QUEUED_BYTES, QUEUED_LINES
 from gateway.connections.listeners import listen
 from gateway.connections.session import Session
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import stop_in
 from gateway.daemon import Daemon
+from gateway.handlers import Handlers, on
 from gateway.process.loop import HANGUP, READ, Loop
 from gateway.registry import Context, Spec
 from gateway.wire import framing
-from gateway.wire.messages import Stopped
+from gateway.wire.limits import BAD_LINES, MOST_STOPS, QUEUED_BYTES, QUEUED_LINES
+from gateway.wire.stop import ROBOT_STOP, Stopped
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config, until
 
@@ -35,7 +36,7 @@ class Stops:
     """A module that stops what there is, and tells; it stands in the place of `control`."""
 
     def __init__(self, context: Context) -> None:
-        self.handlers = {"robot.stop": lambda session, params: self._late(session, params)}
+        self.handlers = Handlers(on(ROBOT_STOP, self._late))
         self.asked: list[tuple[str, str]] = []
         self.late: list[tuple[str, str]] = []  # what came by the loop
         self.answer: Future[Stopped] = Future()

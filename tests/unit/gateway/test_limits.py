@@ -16,7 +16,7 @@ import pytest
 
 from drivers.joint.cia402 import DriveState
 from gateway import coding
-from gateway.config import ParameterSettings
+from gateway.config.robot import ParameterSettings
 from gateway.modules.control import catalogue, offer, parameters, rules
 from gateway.modules.control.parameters import Lock, Parameter
 from gateway.wire.framing import Kind, RpcError
@@ -207,6 +207,23 @@ STEPS = [
 ]  # before, after, most, too far
 
 
+LIMITED = SimpleNamespace(min=-0.7, max=0.6, max_step=0.5)
+BROKEN: list[tuple[int | None, float, float | None, str | None]] = [
+    (None, 0.6, None, None),
+    (None, 0.60000002, None, "max"),
+    (REAL32, 0.60000002, None, None),  # which the device holds of 0.6
+    (REAL32, 0.6000001, None, "max"),
+    (None, -0.7, None, None),
+    (None, -0.70000001, None, "min"),
+    (REAL32, -0.70000001, None, "min"),
+    (REAL32, -0.69999998, None, None),
+    (None, 0.6, 0.1, None),
+    (None, 0.6, 0.0, "max_step"),
+    (None, 0.7, 0.0, "max"),
+    (None, -0.8, 0.0, "min"),
+]  # the type, the value, the one before, and the limit that is broken
+
+
 def check_coding(module: ModuleType) -> None:
     for data_type, scale, value, data in ENCODED:
         assert _coded(module, lambda: module.Coding(data_type, scale).encode(value)) == data  # noqa: B023
@@ -216,7 +233,13 @@ def check_coding(module: ModuleType) -> None:
     for data_type, scale, limit, expected in NEAREST:
         assert module.Coding(data_type, scale).nearest(limit) == expected
     for before, after, most, too_far in STEPS:
-        assert module.too_far(before, after, most) is too_far
+        limited = SimpleNamespace(min=None, max=None, max_step=most)
+        assert (module.broken_limit(limited, None, after, before) == "max_step") is too_far
+    for kind, reached, was, broken in BROKEN:
+        held = None if kind is None else module.Coding(kind)
+        assert module.broken_limit(LIMITED, held, reached, was) == broken
+    assert module.coding_of("REAL32", 0.1) == module.Coding(REAL32, 0.1)
+    assert module.coding_of("", 1.0) is None
 
 
 def _coded(module: ModuleType, do: Callable[[], Any]) -> Any:
@@ -388,7 +411,6 @@ CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] =
         check_parameter,
         parameters,
         (
-            "_LIMITS",
             "read_only",
             "check_readable",
             "check_writable",
@@ -398,7 +420,7 @@ CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] =
             "contradiction",
         ),
     ),
-    (check_coding, coding, ("scaled", "too_far", "decode", "encode", "nearest", "_finite")),
+    (check_coding, coding, ("scaled", "broken_limit", "coding_of", "decode", "encode", "nearest", "_finite")),
     (check_described, catalogue, ("described", "_scaled_limits")),
     (check_locks, offer, ("_lock", "_axis", "_of_first_axis")),
     (check_states, rules, ("check_value", "check_states", "allowed_states")),

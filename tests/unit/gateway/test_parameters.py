@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import eds
 from drivers.component import Kind
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
-from gateway.config import ParameterSettings
+from gateway.config.robot import ParameterSettings
 from gateway.modules.control import unanswered
 from gateway.modules.control.catalogue import described
 from gateway.modules.control.parameters import Parameter

@@ -18,7 +18,7 @@ from gateway.modules.resource.counters import Counters, ProcessTimes
 from gateway.modules.resource.host import Meter
 from gateway.modules.resource.portable import Portable
 from gateway.modules.resource.procfs import SELECTABLE, Procfs
-from gateway.wire.messages import ResourceSnapshotParams
+from gateway.wire.resource import ResourceSnapshotParams
 from tests.unit.gateway.harness import Client, until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="procfs is Linux's")
@@ -373,7 +373,7 @@ def test_without_clients_nothing_is_kept(connect: Callable[[], Client]) -> None:
 
 def test_a_snapshot_needs_no_psutil() -> None:
     code = (
-        "import sys; from gateway.wire.messages import ResourceSnapshotParams as P; "
+        "import sys; from gateway.wire.resource import ResourceSnapshotParams as P; "
         "from gateway.modules.resource.host import Host; host = Host(); "
         "host.meter().snapshot(P(include=['cmdline'])); host.close(); print('psutil' in sys.modules)"
     )

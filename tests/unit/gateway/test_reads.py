@@ -8,7 +8,7 @@ import pytest
 
 from gateway.modules.control import reads
 from gateway.modules.control.reads import DEVICES, OBJECTS, Reads
-from gateway.wire.messages import ParameterValue
+from gateway.wire.parameter import ParameterValue
 
 DEVICE_NAMES = ("left_hip", "left_knee", "right_hip", "right_knee")
 

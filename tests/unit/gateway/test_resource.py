@@ -19,7 +19,7 @@ from gateway.modules.resource.module import ResourceModule
 from gateway.modules.resource.redact import redact
 from gateway.process.loop import Loop
 from gateway.registry import Context
-from gateway.wire.messages import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
+from gateway.wire.resource import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config
 
 MB = 1 << 20

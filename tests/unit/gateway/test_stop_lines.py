@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import UNSET
 
-from gateway.connections.limits import LINE_LIMIT, REASON_LENGTH
 from gateway.connections.stop_lines import StopSplitter, stop_in
 from gateway.wire import framing
+from gateway.wire.limits import LINE_LIMIT, REASON_LENGTH
 
 PLAIN = b'{"jsonrpc":"2.0","id":1,"method":"robot.stop","params":{"reason":"fall"}}'
 LONG = b"x" * LINE_LIMIT

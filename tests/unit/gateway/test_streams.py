@@ -11,15 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.component import Kind
-from gateway.connections import limits
 from gateway.connections.session import Session
 from gateway.modules.component.module import ComponentSource
 from gateway.process.loop import Loop
-from gateway.streaming import streams
+from gateway.streaming import feeds
 from gateway.streaming.budget import Budget
+from gateway.streaming.feeds import Feed, SampleFeed, TickFeed, values_a_second
 from gateway.streaming.outlets import Batch, Outlet, encode_batch
 from gateway.streaming.sources import merge, narrow, whole
-from gateway.streaming.streams import SampleFeed, Streams, TickFeed, values_a_second
+from gateway.streaming.streams import Streams
+from gateway.wire import limits
 from gateway.wire.framing import RpcError
 from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
 
@@ -70,7 +71,7 @@ def tick_feed(component: FakeComponent, rate_hz: float) -> tuple[TickFeed, Outle
     return feed, one, feed._next_ns
 
 
-def finish(feed: streams.Feed) -> None:
+def finish(feed: Feed) -> None:
     feed.close()
     feed._loop.close()
 
@@ -174,7 +175,7 @@ def test_own_samples_show_only_the_channels_asked_for() -> None:
 
 
 def test_a_source_that_outruns_the_loop_loses_and_it_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streams, "TAP_SAMPLES", 3)
+    monkeypatch.setattr(feeds, "TAP_SAMPLES", 3)
     component = knee()
     feed = SampleFeed(Loop(), [whole(ComponentSource(component))])
     one = outlet()
@@ -288,7 +289,7 @@ class TestCost:
 def test_a_feed_that_is_late_catches_up_in_several_turns_and_loses_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(streams, "TURN_VALUES", 30)
+    monkeypatch.setattr(feeds, "TURN_VALUES", 30)
     component = knee()
     feed, one, began_ns = tick_feed(component, 1000)
     for at in range(50):

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.wire import framing, messages
+from gateway.wire import framing
+from gateway.wire.methods import METHODS
 
 
 def split(data: bytes, at: list[int], limit: int = 16) -> list[framing.Line]:
@@ -105,7 +106,7 @@ def test_no_line_raises_anything_but_bad_line(line: bytes) -> None:
 )
 def test_wrong_parameters_name_the_field_and_what_is_allowed(method: str, params: bytes, says: str) -> None:
     with pytest.raises(framing.RpcError) as caught:
-        framing.decode_params(msgspec.Raw(params), messages.METHODS[method].params)
+        framing.decode_params(msgspec.Raw(params), METHODS[method].params)
     assert (caught.value.code, caught.value.kind) == (framing.INVALID_PARAMS, framing.Kind.BAD_PARAMS)
     assert says in str(caught.value)
 
@@ -113,7 +114,7 @@ def test_wrong_parameters_name_the_field_and_what_is_allowed(method: str, params
 @pytest.mark.parametrize("params", [b"", b"null", b'{"reason":7}', b'{"why":"fire"}'])
 def test_a_stop_is_never_refused_for_its_form(params: bytes) -> None:
     raw = msgspec.Raw(params) if params else msgspec.UNSET
-    framing.decode_params(raw, messages.METHODS["robot.stop"].params)
+    framing.decode_params(raw, METHODS["robot.stop"].params)
 
 
 @given(st.one_of(st.none(), st.integers(), st.text()), st.floats())

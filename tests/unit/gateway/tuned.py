@@ -23,7 +23,7 @@ from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoFile
 from gateway.registry import Context
 from gateway.wire.framing import RpcError
-from gateway.wire.messages import TrialInfo
+from gateway.wire.parameter import TrialInfo
 from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Bench, FakeNode, config
 
 LONG_S = 100.0  # a trial that does not end by itself in a test

@@ -14,8 +14,8 @@ from drivers.bus.settings import CanSettings
 from drivers.component import Component, Kind
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
-from gateway.guard.rules import Rule
-from gateway.guard.settings import WATCHES
+from gateway.config.guard import WATCHES
+from gateway.config.guard_rules import Rule
 from gateway.guard.watcher import Change, Watcher
 from gateway.guard.watcher import State as Found
 from gateway.guard.wiring import Wiring

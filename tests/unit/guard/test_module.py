@@ -10,9 +10,9 @@ import msgspec
 import pytest
 
 from drivers.component import Kind
+from gateway.config.guard import GuardSettings
+from gateway.config.guard_rules import DriftRule, RangeRule, Rule
 from gateway.guard.module import GuardModule
-from gateway.guard.rules import DriftRule, RangeRule, Rule
-from gateway.guard.settings import GuardSettings
 from gateway.modules.component.assembly import Robot
 from tests.unit.guard.bench import Bench
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.guard.settings import WATCHES
+from gateway.config.guard import WATCHES
 from gateway.guard.table import table
 
 MANUAL = (Path(__file__).parents[3] / "docs" / "reference" / "guard.md").read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from drivers.bus.emcy import Emcy
+from gateway.config.guard_rules import Blind, EmcyRule, LevelRule, SilenceRule
 from gateway.guard.inputs import (
     AGAIN_NS,
     EmcyWatcher,
@@ -17,7 +18,6 @@ from gateway.guard.inputs import (
     UnseenWatcher,
 )
 from gateway.guard.judging import Beside, judging
-from gateway.guard.rules import Blind, EmcyRule, LevelRule, SilenceRule
 from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
 
 WATCHING, CLEARED, BLIND, TRIPPED = State.WATCHING, State.CLEARED, State.BLIND, State.TRIPPED

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from drivers.component import Kind
-from gateway.guard.settings import WATCHES
+from gateway.config.guard import WATCHES
 from gateway.guard.watcher import State as Found
 from tests.unit.guard.bench import JOINT, Bench, Part
 

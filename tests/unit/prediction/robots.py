@@ -13,7 +13,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from gateway.client import Batch, ClockOffset
-from gateway.wire.messages import ChannelInfo
+from gateway.wire.component import ChannelInfo
 from ml.registry.card import Card, Source
 from ml.registry.code import features_hash, versions
 from ml.registry.registry import Registry

@@ -1,7 +1,9 @@
 """The three modules behind one `apply`."""
 
 from gateway.client import Batch, ConnectionState
-from gateway.wire.messages import Clock, Description, GuardInfo, Snapshot, StopInfo
+from gateway.wire.component import Snapshot
+from gateway.wire.robot import Clock, Description, GuardInfo
+from gateway.wire.stop import StopInfo
 from server_gui.core.follow.events import Described, Failed, LinkChanged, Looked, Resources, Telemetry
 from server_gui.core.processing.communication import Health
 from server_gui.core.processing.gait_events import Leg, Source

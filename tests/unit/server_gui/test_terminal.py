@@ -11,20 +11,10 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from gateway.client import Batch, ConnectionState, LinkLost
-from gateway.wire.messages import (
-    Clock,
-    ComponentInfo,
-    Description,
-    GuardInfo,
-    ParameterInfo,
-    ParameterValue,
-    ParameterValues,
-    QualityInfo,
-    Snapshot,
-    StopInfo,
-    Stopped,
-    Written,
-)
+from gateway.wire.component import ComponentInfo, QualityInfo, Snapshot
+from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Written
+from gateway.wire.robot import Clock, Description, GuardInfo
+from gateway.wire.stop import StopInfo, Stopped
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, LinkChanged, Looked, Telemetry
 from server_gui.core.follow.news import News

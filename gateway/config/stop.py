@@ -1,15 +1,11 @@
 """What an integrator says about the stop: `[stop]` of the robot's file."""
 
-from collections.abc import Iterator
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from gateway.object_names import ObjectName, address_of
-
-if TYPE_CHECKING:
-    from gateway.config import RobotConfig
+from gateway.config.objects import ObjectName, address_of
 
 
 class Fallback(StrEnum):
@@ -53,17 +49,3 @@ class StopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     timeout_s: Annotated[float, Meta(gt=0, le=4)] = 2.5
     fallback: tuple[Fallback, ...] = ()
     controller: tuple[ControllerStop, ...] = ()
-
-
-def complaints(config: "RobotConfig", stop: StopSettings) -> Iterator[str]:
-    """Everything that is wrong with the table in this robot's file."""
-    if list(stop.fallback) != [one for one in Fallback if one in stop.fallback]:
-        order = ", ".join(f'"{one}"' for one in Fallback)
-        yield f"[stop] fallback: each once, NMT stop last because it silences the drive: {order}"
-    for number, controller in enumerate(stop.controller, 1):
-        where = f"[[stop.controller]] number {number}"
-        if controller.component not in config.device:
-            known = ", ".join(config.device) or "none"
-            yield f"{where} component: there is no [device.{controller.component}]; here are {known}"
-        if controller.address[1] > 0xFF:
-            yield f"{where} object: the subindex goes from 0 to 255"

@@ -1,10 +1,15 @@
-"""How the robot's file names an object of a CANopen device: "0x6072:0", index and subindex."""
+"""Objects of CANopen devices in the robot's file: how they are named, and those that are no parameters."""
 
 from typing import Annotated
 
 from msgspec import Meta
 
+# As "0x6072:0", index and subindex.
 ObjectName = Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$")]
+
+CONTROLWORD = 0x6040
+AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)
+STORE, RESTORE = 0x1010, 0x1011
 
 
 def address_of(name: str) -> tuple[int, int]:

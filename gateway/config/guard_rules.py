@@ -1,4 +1,4 @@
-"""What a rule may say: every kind of rule with its keys, in SI units, and when it trips in words."""
+"""What a rule of the guard may say: each kind with its keys, in SI units, and when it trips in words."""
 
 from collections.abc import Mapping
 from enum import StrEnum

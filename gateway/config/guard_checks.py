@@ -4,10 +4,10 @@ import fnmatch
 import math
 from collections.abc import Iterator
 from functools import singledispatch
-from typing import TYPE_CHECKING
 
 from drivers.bus.settings import Role
-from gateway.guard.rules import (
+from gateway.config.guard import ALARMS, TABLES, WATCHES, GuardSettings
+from gateway.config.guard_rules import (
     SIDED,
     EmcyRule,
     InputRule,
@@ -18,15 +18,10 @@ from gateway.guard.rules import (
     bit_words,
     mask,
 )
-from gateway.guard.settings import TABLES, WATCHES, GuardSettings
-
-if TYPE_CHECKING:
-    from gateway.config import RobotConfig
-
-ALARMS = "alarms"  # the channel that counts them; no rule is called so
+from gateway.config.robot import RobotConfig
 
 
-def complaints(config: "RobotConfig", guard: GuardSettings) -> Iterator[str]:
+def complaints(config: RobotConfig, guard: GuardSettings) -> Iterator[str]:
     """Everything that is wrong with a guard's table in this robot's file."""
     if guard.heartbeat_ms is None and not guard.rule:
         yield "[guard] has neither heartbeat_ms nor a [guard.rule.NAME]: it would watch nothing"
@@ -41,7 +36,7 @@ def complaints(config: "RobotConfig", guard: GuardSettings) -> Iterator[str]:
         yield from _about_components(config, where, rule)
 
 
-def _about_heartbeat(config: "RobotConfig") -> Iterator[str]:
+def _about_heartbeat(config: RobotConfig) -> Iterator[str]:
     if not config.joint:
         yield "[guard] heartbeat_ms: there is no joint whose drive could be armed"
     for name in dict.fromkeys(joint.bus for joint in config.joint.values()):
@@ -69,13 +64,13 @@ def _about_numbers(where: str, rule: Rule) -> Iterator[str]:
 
 
 @singledispatch
-def _about(_rule: Rule, _where: str, _config: "RobotConfig") -> Iterator[str]:
+def _about(_rule: Rule, _where: str, _config: RobotConfig) -> Iterator[str]:
     """What is wrong with the keys of this kind of rule."""
     yield from ()
 
 
 @_about.register(RangeRule)
-def _range(rule: RangeRule, where: str, _config: "RobotConfig") -> Iterator[str]:
+def _range(rule: RangeRule, where: str, _config: RobotConfig) -> Iterator[str]:
     if rule.min is None and rule.max is None:
         yield f"{where} lacks min, max or both: it could never trip"
     elif rule.min is not None and rule.max is not None and rule.max - rule.min <= 2 * rule.hysteresis:
@@ -86,14 +81,14 @@ def _range(rule: RangeRule, where: str, _config: "RobotConfig") -> Iterator[str]
 
 
 @_about.register(EmcyRule)
-def _emcy(rule: EmcyRule, where: str, _config: "RobotConfig") -> Iterator[str]:
+def _emcy(rule: EmcyRule, where: str, _config: RobotConfig) -> Iterator[str]:
     for code in rule.codes or ():
         if code.startswith("0x0"):
             yield f"{where} codes: {code} says that an error is over; name errors, 0x1 to 0xFFFF"
 
 
 @_about.register(InputRule)
-def _input(rule: InputRule, where: str, _config: "RobotConfig") -> Iterator[str]:
+def _input(rule: InputRule, where: str, _config: RobotConfig) -> Iterator[str]:
     if not mask(rule.must_be_set) | mask(rule.must_be_clear):
         yield f"{where} lacks must_be_set, must_be_clear or both, with a bit: it could never trip"
     both = mask(rule.must_be_set) & mask(rule.must_be_clear)
@@ -102,7 +97,7 @@ def _input(rule: InputRule, where: str, _config: "RobotConfig") -> Iterator[str]
 
 
 @_about.register(SyncRule)
-def _sync(rule: SyncRule, where: str, config: "RobotConfig") -> Iterator[str]:
+def _sync(rule: SyncRule, where: str, config: RobotConfig) -> Iterator[str]:
     ours = config.gateway.role is Role.MASTER
     for name, bus in config.can.items():
         if ours and bus.sync_period_s and any(fnmatch.fnmatchcase(name, glob) for glob in rule.on or "*"):
@@ -110,7 +105,7 @@ def _sync(rule: SyncRule, where: str, config: "RobotConfig") -> Iterator[str]:
 
 
 @_about.register(SymmetryRule)
-def _symmetry(rule: SymmetryRule, where: str, config: "RobotConfig") -> Iterator[str]:
+def _symmetry(rule: SymmetryRule, where: str, config: RobotConfig) -> Iterator[str]:
     if rule.on is not None:
         yield f"{where} on: {rule.watch} watches its left and right; remove on"
     if rule.left == rule.right:
@@ -123,7 +118,7 @@ def _symmetry(rule: SymmetryRule, where: str, config: "RobotConfig") -> Iterator
             yield f"{where} {key}: {name!r} is no {kind}, which has a {rule.quantity}; here are {here}"
 
 
-def _about_components(config: "RobotConfig", where: str, rule: Rule) -> Iterator[str]:
+def _about_components(config: RobotConfig, where: str, rule: Rule) -> Iterator[str]:
     kinds = WATCHES[rule.watch].kinds
     known = [name for kind in kinds for name in getattr(config, TABLES[kind])]
     what = " or ".join(kinds)

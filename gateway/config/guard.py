@@ -10,7 +10,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from drivers.component import Kind
-from gateway.guard.rules import (
+from gateway.config.guard_rules import (
     BusRule,
     DriftRule,
     EmcyRule,
@@ -26,6 +26,7 @@ from gateway.guard.rules import (
     SyncRule,
 )
 
+ALARMS = "alarms"  # the channel that counts them; no rule is called so
 BUS = "bus"  # what a rule can watch beside components
 TABLES: Mapping[str, str] = {**{kind: kind.value for kind in Kind}, BUS: "can"}  # of the robot's file
 

@@ -4,13 +4,10 @@ Else one node's answer would confirm what was asked of another one.
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from drivers.bus.settings import NodeTimes
 from drivers.imu.settings import CanImuSettings
-
-if TYPE_CHECKING:
-    from gateway.config import OnBus, RobotConfig
+from gateway.config.robot import OnBus, RobotConfig
 
 REQUEST, RESPONSE = 0x600, 0x580  # of a node's default channel, plus its node id
 # Identifiers that no configurable object may have (CiA 301 §7.3.5), and those whose meaning is fixed.
@@ -35,7 +32,7 @@ _PDOS = {
 _REMEDY = "take one that nobody uses on that bus, such as one from 0x680 to 0x6DF, and set it in the device"
 
 
-def complaints(config: "RobotConfig") -> Iterator[str]:
+def complaints(config: RobotConfig) -> Iterator[str]:
     """Everything that is wrong with a channel, by table and key."""
     for bus in config.can:
         yield from _Bus(config, bus).complaints()
@@ -44,7 +41,7 @@ def complaints(config: "RobotConfig") -> Iterator[str]:
 class _Bus:
     """The tables of one bus by their headers."""
 
-    def __init__(self, config: "RobotConfig", name: str) -> None:
+    def __init__(self, config: RobotConfig, name: str) -> None:
         self._tables: dict[str, OnBus] = {where: one for where, one in config.on_buses() if one.bus == name}
         self._nodes = {
             one.node_id: where for where, one in self._tables.items() if not isinstance(one, CanImuSettings)

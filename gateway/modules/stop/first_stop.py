@@ -8,7 +8,7 @@ import logging
 import threading
 import time
 
-from gateway.config import RobotConfig
+from gateway.config.robot import RobotConfig
 
 log = logging.getLogger(__name__)
 

@@ -1,0 +1,157 @@
+"""The robot's file as frozen structs, a table each."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from drivers.bus.settings import CanSettings, DeviceSettings, Role
+from drivers.component import Kind
+from drivers.imu.settings import CanImuSettings, MountedSettings, NodeImuSettings
+from drivers.insole.settings import InsoleSettings
+from drivers.joint.settings import JointSettings
+from gateway.config.objects import ObjectName, address_of
+from gateway.config.stop import StopSettings
+from gateway.records.folder import default_folder
+
+if TYPE_CHECKING:
+    from gateway.config.guard import GuardSettings
+
+Node = tuple[str, int]  # a bus by its name, and a node id there
+OnBus = JointSettings | DeviceSettings | CanImuSettings | NodeImuSettings
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+COMPONENT_TABLES = tuple(Kind)  # each kind by its name
+
+
+class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[robot]`."""
+
+    name: Annotated[str, Meta(min_length=1)]
+
+
+class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client.
+
+    `records` is the folder of journal, held stop and pending reverts, relative to the robot's file.
+    `classic_port` serves the process list as the paper's daemon does, for comparison.
+    Beyond `max_cpu_percent` of a core, streams send fewer rows. For a client that is slow, `buffer_kb` of its
+    streams wait; one that takes nothing for `stuck_s` is dropped.
+    """
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Meta(ge=0, le=65535)] = 7420
+    role: Role = Role.OBSERVER
+    linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
+    records: str | None = None
+    classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None
+    max_cpu_percent: Annotated[float, Meta(gt=0)] | None = None
+    buffer_kb: Annotated[int, Meta(ge=64, le=65_536)] = 1024
+    stuck_s: Annotated[float, Meta(gt=0, le=3600)] = 30.0
+
+
+class ControlLoopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[control_loop]`: the robot's own control program, on this computer.
+
+    `processes` are names, or globs of them, as `ps` shows them, or of the programs that they run. Where `bus`
+    is given, it puts a frame with `can_id` there each `period_ms`; one that comes more than `late_ms` after
+    its time (half a period) is an overrun.
+    """
+
+    processes: Annotated[tuple[str, ...], Meta(min_length=1)]
+    bus: str | None = None
+    can_id: Annotated[int, Meta(ge=0, le=0x1FFF_FFFF)] = 0x080
+    period_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None
+    late_ms: Annotated[float, Meta(gt=0)] | None = None
+
+    @property
+    def tolerance_ms(self) -> float:
+        """After a frame's time."""
+        return (self.period_ms or 0.0) / 2 if self.late_ms is None else self.late_ms
+
+
+class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[joint.NAME]`: a joint, and what its EDS offers as parameters."""
+
+    parameters: Literal["eds"] | None = None  # every writable number of the EDS, to be read
+    release: tuple[str, ...] = ()  # names or globs of those that may be changed too
+
+
+class DeviceTable(DeviceSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[device.NAME]`: another device, and what its EDS offers as parameters."""
+
+    parameters: Literal["eds"] | None = None
+    release: tuple[str, ...] = ()
+
+
+class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """`[parameter."component.name"]`: one object of a CANopen device that may be changed, and how far.
+
+    value = device's number · scale, in `unit`. `max_step` limits one change. `live` allows changes while a
+    drive is enabled. `states` are the CiA 402 states that allow a change.
+    """
+
+    object: ObjectName
+    unit: str = ""
+    scale: float = 1.0
+    min: float | None = None
+    max: float | None = None
+    max_step: Annotated[float, Meta(gt=0)] | None = None
+    live: bool = False
+    states: tuple[str, ...] | None = None
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Index and subindex."""
+        return address_of(self.object)
+
+
+class RobotConfig(Struct, frozen=True, kw_only=True):
+    """A robot as its file describes it; each dictionary is by the components' names."""
+
+    path: Path
+    robot: RobotSettings
+    gateway: GatewaySettings = GatewaySettings()
+    can: dict[str, CanSettings] = {}
+    joint: dict[str, JointTable] = {}
+    device: dict[str, DeviceTable] = {}
+    insole: dict[str, InsoleSettings] = {}
+    imu: dict[str, MountedSettings] = {}
+    parameter: dict[str, ParameterSettings] = {}
+    stop: StopSettings = StopSettings()
+    guard: "GuardSettings | None" = None
+    control_loop: ControlLoopSettings | None = None
+
+    def node_of(self, component: str) -> Node:
+        """Where a joint or device is: bus and node id."""
+        table = self.joint[component] if component in self.joint else self.device[component]
+        return table.bus, table.node_id
+
+    def sharing(self, component: str) -> tuple[str, ...]:
+        """The joints and devices on one's node, itself among them: the axes of one drive."""
+        node = self.node_of(component)
+        return tuple(name for name in (*self.joint, *self.device) if self.node_of(name) == node)
+
+    def drives_of(self, component: str) -> tuple[str, ...]:
+        """The joints that its parameters may move: those on its node; where it has none, every joint."""
+        return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
+
+    def on_buses(self) -> Iterator[tuple[str, OnBus]]:
+        """Every table of something on a CAN bus, with its header."""
+        for table in COMPONENT_TABLES:
+            for name, settings in getattr(self, table).items():
+                if isinstance(settings, OnBus):
+                    yield f"[{table}.{name}]", settings
+
+    @property
+    def records(self) -> Path:
+        """The folder of this robot's records."""
+        given = self.gateway.records
+        return default_folder(self.robot.name) if given is None else self.path.parent / given
+
+
+def header(table: str, name: str) -> str:
+    """As the file writes it."""
+    return f'[{table}."{name}"]' if "." in name else f"[{table}.{name}]"

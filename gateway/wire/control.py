@@ -1,0 +1,52 @@
+"""Lease and journal: who may change something on the robot, and who did."""
+
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+
+from gateway.wire.method import Done, Method, Params, Seconds
+
+
+class AcquireParams(Params, frozen=True):
+    """`control.acquire`."""
+
+    ttl_s: Seconds
+
+
+class ReleaseParams(Params, frozen=True):
+    """`control.release`; a lease belongs to its connection, naming it is a check."""
+
+    lease: str | None = None
+
+
+class Lease(Struct, frozen=True):
+    """Result of `control.acquire`."""
+
+    lease: str
+    expires_s: float
+
+
+class TailParams(Params, frozen=True):
+    """`journal.tail`."""
+
+    n: Annotated[int, Meta(ge=1, le=1000)] = 20
+
+
+class JournalEntries(Struct, frozen=True):
+    """Result of `journal.tail`: the newest entries, oldest first; `cut` says why there are not more."""
+
+    entries: list[dict[str, Any]]
+    cut: str | None = None
+
+
+class RecordsInfo(Struct, frozen=True):
+    """Where the journal is kept, and why it cannot be written."""
+
+    folder: str
+    problem: str | None = None
+
+
+CONTROL_ACQUIRE = Method("control.acquire", AcquireParams, Lease, module="control")
+CONTROL_RELEASE = Method("control.release", ReleaseParams, Done, module="control", needs_lease=True)
+JOURNAL_TAIL = Method("journal.tail", TailParams, JournalEntries, module="control")
+METHODS = (CONTROL_ACQUIRE, CONTROL_RELEASE, JOURNAL_TAIL)

@@ -1,0 +1,66 @@
+"""What monitoring costs the robot."""
+
+from msgspec import Struct
+
+from gateway.wire.method import Method, Params
+
+
+class BudgetInfo(Struct, frozen=True):
+    """What the gateway may use of a core; beyond it, its streams send one row of `shed`."""
+
+    max_cpu_percent: float
+    shed: int
+
+
+class StreamCost(Struct, frozen=True):
+    """One stream of a client; `rate_hz` 0 is every source's own samples."""
+
+    stream: int
+    rate_hz: float
+    channels: int
+    rows_per_s: float | None
+    dropped: int  # since it began
+    shed: int  # it sends one row of so many
+
+
+class ClientCost(Struct, frozen=True):
+    """What one client causes; `cpu_percent` is of one core, and of what clients share it has its part."""
+
+    who: str
+    cpu_percent: float | None
+    requests_per_s: float | None
+    sent_bytes_per_s: float | None
+    received_bytes_per_s: float | None
+    waiting_bytes: int  # for a client that is slow
+    streams: list[StreamCost]
+
+
+class BusCost(Struct, frozen=True):
+    """What the gateway does on one bus; each SDO request that it sends is answered by a frame as long.
+
+    `load_percent` is what its frames and their answers take of the bus, without stuff bits; `None` where the
+    bitrate is not known. What it only receives is there without it.
+    """
+
+    sent_frames_per_s: float | None
+    sent_bytes_per_s: float | None
+    received_frames_per_s: float | None
+    load_percent: float | None
+
+
+class GatewayCost(Struct, frozen=True):
+    """Result of `gateway.cost`; rates are since this connection's last request, `None` in the first."""
+
+    stamp_ns: int
+    cpu_percent: float | None  # of one core, all threads
+    rss_bytes: int
+    threads: int
+    wake_ups_per_s: float | None  # context switches of all threads
+    modules: dict[str, str]  # module → off, starting, running, stopping
+    buses: dict[str, BusCost]
+    clients: list[ClientCost]
+    budget: BudgetInfo | None = None
+
+
+GATEWAY_COST = Method("gateway.cost", Params, GatewayCost)
+METHODS = (GATEWAY_COST,)

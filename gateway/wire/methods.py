@@ -1,0 +1,13 @@
+"""Every method of the wire by its name; the names are a contract."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from gateway.wire import component, control, cost, parameter, resource, robot, stop, stream
+from gateway.wire.method import AnyMethod
+
+METHODS: Final[Mapping[str, AnyMethod]] = {
+    method.name: method
+    for group in (robot, cost, resource, component, stream, control, parameter, stop)
+    for method in group.METHODS
+}
