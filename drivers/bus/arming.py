@@ -12,7 +12,7 @@ from functools import partial
 from drivers.bus.heartbeat import Heartbeat
 from drivers.bus.life import HEARTBEATS_MISSED
 from drivers.bus.node import Node
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError, Mismatch
 

@@ -12,10 +12,10 @@ import threading
 import time
 from collections.abc import Callable
 
-from drivers.bus.bus_state import BusState, bus_state
 from drivers.bus.frames import ERROR, FrameHandler, Transport
+from drivers.bus.interfaces.controller_state import BusState, bus_state
+from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
-from drivers.bus.opening import open_transport
 from drivers.bus.sender import Sender, always
 from drivers.bus.settings import CanSettings, Role
 from drivers.bus.switching import FastSwitching

@@ -2,7 +2,7 @@
 
 from drivers.bus.bus import CanBus
 from drivers.bus.node import shared_node
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
 from drivers.component import Kind
 from drivers.latest import Latest

@@ -16,8 +16,8 @@ from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
-from drivers.bus.sdo_channel import Interrupted, SdoChannel
-from drivers.bus.sdo_worker import SdoWorker
+from drivers.bus.sdo.channel import Interrupted, SdoChannel
+from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
 from drivers.bus.stuck import why_silent
 from drivers.bus.values import size_of, unsigned

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError
 from eds import Description

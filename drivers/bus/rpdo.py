@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from drivers.bus.frames import EXTENDED
 from drivers.bus.pdo import EXTENDED_ID, NOT_VALID, MappedObject, read_mapping
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort
 from eds import Description

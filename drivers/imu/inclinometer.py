@@ -10,7 +10,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.frames import EXTENDED, FrameHandler
 from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import SettingsError
 from drivers.imu import slopes
 from drivers.imu.canopen.cia410 import InclinometerSettings

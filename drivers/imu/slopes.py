@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from drivers.bus.pdo import MappedObject, Tpdo, read_tpdos
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError
 from drivers.imu.frame import ImuFrame

@@ -1,6 +1,6 @@
 """One axis of a drive, asked by SDO within a job of its node's worker."""
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import CONTROLWORD, STATUSWORD, Controlword

@@ -15,7 +15,7 @@ from drivers.bus.emcy import error_text
 from drivers.bus.frames import EXTENDED, FrameHandler
 from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.component import Kind
 from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from drivers.bus.sdo_channel import Interrupted
+from drivers.bus.sdo.channel import Interrupted
 from drivers.errors import DeviceTimeout, DriverError, Unavailable
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection
 from concurrent.futures import Future
 
 from drivers.bus.node import Node
-from drivers.bus.sdo import expedited
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
+from drivers.bus.sdo.protocol import expedited
 from drivers.bus.sender import always
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState

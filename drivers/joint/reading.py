@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivers.bus.pdo import Tpdo, read_tpdos
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import decode
 from drivers.errors import DeviceAbort
 from drivers.joint.quantities import AXIS_OFFSET

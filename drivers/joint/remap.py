@@ -7,7 +7,7 @@ back; nothing is stored in the device, and a device that refuses is left with th
 from collections.abc import Collection
 
 from drivers.bus.pdo import TPDO_MAPPING, TPDO_PARAMETER, Tpdo, read_tpdo
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import DeviceAbort, Mismatch
 from eds import Description
 

@@ -5,7 +5,7 @@ In the cyclic modes the drive adds offsets to it, or feeds them forward; they ar
 
 from collections.abc import Mapping
 
-from drivers.bus.aborts import NO_OBJECT
+from drivers.bus.sdo.aborts import NO_OBJECT
 from drivers.errors import DeviceAbort, DriverError, Mismatch
 from drivers.joint.axis import POSITION_ACTUAL, Axis
 from drivers.joint.cia402 import MODES, option_text

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from drivers.bus.nmt import NmtState
 from drivers.bus.node import Node
 from drivers.bus.rpdo import Rpdo, find_rpdo, read_values
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import Role
 from drivers.errors import DeviceAbort
 from drivers.joint.commands import CONTROLWORD, Controlword

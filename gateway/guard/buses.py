@@ -3,7 +3,7 @@
 import time
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.bus_state import BusState
+from drivers.bus.interfaces.controller_state import BusState
 from gateway.config.guard_rules import BusRule, SyncRule
 from gateway.guard.inputs import AGAIN_NS, Changed, Pulse, SilenceWatcher
 from gateway.guard.watcher import GRACE_NS, Watcher

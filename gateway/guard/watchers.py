@@ -37,7 +37,7 @@ from gateway.guard.watcher import Watcher
 if TYPE_CHECKING:
     from drivers.bus.device import CanDevice
     from drivers.bus.node import Node
-    from drivers.bus.sdo_channel import SdoChannel
+    from drivers.bus.sdo.channel import SdoChannel
     from drivers.insole.device import Insole
     from drivers.joint.drive import JointDrive
     from gateway.modules.component.assembly import Robot

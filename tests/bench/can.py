@@ -23,8 +23,8 @@ import canopen
 import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.frames import Transport
+from drivers.bus.interfaces.socketcan import SocketCanTransport
 from drivers.bus.settings import CanSettings
-from drivers.bus.socketcan import SocketCanTransport
 from drivers.joint.drive import JointDrive
 from drivers.joint.settings import JointSettings
 from tests.bench._drives import DRIVES, Drives, objects

@@ -21,7 +21,7 @@ from typing import Any
 import drivers
 import eds
 import gateway
-from drivers.bus import opening
+from drivers.bus.interfaces import opening
 from tests.explore.disk import Locking
 from tests.explore.runtime import Runtime
 from tests.explore.system import Poller, System

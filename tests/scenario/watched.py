@@ -17,9 +17,9 @@ from typing import Any, cast
 import pytest
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.bus_state import bus_state
 from drivers.bus.frames import ERROR
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.interfaces.controller_state import bus_state
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.config import RobotConfig, load
 from gateway.config.guard_rules import Rule

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from drivers.bus.netlink import read_link
+from drivers.bus.interfaces.netlink import read_link
 
 NAME = "vcan0"
 _SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 1

@@ -14,7 +14,7 @@ import pytest
 
 import eds
 from drivers.bus.bus import CanBus
-from drivers.bus.netlink import read_link
+from drivers.bus.interfaces.netlink import read_link
 from drivers.bus.settings import CanSettings
 from drivers.joint.drive import JointDrive
 from drivers.joint.settings import JointSettings

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.bus.netlink import read_link
+from drivers.bus.interfaces.netlink import read_link
 
 SCRIPT = Path(__file__).with_name("uml")
 BOOTED = "uml: booted"

@@ -13,11 +13,11 @@ import can
 import pytest
 
 import eds
-from drivers.bus import socketcan
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.bus_state import BusState
 from drivers.bus.frames import EXTENDED
-from drivers.bus.netlink import read_link
+from drivers.bus.interfaces import socketcan
+from drivers.bus.interfaces.controller_state import BusState
+from drivers.bus.interfaces.netlink import read_link
 from drivers.bus.settings import CanSettings
 from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome

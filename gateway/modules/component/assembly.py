@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
-from drivers.bus.opening import needs_python_can
+from drivers.bus.interfaces.opening import needs_python_can
 from drivers.bus.settings import DeviceSettings
 from drivers.component import Component, Kind
 from drivers.errors import DriverError

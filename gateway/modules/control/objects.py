@@ -10,7 +10,7 @@ from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.stop.authority import Address

@@ -6,8 +6,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from drivers.bus.sdo import EXPEDITED, expedited
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
+from drivers.bus.sdo.protocol import EXPEDITED, expedited
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from drivers.joint.quick_stop import FIRST_PATIENCE_S, READ_PERIOD_S, StopOutcome
 from eds import Description

@@ -42,7 +42,7 @@ class FirstStop:
             thread.join()
 
     def _send(self, bus: str) -> None:
-        from drivers.bus.opening import open_transport  # for a cold stop only
+        from drivers.bus.interfaces.opening import open_transport  # for a cold stop only
         from drivers.errors import Unavailable
 
         try:
@@ -58,7 +58,7 @@ class FirstStop:
             log.warning("no quick stop yet on bus %s: %s", bus, error)
 
     def _requests(self, bus: str) -> list[tuple[int, bytes]]:
-        from drivers.bus.sdo import expedited
+        from drivers.bus.sdo.protocol import expedited
         from drivers.joint.commands import CONTROLWORD, Controlword
         from drivers.joint.quantities import AXIS_OFFSET
 

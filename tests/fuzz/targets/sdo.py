@@ -2,9 +2,9 @@
 
 import contextlib
 
-from drivers.bus import sdo
-from drivers.bus.answers import INBOX, Answers, SdoCounters
-from drivers.bus.outstanding import Outstanding
+from drivers.bus.sdo import protocol
+from drivers.bus.sdo.answers import INBOX, Answers, SdoCounters
+from drivers.bus.sdo.outstanding import Outstanding
 
 TOKENS = (
     b"\x43\x41\x60\0",
@@ -14,24 +14,24 @@ TOKENS = (
     b"\x01",
     b"\x11",
 )
-MODULES = ("drivers.bus.sdo", "drivers.bus.outstanding", "drivers.bus.answers")
+MODULES = ("drivers.bus.sdo.protocol", "drivers.bus.sdo.outstanding", "drivers.bus.sdo.answers")
 
 
 def fuzz(data: bytes) -> None:
     responses = [data[at : at + 8] for at in range(0, len(data) - 7, 8)]
-    with contextlib.suppress(sdo.SdoAborted, sdo.SdoProtocolError):
-        _play(sdo.upload(0x6041, 0), responses)
-    with contextlib.suppress(sdo.SdoAborted, sdo.SdoProtocolError):
-        _play(sdo.download(0x6041, 0, bytes(20)), responses)
+    with contextlib.suppress(protocol.SdoAborted, protocol.SdoProtocolError):
+        _play(protocol.upload(0x6041, 0), responses)
+    with contextlib.suppress(protocol.SdoAborted, protocol.SdoProtocolError):
+        _play(protocol.download(0x6041, 0, bytes(20)), responses)
     _assign(responses)
 
 
-def _play(steps: sdo.Upload | sdo.Download, responses: list[bytes]) -> None:
+def _play(steps: protocol.Upload | protocol.Download, responses: list[bytes]) -> None:
     """As the channel does it: what cannot be the answer is not handed over."""
     try:
         request = next(steps)
         for response in responses:
-            if sdo.answers(response, request, sdo.multiplexer(0x6041, 0)):
+            if protocol.answers(response, request, protocol.multiplexer(0x6041, 0)):
                 request = steps.send(response)
                 assert len(request) == 8
     except StopIteration as done:
@@ -42,7 +42,9 @@ def _assign(responses: list[bytes]) -> None:
     """What is asked for by one of these is settled at most once; the rest is counted."""
     counters, outstanding = SdoCounters(), Outstanding()
     answers = Answers(outstanding, counters)
-    asked = [outstanding.add(sdo.multiplexer(0x6041, 0), next(sdo.upload(0x6041, 0))) for _ in range(3)]
+    asked = [
+        outstanding.add(protocol.multiplexer(0x6041, 0), next(protocol.upload(0x6041, 0))) for _ in range(3)
+    ]
     for response in responses:
         answers.put(response)
     answers.fetch_waiting()

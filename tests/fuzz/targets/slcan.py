@@ -4,7 +4,7 @@ import atexit
 from typing import Any
 
 from drivers.bus.frames import EXTENDED, REMOTE
-from drivers.bus.python_can import MAX_PENDING, PythonCanTransport
+from drivers.bus.interfaces.python_can import MAX_PENDING, PythonCanTransport
 from drivers.bus.settings import CanSettings
 
 TOKENS = (
@@ -22,7 +22,7 @@ TOKENS = (
     b"N1234\r",
     b"-",
 )
-MODULES = ("drivers.bus.python_can",)
+MODULES = ("drivers.bus.interfaces.python_can",)
 _transport = PythonCanTransport(
     CanSettings(interface="slcan", channel="loop://", more={"sleep_after_open": 0, "timeout": 0})
 )

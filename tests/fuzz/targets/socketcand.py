@@ -1,7 +1,7 @@
 """What a CAN server sends: messages between brackets, and frames in them."""
 
 from drivers.bus.frames import EXTENDED
-from drivers.bus.socketcand import MAX_PENDING, SocketcandParser, frame_of, send_message
+from drivers.bus.interfaces.socketcand import MAX_PENDING, SocketcandParser, frame_of, send_message
 
 TOKENS = (
     b"< frame ",
@@ -15,7 +15,7 @@ TOKENS = (
     b"< ok >",
     b"-1 ",
 )
-MODULES = ("drivers.bus.socketcand",)
+MODULES = ("drivers.bus.interfaces.socketcand",)
 
 
 def fuzz(data: bytes) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import repeat
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from tests.unit.bus.direct import Direct
 
 CLOCK, VALUE, LONG, ABSENT = 0x2000, 0x2001, 0x2002, 0x2003

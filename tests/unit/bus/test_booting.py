@@ -10,7 +10,7 @@ import pytest
 
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
 from drivers.errors import DeviceTimeout
 from eds import Description

@@ -12,8 +12,8 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.bus_state import BusState, bus_state
 from drivers.bus.frames import ERROR, EXTENDED, wire_id
+from drivers.bus.interfaces.controller_state import BusState, bus_state
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from tests.unit.bus.narrow import NarrowTransport
@@ -234,7 +234,7 @@ def test_a_bus_nobody_holds_is_closed_and_threads_take_turns_as_before() -> None
 def test_an_interface_of_python_can_that_may_block_sends_in_the_buss_own_thread(
     peer: can.BusABC, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
-    monkeypatch.setattr("drivers.bus.python_can._NEVER_BLOCKS", ())
+    monkeypatch.setattr("drivers.bus.interfaces.python_can._NEVER_BLOCKS", ())
     senders: list[str] = []
     send = VirtualBus.send
 

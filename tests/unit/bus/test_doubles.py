@@ -2,7 +2,7 @@
 
 import itertools
 
-from drivers.bus.doubles import CLEAN, RECENT, Doubles
+from drivers.bus.sdo.doubles import CLEAN, RECENT, Doubles
 
 
 def answer(number: int, specifier: int = 0x43) -> bytes:

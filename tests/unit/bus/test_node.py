@@ -10,7 +10,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.life import EMCY_HISTORY
 from drivers.bus.node import shared_node
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
 from drivers.samples import State

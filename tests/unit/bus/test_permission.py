@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from drivers.bus.sdo_channel import Interrupted, SdoChannel
-from drivers.bus.sdo_worker import SdoWorker
+from drivers.bus.sdo.channel import Interrupted, SdoChannel
+from drivers.bus.sdo.worker import SdoWorker
 from drivers.errors import DeviceTimeout, DriverError, NotPermitted
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import VALUE, LateServer

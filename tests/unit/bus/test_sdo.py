@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.bus import sdo
+from drivers.bus.sdo import protocol
 
 Steps = Generator[bytes, bytes, Any]
 
@@ -36,13 +36,13 @@ def play(steps: Steps, dialogue: Sequence[tuple[str, str]]) -> object:
 )
 def test_expedited_upload(response: str, data: str) -> None:
     dialogue = [("40 64 60 00 00 00 00 00", response)]
-    assert play(sdo.upload(0x6064, 0), dialogue) == bytes.fromhex(data)
+    assert play(protocol.upload(0x6064, 0), dialogue) == bytes.fromhex(data)
 
 
 def test_segmented_upload() -> None:
     assert (
         play(
-            sdo.upload(0x1008, 0),
+            protocol.upload(0x1008, 0),
             [
                 ("40 08 10 00 00 00 00 00", "41 08 10 00 0A 00 00 00"),
                 ("60 00 00 00 00 00 00 00", "00 41 42 43 44 45 46 47"),
@@ -63,7 +63,7 @@ def test_segmented_upload() -> None:
     ],
 )
 def test_expedited_download(data: str, request_hex: str) -> None:
-    steps = sdo.download(0x6040, 0, bytes.fromhex(data))
+    steps = protocol.download(0x6040, 0, bytes.fromhex(data))
     assert play(steps, [(request_hex, "60 40 60 00 00 00 00 00")]) is None
 
 
@@ -73,12 +73,12 @@ def test_segmented_download() -> None:
         ("00 41 42 43 44 45 46 47", "20 00 00 00 00 00 00 00"),
         ("19 48 49 4A 00 00 00 00", "30 00 00 00 00 00 00 00"),
     ]
-    assert play(sdo.download(0x1008, 0, b"ABCDEFGHIJ"), dialogue) is None
+    assert play(protocol.download(0x1008, 0, b"ABCDEFGHIJ"), dialogue) is None
 
 
 def test_an_abort_ends_the_transfer_with_its_code() -> None:
-    steps = sdo.upload(0x6064, 0)
-    with pytest.raises(sdo.SdoAborted) as caught:
+    steps = protocol.upload(0x6064, 0)
+    with pytest.raises(protocol.SdoAborted) as caught:
         play(steps, [("40 64 60 00 00 00 00 00", "80 64 60 00 00 00 02 06")])
     assert caught.value.abort_code == 0x06020000
 
@@ -120,8 +120,8 @@ def frame(text: str) -> bytes:
     ],
 )
 def test_which_response_can_be_the_one_to_a_request(request_hex: str, response: str, belongs: bool) -> None:
-    about = sdo.multiplexer(0x6064, 0)
-    assert sdo.answers(frame(response), frame(request_hex), about) is belongs
+    about = protocol.multiplexer(0x6064, 0)
+    assert protocol.answers(frame(response), frame(request_hex), about) is belongs
 
 
 def test_a_device_that_sends_less_than_it_announced_is_not_believed() -> None:
@@ -129,29 +129,29 @@ def test_a_device_that_sends_less_than_it_announced_is_not_believed() -> None:
         ("40 08 10 00 00 00 00 00", "41 08 10 00 0A 00 00 00"),
         ("60 00 00 00 00 00 00 00", "01 41 42 43 44 45 46 47"),
     ]
-    with pytest.raises(sdo.SdoProtocolError, match="announced 10 bytes and sent 7"):
-        play(sdo.upload(0x1008, 0), dialogue)
+    with pytest.raises(protocol.SdoProtocolError, match="announced 10 bytes and sent 7"):
+        play(protocol.upload(0x1008, 0), dialogue)
 
 
 def test_an_upload_without_end_is_bounded() -> None:
-    steps = sdo.upload(0x1008, 0)
+    steps = protocol.upload(0x1008, 0)
     next(steps)
-    with pytest.raises(sdo.SdoProtocolError, match="announces"):
+    with pytest.raises(protocol.SdoProtocolError, match="announces"):
         steps.send(bytes.fromhex("41 08 10 00 FF FF FF FF"))
 
 
 def test_nothing_to_write_is_refused() -> None:
     with pytest.raises(ValueError, match="nothing to write"):
-        next(sdo.download(0x6040, 0, b""))
+        next(protocol.download(0x6040, 0, b""))
 
 
 def test_an_abort_request_names_object_and_code() -> None:
-    assert sdo.abort_request(0x6064, 2, 0x05040000) == bytes.fromhex("80 64 60 02 00 00 04 05")
+    assert protocol.abort_request(0x6064, 2, 0x05040000) == bytes.fromhex("80 64 60 02 00 00 04 05")
 
 
 @given(st.binary(min_size=1, max_size=300))
 def test_what_is_downloaded_in_segments_is_what_the_device_gets(data: bytes) -> None:
-    steps = sdo.download(0x2000, 1, data)
+    steps = protocol.download(0x2000, 1, data)
     request = next(steps)
     received = bytearray()
     try:
@@ -169,10 +169,10 @@ def test_what_is_downloaded_in_segments_is_what_the_device_gets(data: bytes) -> 
 
 @given(st.lists(st.binary(min_size=8, max_size=8), max_size=12))
 def test_garbage_never_breaks_a_transfer_otherwise_than_it_says(responses: list[bytes]) -> None:
-    for steps in (sdo.upload(0x6064, 0), sdo.download(0x2000, 1, bytes(20))):
+    for steps in (protocol.upload(0x6064, 0), protocol.download(0x2000, 1, bytes(20))):
         try:
             next(steps)
             for response in responses:
                 steps.send(response)
-        except (StopIteration, sdo.SdoAborted, sdo.SdoProtocolError):
+        except (StopIteration, protocol.SdoAborted, protocol.SdoProtocolError):
             continue

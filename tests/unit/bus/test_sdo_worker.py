@@ -6,8 +6,8 @@ from concurrent.futures import Future
 
 import pytest
 
-from drivers.bus.sdo_channel import SdoChannel
-from drivers.bus.sdo_worker import SdoWorker
+from drivers.bus.sdo.channel import SdoChannel
+from drivers.bus.sdo.worker import SdoWorker
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.waiting import WAIT_S, until

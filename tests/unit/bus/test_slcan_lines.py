@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from drivers.bus.frames import EXTENDED
-from drivers.bus.python_can import MAX_PENDING, PythonCanTransport
+from drivers.bus.interfaces.python_can import MAX_PENDING, PythonCanTransport
 from drivers.bus.settings import CanSettings
 
 SOUND = b"t1812AABB\r"

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.bus.frames import ERROR, EXTENDED
-from drivers.bus.link_report import blocking_problem, missing_link, warning
-from drivers.bus.netlink import Link, link_request, parse_link, read_link
-from drivers.bus.opening import open_transport
+from drivers.bus.interfaces.link_report import blocking_problem, missing_link, warning
+from drivers.bus.interfaces.netlink import Link, link_request, parse_link, read_link
+from drivers.bus.interfaces.opening import open_transport
+from drivers.bus.interfaces.socketcan import SocketCanTransport
 from drivers.bus.settings import CanSettings
-from drivers.bus.socketcan import SocketCanTransport
 from drivers.errors import Unavailable
 
 

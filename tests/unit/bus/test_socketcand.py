@@ -10,8 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.bus.frames import EXTENDED, REMOTE, Frame
+from drivers.bus.interfaces.socketcand import (
+    MAX_PENDING,
+    SocketcandParser,
+    SocketcandTransport,
+    frame_of,
+    send_message,
+)
 from drivers.bus.sender import Sender
-from drivers.bus.socketcand import MAX_PENDING, SocketcandParser, SocketcandTransport, frame_of, send_message
 from drivers.errors import Unavailable
 from tests.unit.bus.waiting import until
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus import sdo
-from drivers.bus.answers import INBOX, Answers, SdoCounters
-from drivers.bus.outstanding import Outstanding
-from drivers.bus.sdo_channel import OUT_OF_SYNC, SdoChannel
+from drivers.bus.sdo import protocol
+from drivers.bus.sdo.answers import INBOX, Answers, SdoCounters
+from drivers.bus.sdo.channel import OUT_OF_SYNC, SdoChannel
+from drivers.bus.sdo.outstanding import Outstanding
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, Unavailable
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import ABSENT, AT_ONCE, CLOCK, LONG, VALUE, Fate, LateServer
@@ -358,7 +358,7 @@ def test_of_a_flood_that_nobody_fetches_the_first_are_kept() -> None:
     """The late answer to what was asked comes before what somebody else sends behind it."""
     counters = SdoCounters()
     outstanding = Outstanding()
-    asked = outstanding.add(sdo.multiplexer(0x6041, 0), next(sdo.upload(0x6041, 0)))
+    asked = outstanding.add(protocol.multiplexer(0x6041, 0), next(protocol.upload(0x6041, 0)))
     answers = Answers(outstanding, counters)
     answers.put(b"\x4b\x41\x60\0" + bytes(4))
     for _ in range(10_000):

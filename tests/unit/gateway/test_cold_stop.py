@@ -93,7 +93,7 @@ class Wire:
 @pytest.fixture
 def wires(monkeypatch: pytest.MonkeyPatch) -> Wires:
     wires = Wires()
-    monkeypatch.setattr("drivers.bus.opening.open_transport", wires.open)
+    monkeypatch.setattr("drivers.bus.interfaces.opening.open_transport", wires.open)
     return wires
 
 
@@ -143,7 +143,7 @@ def test_a_bus_that_cannot_be_opened_is_told(
     def refuse(settings: CanSettings) -> Wire:
         raise Unavailable(f"{settings.channel} is down")
 
-    monkeypatch.setattr("drivers.bus.opening.open_transport", refuse)
+    monkeypatch.setattr("drivers.bus.interfaces.opening.open_transport", refuse)
     first.begin()
     first.join()
     assert "can0 is down" in caplog.text

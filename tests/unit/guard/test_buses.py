@@ -8,7 +8,7 @@ from typing import cast
 import pytest
 
 from drivers.bus.bus import BusUser
-from drivers.bus.bus_state import BusState
+from drivers.bus.interfaces.controller_state import BusState
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.guard.buses import BusWatcher, SyncWatcher
 from gateway.guard.inputs import AGAIN_NS

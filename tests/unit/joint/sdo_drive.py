@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
 from tests.unit.bus.direct import Direct

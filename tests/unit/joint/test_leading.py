@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from drivers.bus.sdo_channel import Interrupted
+from drivers.bus.sdo.channel import Interrupted
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import OVERTAKEN, Errand, Led, lead_down, look, step_up

@@ -13,7 +13,7 @@ import pytest
 import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.node import Node
-from drivers.bus.sdo_worker import SdoWorker
+from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import CanSettings, Role
 from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from drivers.bus.sdo_channel import SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sender import BusFull, StillLeaving
 from drivers.errors import Unavailable
 from drivers.joint.axis import Axis

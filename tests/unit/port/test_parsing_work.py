@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from drivers.bus.socketcand import SocketcandParser, frame_of
+from drivers.bus.interfaces.socketcand import SocketcandParser, frame_of
 from drivers.imu.can.witmotion_can import WitmotionCanParser
 from drivers.imu.formats.bno08x_rvc import Bno08xRvcParser
 from drivers.imu.formats.vectornav import VectornavParser

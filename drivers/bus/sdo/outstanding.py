@@ -10,7 +10,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import chain
 
-from drivers.bus import sdo
+from drivers.bus.sdo import protocol
 
 MOST = 64  # requests whose order is remembered
 # What every device may be asked without harm (CiA 301 §7.5.2): type, identity, error register, heartbeat.
@@ -71,7 +71,7 @@ class Outstanding:
     def is_lost(self, answer: bytes) -> bool:
         """Whether this may answer a request so old that nobody knows any more which."""
         with self._lock:
-            return sdo.names_object(answer) and answer[1:4] in self._crowd
+            return protocol.names_object(answer) and answer[1:4] in self._crowd
 
     def settle(self, answer: bytes) -> Request | None:
         """Take an answer; the request that it settles, `None` where it is none's or anybody's."""
@@ -103,29 +103,29 @@ class Outstanding:
         asked for the same ones again: such objects are left for when it is heard.
         """
         with self._lock:
-            usual = [one for one in PROBES if sdo.multiplexer(*one) != avoid]
+            usual = [one for one in PROBES if protocol.multiplexer(*one) != avoid]
             first = self._turn % len(usual)
             usual = [*usual[first:], *usual[:first]]
             self._turn += 1
             asked = {request.about for request in self._requests} | self._crowd
             spare: Collection[tuple[int, int]] = _SPARE if self.heard else ()
             self.heard = False
-            fresh = (one for one in chain(usual, spare) if sdo.multiplexer(*one) not in asked)
+            fresh = (one for one in chain(usual, spare) if protocol.multiplexer(*one) not in asked)
             return next(fresh, usual[0])
 
     def _answered_by(self, answer: bytes) -> int | None:
-        if answer[0] == sdo.ABORT and answer[1:4] == bytes(3):  # of anything: only where there is but one
+        if answer[0] == protocol.ABORT and answer[1:4] == bytes(3):  # of anything: where it is one
             return 0 if len(self._requests) == 1 and not self._crowd else None
-        if self._crowd and sdo.names_object(answer) and answer[1:4] in self._crowd:
+        if self._crowd and protocol.names_object(answer) and answer[1:4] in self._crowd:
             return None  # nobody knows to which
         for at, one in enumerate(self._requests):
-            if sdo.answers(answer, one.frame, one.about):
+            if protocol.answers(answer, one.frame, one.about):
                 return at
         return None
 
     def _answer_repeated(self, settled: Request, answer: bytes) -> None:
         """Where the same was written again, and nothing else in between, each is known by this."""
         later = [one for one in self._requests if one.about == settled.about]
-        if sdo.is_expedited_download(settled.frame) and all(one.frame == settled.frame for one in later):
+        if protocol.is_expedited_download(settled.frame) and all(one.frame == settled.frame for one in later):
             for one in later:
                 one.answer = answer

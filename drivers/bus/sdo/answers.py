@@ -5,8 +5,8 @@ import queue
 import time
 from dataclasses import dataclass
 
-from drivers.bus.doubles import Doubles
-from drivers.bus.outstanding import Outstanding
+from drivers.bus.sdo.doubles import Doubles
+from drivers.bus.sdo.outstanding import Outstanding
 
 # Responses that wait. Of a flood the first are kept, in their order: what answers a request comes before what
 # is sent behind it without being asked. What comes beyond is lost, which is as if it never came: its request

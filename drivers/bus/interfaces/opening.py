@@ -8,7 +8,7 @@ from drivers.errors import Unavailable
 
 
 def _socketcand(settings: CanSettings) -> Transport:
-    from drivers.bus.socketcand import SocketcandTransport
+    from drivers.bus.interfaces.socketcand import SocketcandTransport
 
     try:
         host, port = str(settings.more["host"]), int(settings.more["port"])
@@ -20,13 +20,13 @@ def _socketcand(settings: CanSettings) -> Transport:
 def _socketcan(settings: CanSettings) -> Transport:
     if settings.more:  # such as CAN FD: only python-can knows these keys
         return _python_can(settings)
-    from drivers.bus.socketcan import open_socketcan
+    from drivers.bus.interfaces.socketcan import open_socketcan
 
     return open_socketcan(settings)
 
 
 def _python_can(settings: CanSettings) -> Transport:
-    from drivers.bus.python_can import PythonCanTransport
+    from drivers.bus.interfaces.python_can import PythonCanTransport
 
     return PythonCanTransport(settings)
 

@@ -2,7 +2,7 @@
 
 import socket
 
-from drivers.bus.netlink import Link
+from drivers.bus.interfaces.netlink import Link
 
 RESTART_MS = 100  # suggested: how long after bus off the controller tries again
 USUAL_BITRATE = 1_000_000

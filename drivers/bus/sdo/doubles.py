@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from drivers.bus import sdo
+from drivers.bus.sdo import protocol
 
 RECENT = 8  # requests whose second answer is still recognised
 CLEAN = 20  # requests answered once, after which all is well again
@@ -30,7 +30,7 @@ class Doubles:
 
     def answered(self, answer: bytes) -> None:
         """A request was answered by this."""
-        if not sdo.names_object(answer):
+        if not protocol.names_object(answer):
             return
         self._recent.append(_Answered(answer))
         if len(self._recent) > RECENT:
@@ -57,4 +57,4 @@ class Doubles:
 
 def _key(answer: bytes) -> tuple[int, bytes]:
     """Specifier and object: two devices may hold different values."""
-    return answer[0] & sdo.SPECIFIER, answer[1:4]
+    return answer[0] & protocol.SPECIFIER, answer[1:4]

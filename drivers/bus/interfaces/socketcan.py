@@ -11,8 +11,8 @@ import time
 from collections.abc import Sequence
 
 from drivers.bus.frames import EXTENDED, REMOTE, Frame
-from drivers.bus.link_report import blocking_problem, missing_link, warning
-from drivers.bus.netlink import read_link
+from drivers.bus.interfaces.link_report import blocking_problem, missing_link, warning
+from drivers.bus.interfaces.netlink import read_link
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Generic, TypeVar
 
-from drivers.bus import sdo
-from drivers.bus.outstanding import Request
+from drivers.bus.sdo import protocol
+from drivers.bus.sdo.outstanding import Request
 
 T = TypeVar("T")
 
@@ -32,7 +32,7 @@ class Transfer(Generic[T]):
     @property
     def about(self) -> bytes:
         """Its object, as frames name it."""
-        return sdo.multiplexer(self.index, self.subindex)
+        return protocol.multiplexer(self.index, self.subindex)
 
     @property
     def write_begun(self) -> bool:
@@ -42,13 +42,13 @@ class Transfer(Generic[T]):
     @property
     def is_expedited_write(self) -> bool:
         """Whether its first request is all of it."""
-        return self.data is not None and len(self.data) <= sdo.EXPEDITED
+        return self.data is not None and len(self.data) <= protocol.EXPEDITED
 
     @property
     def late_answer(self) -> bytes | None:
         """The answer to a read that was given up, where it came after all and is all of it."""
         asked = self.request
-        if asked is None or asked.answer is None or not sdo.concludes(asked.answer, asked.frame):
+        if asked is None or asked.answer is None or not protocol.concludes(asked.answer, asked.frame):
             return None
         return asked.answer
 
@@ -56,7 +56,7 @@ class Transfer(Generic[T]):
 def read(label: str, index: int, subindex: int, timeout_s: float) -> Transfer[bytes]:
     """A read of an object of the device `label`."""
     what = f"{label}: reading 0x{index:04X}:{subindex:02X}"
-    return Transfer(partial(sdo.upload, index, subindex), index, subindex, what, timeout_s)
+    return Transfer(partial(protocol.upload, index, subindex), index, subindex, what, timeout_s)
 
 
 def write(
@@ -64,7 +64,7 @@ def write(
 ) -> Transfer[None]:
     """A write of an object of the device `label`."""
     what = f"{label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
-    begin = partial(sdo.download, index, subindex, data)
+    begin = partial(protocol.download, index, subindex, data)
     return Transfer(begin, index, subindex, what, timeout_s, data, permitted)
 
 

@@ -12,11 +12,11 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
-from drivers.bus import sdo
-from drivers.bus.aborts import abort_text
-from drivers.bus.answers import Answers, SdoCounters
-from drivers.bus.outstanding import Outstanding, Request
-from drivers.bus.sdo_transfer import Transfer, nothing, read, write
+from drivers.bus.sdo import protocol
+from drivers.bus.sdo.aborts import abort_text
+from drivers.bus.sdo.answers import Answers, SdoCounters
+from drivers.bus.sdo.outstanding import Outstanding, Request
+from drivers.bus.sdo.transfer import Transfer, nothing, read, write
 from drivers.bus.sender import StillLeaving
 from drivers.bus.written import Written
 from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
@@ -120,7 +120,7 @@ class SdoChannel:
             self._interrupted.set()
             self._ahead = None
             if self._in_flight is not None:
-                self._end_transfer(*self._in_flight, sdo.GENERAL_ERROR)
+                self._end_transfer(*self._in_flight, protocol.GENERAL_ERROR)
             self._in_flight = None
             if ahead is not None:
                 self._written.doubt((int.from_bytes(ahead[1:3], "little"), ahead[3]))
@@ -226,23 +226,23 @@ class SdoChannel:
         self.counters.transfers += 1
         try:
             result = self._run(transfer)
-        except sdo.SdoAborted as error:
+        except protocol.SdoAborted as error:
             self.counters.aborts += 1
             self.answered_ns = time.monotonic_ns()
             text = f"{transfer.what}: refused, {abort_text(error.abort_code)}"
             raise DeviceAbort(text, error.abort_code) from error
-        except sdo.SdoProtocolError as error:
+        except protocol.SdoProtocolError as error:
             self._abort(transfer, error.abort_code)
             raise SdoProtocolBroken(
                 f"{transfer.what}: the device {error}, against the SDO protocol"
             ) from error
         except NotPermitted:
             if transfer.write_begun:
-                self._abort(transfer, sdo.GENERAL_ERROR)
+                self._abort(transfer, protocol.GENERAL_ERROR)
             raise
         except queue.Empty as error:
             self.counters.timeouts += 1
-            self._abort(transfer, sdo.TIMED_OUT)
+            self._abort(transfer, protocol.TIMED_OUT)
             raise DeviceTimeout(f"{transfer.what}: no answer within {transfer.timeout_s:g} s") from error
         else:
             self.answered_ns = time.monotonic_ns()
@@ -317,8 +317,8 @@ class SdoChannel:
             ) from error
         finally:
             request.given_up = True
-        if request.answer is not None and not sdo.concludes(request.answer, request.frame):
-            self._abort(probe, sdo.GENERAL_ERROR)  # its data is of no interest
+        if request.answer is not None and not protocol.concludes(request.answer, request.frame):
+            self._abort(probe, protocol.GENERAL_ERROR)  # its data is of no interest
 
     # What goes out.
 
@@ -399,7 +399,7 @@ class SdoChannel:
 
     def _end_transfer(self, index: int, subindex: int, abort_code: int) -> None:
         """Tell the device, which answers nothing to that."""
-        self._outlet.send_urgent(sdo.abort_request(index, subindex, abort_code))
+        self._outlet.send_urgent(protocol.abort_request(index, subindex, abort_code))
 
     def _check_interrupted(self) -> None:
         if self._interrupted.is_set():

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
-from drivers.bus.sdo_channel import Interrupted, SdoChannel
+from drivers.bus.sdo.channel import Interrupted, SdoChannel
 from drivers.errors import Unavailable
 from drivers.urgency import make_urgent
 
