@@ -1,4 +1,4 @@
-"""`python -m tools.check_size`: no file of Python is longer than can be read at one sitting; run by `./dev lint`."""
+"""`python -m tools.check_size`: no file of Python is too long to be one idea; run by `./dev lint`."""
 
 import subprocess
 import sys
