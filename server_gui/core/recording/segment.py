@@ -4,6 +4,7 @@ import collections
 import contextlib
 import itertools
 import operator
+import os
 import sqlite3
 import time
 import zlib
@@ -57,7 +58,9 @@ def translated(file: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        damaged = getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        # A file that we may write and that says it is only to be read does not say what we wrote.
+        damaged = code in _DAMAGED or (code == sqlite3.SQLITE_READONLY and os.access(file, os.W_OK))
         kind, how = (Damaged, "is damaged") if damaged else (SpoolUnusable, "cannot be used")
         raise kind(f"the spool's file {file} {how}: {error}") from error
     except OSError as error:
