@@ -101,9 +101,12 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
 
 
 def identity(spool: Path) -> str:
-    """What the spool is called; nothing where there is none."""
+    """What the spool is called; nothing where there is none. Raises `SpoolUnusable` where it is damaged."""
     file = spool / "id"
-    return file.read_text().strip() if file.exists() else ""
+    try:
+        return file.read_text().strip() if file.exists() else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpoolUnusable(f"the spool's name {file} cannot be read: {error}; bring it back") from error
 
 
 def writer(spool: Path, number: int) -> str:

@@ -122,7 +122,7 @@ def test_what_is_still_there_of_a_damaged_file_is_kept_and_noted(place: Place) -
     place.told("mend")
     [kept] = (place.store / "mended").rglob("*.parquet")
     assert (kept.name, kept.read_bytes()) == (damaged.name, content)
-    [note] = mending.taken_out(Store(place.url))
+    [note], _ = mending.taken_out(Store(place.url))
     assert (note.rows, note.robot) == (100, "exo-01")
     assert "100 rows in 1 file were taken out" in place.told()
 
