@@ -261,7 +261,7 @@ class Store:
             data = self.objects.read(ABOUT) or b""
         try:
             about = msgspec.json.decode(data, type=About)
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise StoreError(
                 f"{self.url}/{ABOUT} is damaged: {error}; bring it back from a copy of the store, or write "
                 '{"format":1,"shards":N,"several_writers":true} into it, N for the folders in telemetry'

@@ -127,7 +127,7 @@ def pins(store: Store) -> list[Pin]:
 def _pin(store: Store, name: str, data: bytes) -> Pin:
     try:
         return msgspec.json.decode(data, type=Pin)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise StoreError(
             f"{store.url}/{name} is damaged: bring it back from a copy of the store; it says which version "
             "of a table a model needs"
@@ -192,9 +192,24 @@ def _again(store: Store, location: str, work: Callable[[], Done]) -> Done:
 
 
 def retained(store: Store, location: str) -> datetime | None:
-    """Up to which time rows of the table were removed because they were old; None where none were."""
-    names = [name.rpartition("/")[2].removesuffix(".json") for name in store.objects.names(_noted(location))]
-    return max((datetime.strptime(name, _INSTANT).replace(tzinfo=UTC) for name in names), default=None)
+    """Up to which time rows of the table were removed because they were old; None where none were.
+
+    Raises:
+        StoreError: a note of that is damaged.
+
+    """
+    names = [name for name in store.objects.names(_noted(location)) if name.endswith(".json")]
+    try:
+        return max((_instant(name) for name in names), default=None)
+    except ValueError as error:
+        raise StoreError(
+            f"a note in {store.url}/{_noted(location)} has no time for a name ({error}): bring it back from "
+            "a copy of the store, or remove it; by it is known which rows gwrms cloud retain has removed"
+        ) from error
+
+
+def _instant(name: str) -> datetime:
+    return datetime.strptime(name.rpartition("/")[2].removesuffix(".json"), _INSTANT).replace(tzinfo=UTC)
 
 
 def _note(store: Store, location: str, before: datetime) -> None:

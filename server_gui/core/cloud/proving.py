@@ -1,7 +1,7 @@
 """Whether what receipts say is in the store: each batch's rows once, and as they were sent."""
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ml.store import sums, upkeep
+from ml.store import damage, sums, upkeep
 from ml.store.errors import StoreError, StoreRefused, StoreUnreachable, translated
 from ml.store.fragments import DataFile
 from ml.store.store import Store
@@ -53,6 +53,8 @@ class Proof:
     problems: list[str] = field(default_factory=list)
     lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
     shortened: set[Batch] = field(default_factory=set)  # by retention: how many others there are is not known
+    missing: list[tuple[Batch, Part, int]] = field(default_factory=list)  # how many rows of which parts
+    misread: Sequence[DataFile] = ()  # files that have not the columns that they should have
     wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
 
 
@@ -72,7 +74,7 @@ def prove(
     The receipts are older than the list of files: what they speak of was in the store by then.
 
     Raises:
-        StoreUnreachable, StoreRefused: it could not be looked.
+        StoreError: it could not be looked.
 
     """
     proof, here = Proof(), _here(store)
@@ -87,8 +89,9 @@ def prove(
         else:
             proof.elsewhere += 1
     claims = [_Claim(batch, part) for batch, each in newest.items() for part in each.parts]
-    proof.problems += _count(store, claims, files, advance, values=values)
-    retained = {location: upkeep.retained(store, location) for location in {c.part.location for c in claims}}
+    misread = _count(store, claims, files, advance, values=values)
+    proof.misread, proof.problems = list(misread), [*proof.problems, *misread.values()]
+    retained = _retained(store, {claim.part.location for claim in claims}, proof.problems)
     wrong = set()
     for claim in claims:
         proof.seen += claim.rows
@@ -99,6 +102,7 @@ def prove(
             wrong.add(claim.batch)
             if claim.rows < claim.part.rows:
                 proof.lacking.add(claim.batch)
+                proof.missing.append((claim.batch, claim.part, claim.part.rows - claim.rows))
             proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
         else:
             proof.rows += claim.rows
@@ -124,10 +128,24 @@ def _here(store: Store) -> set[str]:
     return found
 
 
+def _retained(store: Store, locations: Set[str], problems: list[str]) -> dict[str, datetime | None]:
+    """Up to which time rows were removed; where nobody can say, none were, and it is told."""
+    found: dict[str, datetime | None] = {}
+    for location in sorted(locations):
+        try:
+            found[location] = upkeep.retained(store, location)
+        except (StoreUnreachable, StoreRefused):
+            raise
+        except StoreError as error:
+            found[location] = None
+            problems.append(str(error))
+    return found
+
+
 def _count(
     store: Store, claims: Sequence[_Claim], files: Sequence[DataFile], advance: Advance, *, values: bool
-) -> list[str]:
-    """Count what is there of each claim; which files cannot be read."""
+) -> dict[DataFile, str]:
+    """Count what is there of each claim; which files cannot be read, and why."""
     streams: dict[_Whose, list[_Claim]] = defaultdict(list)
     others: dict[str, dict[Batch, _Claim]] = defaultdict(dict)
     for claim in claims:
@@ -147,18 +165,19 @@ def _count(
             if theirs:
                 return _merged(_seen(theirs, batch, values) for batch in _rows(store, file, values, ORIGIN))
         except StoreError as error:
-            return str(error)
-        except pa.ArrowException as error:
-            return f"{store.url}/{file.location}/{file.path} is not as it was written: {error}"
+            return damage.proven(store, file, str(error))
+        except (pa.ArrowException, LookupError, TypeError, ValueError) as error:
+            told = error.args[0] if isinstance(error, KeyError) else error
+            return f"{store.url}/{file.location}/{file.path} is not as it was written: {told}"
         finally:
             advance(1)
         return ()
 
     with ThreadPoolExecutor(AT_ONCE, "prove") as pool:
-        problems: list[str] = []
-        for seen in pool.map(look, files):
+        problems: dict[DataFile, str] = {}
+        for file, seen in zip(files, pool.map(look, files), strict=True):
             if isinstance(seen, str):
-                problems.append(seen)
+                problems[file] = seen
                 continue
             for claim, rows, total in seen:
                 claim.rows += rows

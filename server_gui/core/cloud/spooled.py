@@ -101,9 +101,12 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
 
 
 def identity(spool: Path) -> str:
-    """What the spool is called; nothing where there is none."""
+    """What the spool is called; nothing where there is none. Raises `SpoolUnusable` where it is damaged."""
     file = spool / "id"
-    return file.read_text().strip() if file.exists() else ""
+    try:
+        return file.read_text().strip() if file.exists() else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise SpoolUnusable(f"the spool's name {file} cannot be read: {error}; bring it back") from error
 
 
 def writer(spool: Path, number: int) -> str:
@@ -153,12 +156,16 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
                 translated(file),
                 contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True)) as database,
             ):
-                return database.execute(sql, values).fetchall()
+                return database.execute(sql, values).fetchall() if _has(database, sql) else []
         except Damaged as error:
             raise Damaged(f"{error}; {what_to_do}") from error
-        except SpoolUnusable as error:
-            if "no such table" in str(error):
-                return []
+        except SpoolUnusable:
             if file.exists():
                 raise
     raise SpoolUnusable(f"batch {batch} of the spool {spool} has just gone to the store; ask again")
+
+
+def _has(database: sqlite3.Connection, sql: str) -> bool:
+    """Whether there is what is asked for: there may be no tables yet, and once there was no `meta`."""
+    tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+    return bool(tables) and ("meta" in tables or " meta " not in sql)

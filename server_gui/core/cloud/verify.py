@@ -1,6 +1,7 @@
 """Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
 
 import contextlib
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
@@ -8,13 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import pyarrow.parquet as pq
-
 from gateway.cli.text import counted, size
 from ml.store import mending, reading
-from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
+from ml.store.damage import damage
+from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable
 from ml.store.fragments import DataFile, data_files
-from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from ml.store.upkeep import Pin, pins
@@ -79,7 +78,7 @@ def whole(
     besides, also of rows that have no receipt.
 
     Raises:
-        StoreUnreachable, StoreRefused: it could not be looked.
+        StoreError: it could not be looked.
 
     """
     receipts = receipts_of(spool)  # before the files: what is sent meanwhile counts
@@ -98,7 +97,9 @@ def whole(
     problems += proof.problems
     if proof.here or not proof.elsewhere:
         problems += batches_missing(store, spool)
-    notes = [*_notes(store, spool, proof, receipts)]
+    taken_out, unknown = mending.taken_out(store)
+    problems += unknown
+    notes = [*_notes(store, spool, proof, receipts, taken_out)]
     unproven = sum(file.rows for file in sound) - proof.seen
     return Verdict(found, proof, list(dict.fromkeys(problems)), notes, unproven)
 
@@ -124,7 +125,13 @@ def _known(spool: Path) -> list[Receipt]:
     return [each for each in receipts_of(spool) if isinstance(each, Receipt)]
 
 
-def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
+def _notes(
+    store: Store,
+    spool: Path,
+    proof: Proof,
+    receipts: Sequence[Receipt | Altered],
+    gone: Sequence[mending.TakenOut],
+) -> Iterator[str]:
     """What can be done about it, what was done, and what is still to come."""
     if any(isinstance(each, Altered) for each in receipts):
         yield (
@@ -139,7 +146,7 @@ def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt |
             f"the spool still has a second copy of {told_batches(again)}: end the collector and run gwrms "
             "cloud mend, which brings what is missing of it"
         )
-    if gone := mending.taken_out(store):
+    if gone:
         yield (
             f"{sum(each.rows for each in gone)} rows in {counted(len(gone), 'file')} were taken out "
             f"by gwrms cloud mend ({store.url}/mended says which); what receipts here prove is back"
@@ -226,12 +233,16 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
     """What is wrong with these files, in words: absent, of another size, unreadable, other rows.
 
     Each file's footer is read, and with `deep` every value.
+
+    Raises:
+        StoreError: of one of them nobody can say.
+
     """
     return filter(None, _each(store, wanted, advance, deep=deep))
 
 
 def broken(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> list[DataFile]:
-    """Which of these files are absent, cut off or unreadable."""
+    """Which of these files are absent, cut off or unreadable; raises as `damages` does."""
     told = _each(store, wanted, advance, deep=deep)
     return [file for file, problem in zip(wanted, told, strict=True) if problem]
 
@@ -240,32 +251,12 @@ def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: b
     sizes = {found.path: found.size_bytes for found in store.objects.listing()}
 
     def check(file: DataFile) -> str | None:
-        problem = _damage(store, file, sizes.get(f"{file.location}/{file.path}"), deep=deep)
+        problem = damage(store, file, sizes.get(f"{file.location}/{file.path}"), deep=deep)
         advance(1)
         return problem
 
     with ThreadPoolExecutor(AT_ONCE, "verify") as pool:
         yield from pool.map(check, wanted)
-
-
-def _damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) -> str | None:
-    name = f"{store.url}/{file.location}/{file.path}"
-    if size_bytes is None:
-        return f"{name} is not there, with {file.rows} rows"
-    if size_bytes != file.size_bytes:
-        return f"{name} has {size_bytes} bytes instead of {file.size_bytes}"
-    try:
-        rows = _decoded(store, file) if deep else footer(store, file).num_rows
-    except StoreError as error:
-        return str(error)
-    return None if rows == file.rows else f"{name} has {rows} rows instead of {file.rows}"
-
-
-def _decoded(store: Store, file: DataFile) -> int:
-    """How many rows it has, each of which was read."""
-    name = f"{file.location}/{file.path}"
-    with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
-        return sum(batch.num_rows for batch in pq.ParquetFile(opened).iter_batches())
 
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
@@ -375,3 +366,7 @@ def _newest(store: Store, location: str, writer: str) -> int:
         return store.table(location).transaction_version(writer) or 0
     except NoSuchTable:
         return 0
+    except (StoreUnreachable, StoreRefused):
+        raise
+    except StoreError:  # which `look` tells
+        return sys.maxsize

@@ -57,6 +57,12 @@ class Place:
         found: dict[str, Any] = json.loads(self._capsys.readouterr().out)
         return found
 
+    def status(self, *words: str) -> int:
+        """The exit status of any command."""
+        status = main(["cloud", *words, "--config", str(self._config)])
+        self._capsys.readouterr()
+        return status
+
     def told(self, *words: str) -> str:
         main(["cloud", *(words or ("verify",)), "--config", str(self._config)])
         said = self._capsys.readouterr()
@@ -94,6 +100,10 @@ def rewrite(file: Path, change: Callable[[pa.Table], pa.Table]) -> None:
 
 def replaced(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:
     return rows.set_column(rows.column_names.index(name), rows.schema.field(name), values)
+
+
+def retyped(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:
+    return rows.set_column(rows.column_names.index(name), name, values)
 
 
 def altered(rows: pa.Table) -> pa.Table:
@@ -201,6 +211,35 @@ def pin_damaged(place: Place) -> None:
     file.write_text("{")
 
 
+def retention_note_damaged(place: Place) -> None:
+    file_deleted(place)
+    retain(Store(place.url), [TELEMETRY], datetime(1970, 1, 2, tzinfo=UTC))
+    [note] = (place.store / "retained").rglob("*.json")
+    note.rename(note.with_name("x.json"))
+
+
+def mended_note_damaged(place: Place) -> None:
+    file_deleted(place)
+    (place.store / "mended").mkdir()
+    (place.store / "mended" / "x.json").write_bytes(b"\xff")
+
+
+def without(name: str) -> Callable[[pa.Table], pa.Table]:
+    return lambda rows: rows.drop_columns([name])
+
+
+def numbers_as_text(rows: pa.Table) -> pa.Table:
+    return retyped(rows, "seq", rows["seq"].cast(pa.string()))
+
+
+def event_without_its_batch(place: Place) -> None:
+    rewrite(place.files("events")[0], without("batch"))
+
+
+def event_of_lists(place: Place) -> None:
+    rewrite(place.files("events")[0], lambda rows: retyped(rows, "spool", pa.array([["a"]] * len(rows))))
+
+
 def pinned_version_gone(place: Place) -> None:
     (place.store / "pins").mkdir()
     named = {"location": "telemetry/000", "version": 77, "by": "walking-1"}
@@ -274,6 +313,13 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (pinned_file_deleted, "is not there, with 2 rows (needed by version 3, which walking-1 names)"),
     (pinned_version_gone, "(needed by version 77, which walking-1 names)"),
     (pin_damaged, "is damaged: bring it back from a copy of the store"),
+    (retention_note_damaged, "retained/telemetry-000 has no time for a name"),
+    (mended_note_damaged, "mended/x.json is damaged"),
+    (of_file(without("seq")), "is not as it was written"),
+    (of_file(without("connection")), "is not as it was written"),
+    (of_file(numbers_as_text), "is not as it was written"),
+    (event_without_its_batch, "is not as it was written"),
+    (event_of_lists, "is not as it was written"),
     (receipts_cut_off, f"{RECEIPTS} has no receipt of the batches 2 to 3, which went to a store"),
     (receipts_deleted, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
     (receipts_and_second_copies_deleted, f"{RECEIPTS} is not there, though the spool had the batches 1 to 3"),
@@ -304,6 +350,27 @@ def test_a_missing_file_is_named_once(place: Place) -> None:
     file_deleted(place)
     name = place.verify()[1].partition(" is not there")[0].rpartition("/")[2]
     assert place.verify()[1].count(name) == 1
+
+
+@pytest.mark.parametrize("damage", [retention_note_damaged, mended_note_damaged])
+def test_a_damaged_note_hides_no_other_damage(place: Place, damage: Callable[[Place], None]) -> None:
+    damage(place)
+    assert "is not there, with 100 rows" in place.verify()[1]
+
+
+def test_what_lies_about_in_the_store_and_is_no_note_is_not_read(place: Place) -> None:
+    for folder in ("retained/telemetry-000", "mended"):
+        (place.store / folder).mkdir(parents=True)
+        (place.store / folder / "notes.txt").write_text("junk")
+    assert place.verify() == (0, "")
+
+
+def test_a_spool_whose_name_cannot_be_read_is_refused_in_words(place: Place) -> None:
+    receipts_deleted(place)
+    (place.spool / "id").write_bytes(b"\xff\n")
+    status, problems = place.verify()
+    assert status == 2
+    assert "the spool's name" in problems
 
 
 def test_there_is_no_batch_0(place: Place) -> None:
