@@ -58,4 +58,4 @@ def empty(
                 except StoreError as error:  # as where a file of the table is gone that this one is in
                     waits.append(f"batch {number} waits: {error}")
                 advance(1)
-        return Emptied(store.url, uploaded, [*spool.anew, *problems], waits, notes)
+        return Emptied(store.url, uploaded, [*spool.notices, *problems], waits, notes)

@@ -19,7 +19,8 @@ from server_gui.core.recording.errors import SpoolUnusable
 RECEIPTS: Final = "receipts.jsonl"
 _HEAD: Final = '{"crc":"%08x",'
 _LENGTH: Final = len(_HEAD % 0)
-_TAIL_BYTES: Final = 1 << 20  # of the file, that are read to find its last line at first
+_TAIL_BYTES: Final = 1 << 20  # of the file, that are read to find its last lines at first
+_TAIL_LINES: Final = 2  # one, and the one that it follows
 
 
 class Stream(msgspec.Struct, frozen=True):
@@ -87,9 +88,9 @@ class Receipts:
         try:
             known = self.file.exists()
             with open(self.file, "ab+", opener=opener) as out:
-                whole, last = _tail(out.fileno())
+                whole, lines = _tail(out.fileno())
                 out.truncate(whole)  # what follows was being written when the power went
-                crc = zlib.crc32(body, _stated(last))
+                crc = zlib.crc32(body, _stated(lines[-1]))
                 out.write((_HEAD % crc).encode() + body + b"\n")
                 out.flush()
                 os.fsync(out.fileno())
@@ -116,14 +117,15 @@ class Receipts:
         return (each for each in self.all() if isinstance(each, Receipt))
 
     def newest(self) -> Receipt | None:
-        """The last one, where it can be read."""
+        """The last one that is as it was written and follows the line before it."""
         try:
             with self.file.open("rb") as opened:
-                _, last = _tail(opened.fileno())
+                _, lines = _tail(opened.fileno())
         except OSError:
             return None
-        found = _read(last, None)
-        return found if isinstance(found, Receipt) else None
+        pairs = zip(reversed(lines[1:]), reversed(lines[:-1]), strict=True)
+        found = (_read(line, _stated(before)) for line, before in pairs)
+        return next((each for each in found if isinstance(each, Receipt)), None)
 
     def all(self) -> Iterator[Receipt | Altered]:
         """Each line, oldest first."""
@@ -147,16 +149,16 @@ def _see(tables: dict[str, dict[str, str]], receipt: Receipt) -> None:
     known |= now
 
 
-def _read(line: bytes, before: int | None) -> Receipt | str:
+def _read(line: bytes, before: int) -> Receipt | str:
     """The receipt on a line that follows one with the CRC `before`, or in words what is wrong with it."""
     body = line[_LENGTH:].removesuffix(b"\n")
     if not line.endswith(b"\n"):
         return "is cut off"
-    if before is not None and zlib.crc32(body, before) != _stated(line):
+    if zlib.crc32(body, before) != _stated(line):
         return "is not as it was written, or lines before it are missing"
     try:
         return _decoder.decode(b"{" + body)
-    except msgspec.MsgspecError:
+    except (msgspec.MsgspecError, ValueError):
         return "is no receipt"
 
 
@@ -168,18 +170,16 @@ def _stated(line: bytes) -> int:
         return 0
 
 
-def _tail(descriptor: int) -> tuple[int, bytes]:
-    """Up to where the file has whole lines, and the last of them."""
+def _tail(descriptor: int) -> tuple[int, list[bytes]]:
+    """Up to where the file has whole lines, and the last of them; before the first one stands b""."""
     size = os.fstat(descriptor).st_size
-    begin = size
-    while begin:
+    begin, rest = size, b""
+    lines: list[bytes] = []
+    while begin and len(lines) <= _TAIL_LINES:
         begin = max(0, size - 2 * (size - begin) - _TAIL_BYTES)
-        data = os.pread(descriptor, size - begin, begin)
-        end = data.rfind(b"\n") + 1
-        start = data.rfind(b"\n", 0, max(end - 1, 0)) + 1
-        if end and (start or not begin):
-            return begin + end, data[start:end]
-    return 0, b""
+        *lines, rest = os.pread(descriptor, size - begin, begin).split(b"\n")
+    whole = [line + b"\n" for line in (lines[1:] if begin else lines)]
+    return size - len(rest), whole if begin else [b"", *whole]
 
 
 def _sync(folder: Path) -> None:

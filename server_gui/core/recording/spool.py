@@ -25,10 +25,11 @@ from typing import IO, Final, Self
 
 import msgspec
 
+from gateway.cli.text import counted
 from ml.store import durable
 from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import PAGE_BYTES, SUFFIXES, Segment
 from server_gui.core.recording.wal import lost_commits
@@ -47,6 +48,7 @@ UNFIT: Final = (  # what a segment raises because of the rows themselves
     TypeError,
     ValueError,
 )
+_ID: Final = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
@@ -87,19 +89,21 @@ class Spool:
         self._reserve_bytes = reserve_bytes
         self._keep_bytes = keep_bytes
         self._free_bytes = free_bytes
-        self.anew: list[str] = []  # in words, where a store is another one than batches went to
+        self.notices: list[
+            str
+        ] = []  # in words: a store that is another one than before, a damaged id, doubts
         self.missing: str | None = None  # in words, where files that were there are not any more
         self._lock = _take(folder)
         try:
             with _writing(folder):
+                self.receipts = Receipts(folder / RECEIPTS)
+                self._look_at_names()
+                self._look_at_logs()
                 self.id = self._identify()
                 durable.synchronise([folder / "id"])  # with the names of the folders above it
                 self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
-                self.receipts = Receipts(folder / RECEIPTS)
                 self._writers = {self.id}
                 self._settled: set[int] = set()  # numbers of which nothing is to be told any more
-                self._look_at_names()
-                self._look_at_logs()
                 self._heads = self._known_heads()
                 self._began_ns: int | None = None
                 self._current = self._resume()
@@ -227,7 +231,7 @@ class Spool:
         aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
         gone = set(range(first, self._current.number)) - {number for number, _ in files}
         if found := (aside | gone) - self._settled:
-            self._settled |= found & {each.batch for each in self.receipts.all() if isinstance(each, Receipt)}
+            self._settle(found, gone)
         return {
             number: f"batch {number} of the spool {self.folder} cannot be read, and what it held is lost: "
             f"its file is kept as {self._path(number, Kept.DAMAGED).name}"
@@ -236,6 +240,20 @@ class Spool:
             "says that it was uploaded"
             for number in sorted(found - self._settled)
         }
+
+    def _settle(self, found: set[int], gone: set[int]) -> None:
+        """Tell nothing of those that have a receipt, nor where a receipt that is damaged may be of them."""
+        lines = list(self.receipts.all())
+        known = {each.batch for each in lines if isinstance(each, Receipt)}
+        altered = [each.line for each in lines if isinstance(each, Altered)]
+        if altered and (doubtful := sorted((found & gone) - known)):
+            self._notice(
+                f"the files of {counted(len(doubtful), 'batch', 'batches')} of the spool {self.folder} (from "
+                f"batch {doubtful[0]} on) are not there, and line {altered[0]} of its {RECEIPTS} is damaged: "
+                "nobody can say whether they were uploaded. Bring that file back from a copy, and start again"
+            )
+            known.update(doubtful)
+        self._settled |= found & known
 
     def is_aside(self, number: int) -> bool:
         """Whether the segment was set aside, and is still there."""
@@ -323,17 +341,40 @@ class Spool:
         return [number for number, kept in self._segments() if kept is wanted]
 
     def _identify(self) -> str:
-        """The name of this spool at the store, given once."""
+        """The name of this spool at the store, given once; of one that is damaged, as its batches have it."""
+        if known := identity(self.folder):
+            return known
         file = self.folder / "id"
-        if not file.exists():
-            draft = file.with_name("id.draft")
-            with open(draft, "w", opener=opener) as out:
-                out.write(f"{uuid.uuid4()}\n")
-                out.flush()
-                os.fsync(out.fileno())
-            draft.rename(file)
-            _sync(self.folder)
-        return file.read_text().strip()
+        damaged, found = file.exists(), next(filter(_ID.fullmatch, self._called()), None)
+        named = found or str(uuid.uuid4())
+        draft = file.with_name("id.draft")
+        with open(draft, "w", opener=opener) as out:
+            out.write(f"{named}\n")
+            out.flush()
+            os.fsync(out.fileno())
+        draft.rename(file)
+        _sync(self.folder)
+        if damaged or found:
+            source = "what its batches call it" if found else "a new name: nothing here knows the former one"
+            self._notice(f"the spool's {file} was {'damaged' if damaged else 'gone'}; it has {source} now")
+        return named
+
+    def _called(self) -> Iterator[str]:
+        """What receipts and segments call this spool, the newest first."""
+        receipt = self.receipts.newest()
+        if receipt:
+            yield receipt.writer.partition("/")[0]
+        for number, kept in reversed(self._own()):
+            with (
+                contextlib.suppress(SpoolUnusable),
+                contextlib.closing(Segment(self._path(number, kept), number, written=True)) as segment,
+            ):
+                if segment.writer:
+                    yield segment.writer.partition("/")[0]
+
+    def _notice(self, text: str) -> None:
+        log.error("%s", text)
+        self.notices.append(text)
 
     def _look_at_logs(self) -> None:
         """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
@@ -437,6 +478,13 @@ def _writing(folder: Path) -> Iterator[None]:
     except (sqlite3.Error, OSError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SpoolUnusable(f"the spool {folder} cannot be written: {reason}") from error
+
+
+def identity(folder: Path) -> str:
+    """What the spool in this folder is called; nothing where there is none, or its `id` is damaged."""
+    file = folder / "id"
+    told = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
+    return told if _ID.fullmatch(told) else ""
 
 
 def _has_log(file: Path) -> bool:

@@ -101,7 +101,7 @@ def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -
     )
     lost = _Lost(_WHOLE, text, tuple(sorted(robots)), None, None, {"batches": count})
     _append(store, lost, f"{spool.id}/anew", number, gone[0][1])
-    spool.anew.append(text)
+    spool.notices.append(text)
 
 
 def _append(store: Store, lost: "_Lost", writer: str, number: int, named: object) -> bool:
