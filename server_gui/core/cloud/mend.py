@@ -123,8 +123,9 @@ def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
     draft = file.with_name(f"{file.name}.draft")
     draft.unlink(missing_ok=True)
     draft.touch(FILE)
+    anew = Receipts(draft)
     for each in receipts:
-        Receipts(draft).add(each)
+        anew.add(each)
     file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.damaged").hardlink_to(file)
     draft.replace(file)
     durable.synchronise([file])

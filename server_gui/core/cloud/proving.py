@@ -1,5 +1,6 @@
 """Whether what receipts say is in the store: each batch's rows once, and as they were sent."""
 
+import itertools
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -9,19 +10,24 @@ from typing import Final
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ml.store import sums, upkeep
 from ml.store.errors import StoreError, StoreRefused, StoreUnreachable, translated
 from ml.store.fragments import DataFile
+from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt
+from server_gui.core.cloud import extents
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Mark, Part, Receipt, units_told
+from server_gui.core.recording.tally import NAMING, NUMBER, Units, named, times_us
 
 Advance = Callable[[int], object]
 AT_ONCE: Final = 4  # files
-NAMING: Final = ("connection", "stream", "seq")
+TIME: Final = "utc"
+WHOSE: Final = ("connection", "stream")
 ORIGIN: Final = ("spool", "batch")
 _OWN: Final = {each.name: each.type for each in TELEMETRY.schema}
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
@@ -31,13 +37,81 @@ _Whose = tuple[str, str | None, str | None]  # location, robot, session
 
 
 @dataclass(slots=True)
+class _Count:
+    """Rows, their sum and that of their names; of those from a claim's mark on, rows and sum alone."""
+
+    rows: int = 0
+    sum: int = 0
+    names: int = 0
+    rest_rows: int = 0
+    rest_sum: int = 0
+
+    def add(self, other: "_Count") -> None:
+        self.rows += other.rows
+        self.sum += other.sum
+        self.names += other.names
+        self.rest_rows += other.rest_rows
+        self.rest_sum += other.rest_sum
+
+
+@dataclass(slots=True)
 class _Claim:
-    """What a receipt says of rows in a table, and what is found of them."""
+    """What a receipt says of rows in a table, and what is found of them.
+
+    Where it `is_old` rows may have been removed because they were; from `rest` on all are expected.
+    """
 
     batch: Batch
     part: Part
-    rows: int = 0
-    sum: int = 0
+    is_old: bool
+    rest: Mark | None
+    found: _Count = field(default_factory=_Count)
+
+    @property
+    def expected(self) -> tuple[int, str]:
+        """How many rows, and their sum, of what `there` counts."""
+        return (
+            (self.rest.rows, self.rest.sum) if self.rest and self._went else (self.part.rows, self.part.sum)
+        )
+
+    @property
+    def there(self) -> tuple[int, str]:
+        """So many rows, and their sum."""
+        found = self.found
+        rows, total = (
+            (found.rest_rows, found.rest_sum) if self.rest and self._went else (found.rows, found.sum)
+        )
+        return rows, sums.told(total)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nobody can say what of it retention has left."""
+        return self._went and self.rest is None
+
+    @property
+    def _went(self) -> bool:
+        return self.is_old and self.found.rows < self.part.rows
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Of some rows, each one's sum, sum of its name, and time; what nobody asks for is None."""
+
+    each: sums.Sums | None
+    names: sums.Sums | None
+    times_us: npt.NDArray[np.int64]
+
+    def of(self, claim: _Claim, mine: npt.NDArray[np.intp]) -> _Count:
+        """Those of them that are the claim's."""
+        found = _Count(len(mine), _total(self.each, mine), _total(self.names, mine))
+        if claim.rest is not None:
+            left = mine[self.times_us[mine] >= claim.rest.from_us]
+            found.rest_rows, found.rest_sum = len(left), _total(self.each, left)
+        return found
+
+
+def _total(each: sums.Sums | None, mine: npt.NDArray[np.intp]) -> int:
+    return 0 if each is None else int(each[mine].sum(dtype=np.uint64))
 
 
 @dataclass(slots=True)
@@ -76,6 +150,7 @@ def prove(
     """
     proof, here = Proof(), _here(store)
     newest: dict[Batch, Receipt] = {}
+    all_here: list[Receipt] = []
     for found in receipts:
         if isinstance(found, Altered):
             proof.problems.append(f"line {found.line} of the spool's {RECEIPTS} {found.text}")
@@ -83,27 +158,36 @@ def prove(
             continue
         elif found.url == store.url or not here.isdisjoint(part.table for part in found.parts):
             newest[found.writer, found.batch] = found
+            all_here.append(found)
         else:
             proof.elsewhere += 1
-    claims = [_Claim(batch, part) for batch, each in newest.items() for part in each.parts]
-    proof.problems += _count(store, claims, files, advance, values=values)
-    retained = {location: upkeep.retained(store, location) for location in {c.part.location for c in claims}}
-    wrong = set()
+    parts = [(batch, part) for batch, each in newest.items() for part in each.parts]
+    retained = {
+        location: upkeep.retained(store, location) for location in {part.location for _, part in parts}
+    }
+    claims = [_claim(batch, part, retained[part.location]) for batch, part in parts]
+    told = units_told(all_here)
+    units = {location: store.units(location) for location in retained if location not in unknown}
+    proof.problems += _count(store, claims, files, units, advance, values=values)
+    wrong = _units_wrong(store, claims, told, units, proof)
     for claim in claims:
-        proof.seen += claim.rows
-        problem = _problem(claim, retained[claim.part.location], values=values)
+        rows = claim.found.rows
+        proof.seen += rows
+        problem = _problem(claim, values=values)
         if claim.part.location in unknown:
             wrong.add(claim.batch)
         elif problem:
             wrong.add(claim.batch)
-            if claim.rows < claim.part.rows:
+            if claim.there[0] < claim.expected[0]:
                 proof.lacking.add(claim.batch)
             proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
         else:
-            proof.rows += claim.rows
-            proof.retained += claim.part.rows - claim.rows
+            proof.rows += rows
+            proof.retained += claim.part.rows - rows
+    proof.problems += _columns_gone(store, (claim for claim in claims if claim.batch in wrong), told, units)
     for batch in wrong:
-        proof.wrong[batch] = tuple(_found(claim) for claim in claims if claim.batch == batch)
+        mine = (claim for claim in claims if claim.batch == batch)
+        proof.wrong[batch] = tuple(_found(claim, told, units) for claim in mine)
     proof.here, proof.batches = len(newest), len(newest) - len(wrong)
     return proof
 
@@ -121,10 +205,50 @@ def _here(store: Store) -> set[str]:
     return found
 
 
+def _units_wrong(
+    store: Store,
+    claims: Sequence[_Claim],
+    told: Mapping[str, Units],
+    units: Mapping[str, Units],
+    proof: Proof,
+) -> set[Batch]:
+    """Tell where a column has another unit than what was sent; the newest batch of each such table."""
+    newest = {claim.part.location: claim for claim in claims}
+    wrong = set()
+    for location, claim in newest.items():
+        there = units.get(location, {})
+        for name, unit in told.get(claim.part.table, {}).items():
+            if there.get(name, unit) != unit:
+                wrong.add(claim.batch)
+                proof.problems.append(
+                    f"{store.url}/{location}: {name} is in {there[name] or 'no unit'} there, and its values "
+                    f"were sent in {unit or 'no unit'}: bring the table's log back from a copy"
+                )
+    return wrong
+
+
+def _columns_gone(
+    store: Store, wrong: Iterable[_Claim], told: Mapping[str, Units], units: Mapping[str, Units]
+) -> Iterator[str]:
+    """Which columns these claims' tables have no more."""
+    for location, table in {claim.part.location: claim.part.table for claim in wrong}.items():
+        if gone := [name for name in told.get(table, {}) if name not in units.get(location, told[table])]:
+            yield (
+                f"{store.url}/{location} has no column {', '.join(gone)} any more: bring the table's log "
+                "back from a copy"
+            )
+
+
 def _count(
-    store: Store, claims: Sequence[_Claim], files: Sequence[DataFile], advance: Advance, *, values: bool
+    store: Store,
+    claims: Sequence[_Claim],
+    files: Sequence[DataFile],
+    units: Mapping[str, Units],
+    advance: Advance,
+    *,
+    values: bool,
 ) -> list[str]:
-    """Count what is there of each claim; which files cannot be read."""
+    """Count what is there of each claim, as who reads the tables sees it; which files cannot be read."""
     streams: dict[_Whose, list[_Claim]] = defaultdict(list)
     others: dict[str, dict[Batch, _Claim]] = defaultdict(dict)
     for claim in claims:
@@ -135,35 +259,37 @@ def _count(
             streams[part.location, whose.robot, whose.session].append(claim)
     ordered = {whose: _Streams(mine) for whose, mine in streams.items()}
 
-    def look(file: DataFile) -> Sequence["_Seen"] | str:
+    def look(file: DataFile) -> tuple[Sequence["_Seen"], list[str]]:
         mine = ordered.get((file.location, file.robot, file.session))
         theirs = others.get(file.location)
+        name = f"{store.url}/{file.location}/{file.path}"
+        told: list[str] = []
         try:
             if mine is not None:
-                return _merged(mine.seen(batch, file, values) for batch in _rows(store, file, values, NAMING))
+                rows = _rows(store, file, units[file.location], () if values else (*WHOSE, *NAMING), told)
+                return _merged(mine.seen(batch, file, values) for batch in rows), told
             if theirs:
-                return _merged(_seen(theirs, batch, values) for batch in _rows(store, file, values, ORIGIN))
+                rows = _rows(store, file, units[file.location], () if values else (*ORIGIN, *NUMBER), told)
+                return _merged(_seen(theirs, batch, values) for batch in rows), told
+            told += (f"{name}: {each}" for each in extents.differing(file, footer(store, file)))
         except StoreError as error:
-            return str(error)
+            told.append(str(error))
         except pa.ArrowException as error:
-            return f"{store.url}/{file.location}/{file.path} is not as it was written: {error}"
+            told.append(f"{name} is not as it was written: {error}")
         finally:
             advance(1)
-        return ()
+        return (), told
 
     with ThreadPoolExecutor(AT_ONCE, "prove") as pool:
         problems: list[str] = []
-        for seen in pool.map(look, files):
-            if isinstance(seen, str):
-                problems.append(seen)
-                continue
-            for claim, rows, total in seen:
-                claim.rows += rows
-                claim.sum += total
+        for seen, told in pool.map(look, files):
+            problems += told
+            for claim, found in seen:
+                claim.found.add(found)
     return problems
 
 
-_Seen = tuple[_Claim, int, int]  # rows of it, their sum
+_Seen = tuple[_Claim, _Count]
 
 
 def _merged(found: Iterable[Sequence[_Seen]]) -> Sequence[_Seen]:
@@ -171,11 +297,19 @@ def _merged(found: Iterable[Sequence[_Seen]]) -> Sequence[_Seen]:
     return [seen for batch in found for seen in batch]
 
 
-def _rows(store: Store, file: DataFile, values: bool, naming: Sequence[str]) -> Iterator[pa.RecordBatch]:
+def _rows(
+    store: Store, file: DataFile, known: Units, naming: Sequence[str], told: list[str]
+) -> Iterator[pa.RecordBatch]:
+    """These columns and the times, or all that the table knows; `told` hears which times are not as said."""
     name = f"{file.location}/{file.path}"
     with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
-        for batch in pq.ParquetFile(opened).iter_batches(columns=None if values else list(naming)):
+        parquet, extent = pq.ParquetFile(opened), extents.Seen()
+        there = [each for each in parquet.schema_arrow.names if each in known]
+        for batch in parquet.iter_batches(columns=[*naming, TIME] if naming else there):
+            extent.add(batch)
             yield _plain(batch)
+        wrong = itertools.chain(extent.differing(parquet.metadata), extents.differing(file, parquet.metadata))
+        told += (f"{store.url}/{name}: {each}" for each in wrong)
 
 
 def _plain(batch: pa.RecordBatch) -> pa.RecordBatch:
@@ -201,7 +335,9 @@ class _Streams:
 
     def seen(self, batch: pa.RecordBatch, file: DataFile, values: bool) -> Sequence[_Seen]:
         """What these rows of a file are of each claim."""
-        connections, streams, seqs = (batch[name].to_numpy(zero_copy_only=False) for name in NAMING)
+        connections, streams, seqs = (
+            batch[name].to_numpy(zero_copy_only=False) for name in (*WHOSE, NAMING[0])
+        )
         found: list[_Seen] = []
         for connection in batch["connection"].unique().to_pylist():
             mine = connections == connection
@@ -210,7 +346,7 @@ class _Streams:
                 claims = self._claims.get((connection, stream))
                 if claims:
                     same = {"robot": str(file.robot), "session": str(file.session), "connection": connection}
-                    each = _sums(batch.take(pa.array(rows)), same) if values else None
+                    each = _told(batch.take(pa.array(rows)), same, values)
                     found += _shared(claims, self._firsts[connection, stream], seqs[rows], each)
         return found
 
@@ -219,7 +355,7 @@ def _shared(
     claims: Sequence[_Claim],
     firsts: np.ndarray[tuple[int], np.dtype[np.int64]],
     seqs: np.ndarray[tuple[int], np.dtype[np.int64]],
-    each: sums.Sums | None,
+    each: _Rows,
 ) -> Iterator[_Seen]:
     """Rows of one stream among the claims on it, each of which begins with one of `firsts`."""
     places = np.searchsorted(firsts, seqs, "right") - 1
@@ -227,7 +363,13 @@ def _shared(
         claim = claims[place]
         stream = claim.part.stream
         rows = (places == place) & (seqs <= (stream.last if stream else 0))
-        yield claim, int(rows.sum()), 0 if each is None else int(each[rows].sum(dtype=np.uint64))
+        yield claim, each.of(claim, np.flatnonzero(rows))
+
+
+def _told(batch: pa.RecordBatch, same: Mapping[str, str], values: bool) -> _Rows:
+    """Of rows of telemetry."""
+    each, names = (_sums(batch, same), None) if values else (None, named(batch, NAMING))
+    return _Rows(each, names, times_us(batch[TIME]))
 
 
 def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> sums.Sums:
@@ -239,39 +381,56 @@ def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> sums.Sums:
 
 def _seen(claims: Mapping[Batch, _Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
     """What these rows of another table are of each claim."""
-    each = sums.of_rows(pa.Table.from_batches([batch])).tolist() if values else [0] * batch.num_rows
-    names = zip(batch["spool"].to_pylist(), batch["batch"].to_pylist(), strict=True)
+    each = sums.of_rows(pa.Table.from_batches([batch])) if values else None
+    rows = _Rows(each, None if values else named(batch, NUMBER), times_us(batch[TIME]))
     found: dict[Batch, list[int]] = defaultdict(list)
-    for name, total in zip(names, each, strict=True):
+    for place, name in enumerate(zip(*(batch[column].to_pylist() for column in ORIGIN), strict=True)):
         if name in claims:
-            found[name].append(total)
-    return [(claims[name], len(mine), sum(mine)) for name, mine in found.items()]
+            found[name].append(place)
+    return [(claims[name], rows.of(claims[name], np.array(mine))) for name, mine in found.items()]
 
 
-def _found(claim: _Claim) -> Part:
+def _found(claim: _Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> Part:
     """What is there of a claim, as its receipt would say it."""
-    return msgspec.structs.replace(claim.part, rows=claim.rows, sum=sums.told(claim.sum))
+    part, there = claim.part, units.get(claim.part.location, {})
+    return msgspec.structs.replace(
+        part,
+        rows=claim.found.rows,
+        sum=sums.told(claim.found.sum),
+        names="",
+        marks=(),
+        units={name: there[name] for name in told.get(part.table, {}) if name in there},
+    )
 
 
 def _first(claim: _Claim) -> int:
     return claim.part.stream.first if claim.part.stream else 0
 
 
-def _problem(claim: _Claim, retained: datetime | None, *, values: bool) -> str | None:
+def _claim(batch: Batch, part: Part, retained: datetime | None) -> _Claim:
+    old = retained is not None and part.begin_us is not None and _time(part.begin_us) < retained
+    marks = (mark for mark in part.marks if retained is not None and _time(mark.from_us) >= retained)
+    return _Claim(batch, part, old, next(marks, None) if old else None)
+
+
+def _problem(claim: _Claim, *, values: bool) -> str | None:
     """What is wrong with the rows of a claim, in words."""
     part, (writer, batch) = claim.part, claim.batch
-    whole = claim.rows == part.rows and (not values or sums.told(claim.sum) == part.sum)
-    old = retained is not None and part.begin_us is not None and _time(part.begin_us) < retained
-    if whole or (old and claim.rows < part.rows):
+    (sent, total), (rows, found) = claim.expected, claim.there
+    if claim.is_open:
         return None
     whose = f"batch {batch} of {writer}"
     if part.stream is not None:
         whose += f", {part.stream.robot}, session {part.stream.session}, stream {part.stream.stream}"
-    if claim.rows < part.rows:
-        return f"{part.rows - claim.rows} of {part.rows} rows are missing ({whose})"
-    if claim.rows > part.rows:
-        return f"{claim.rows - part.rows} rows more than the {part.rows} that were sent: doubled ({whose})"
-    return f"the {part.rows} rows are not as they were sent: altered ({whose})"
+    if rows < sent:
+        return f"{sent - rows} of {sent} rows are missing ({whose})"
+    if rows > sent:
+        return f"{rows - sent} rows more than the {sent} that were sent: doubled ({whose})"
+    if values and found != total:
+        return f"the {sent} rows are not as they were sent: altered ({whose})"
+    if not values and part.names and rows == part.rows and sums.told(claim.found.names) != part.names:
+        return f"of the {sent} rows some are missing and as many others doubled or renamed ({whose})"
+    return None
 
 
 def _time(us: int) -> datetime:

@@ -34,10 +34,19 @@ class Stream(msgspec.Struct, frozen=True):
     last: int
 
 
+class Mark(msgspec.Struct, frozen=True, array_like=True):
+    """So many rows of a part, with this sum, are from a time on; in µs since 1970."""
+
+    from_us: int
+    rows: int
+    sum: str
+
+
 class Part(msgspec.Struct, frozen=True, omit_defaults=True):
     """Rows of a batch in one table; of telemetry, those of one stream. `sum` is as `ml.store.sums` makes it.
 
-    Their times are from `begin_us` to `end_us`, in µs since 1970; None where they have none.
+    Their times are from `begin_us` to `end_us`, in µs since 1970; None where they have none. Receipts from
+    before have none of what follows `stream`.
     """
 
     location: str
@@ -47,6 +56,9 @@ class Part(msgspec.Struct, frozen=True, omit_defaults=True):
     begin_us: int | None = None
     end_us: int | None = None
     stream: Stream | None = None
+    names: str = ""  # the sum of what names the rows alone
+    marks: tuple[Mark, ...] = ()  # so that what retention has left can be counted
+    units: dict[str, str | None] = {}  # of columns of its table, as no receipt before it has told them
 
 
 class Receipt(msgspec.Struct, frozen=True):
@@ -75,7 +87,7 @@ class Receipts:
 
     def __init__(self, file: Path) -> None:
         self.file = file
-        self._tables: dict[str, dict[str, str]] | None = None  # of each store; None: nobody has looked yet
+        self._known: _Known | None = None  # None: nobody has looked yet
 
     def add(self, receipt: Receipt) -> None:
         """Write it; on the disk when this returns.
@@ -84,8 +96,9 @@ class Receipts:
             SpoolUnusable: it could not be written.
 
         """
-        body = msgspec.json.encode(receipt)[1:]
         try:
+            seen = self._seen()
+            body = msgspec.json.encode(seen.briefly(receipt))[1:]
             known = self.file.exists()
             with open(self.file, "ab+", opener=opener) as out:
                 whole, lines = _tail(out.fileno())
@@ -96,21 +109,23 @@ class Receipts:
                 os.fsync(out.fileno())
             if not known:
                 _sync(self.file.parent)
-            if self._tables is not None:
-                _see(self._tables, receipt)
+            seen.add(receipt)
         except OSError as error:
             reason = error.strerror or error
             raise SpoolUnusable(f"the spool's receipts {self.file} cannot be written: {reason}") from error
 
     def begun_anew(self, url: str, parts: Iterable[Part]) -> dict[str, str]:
         """Where others went to another table than these parts: the location, and what that was called."""
-        if self._tables is None:
-            self._tables = {}
-            for receipt in self.whole():
-                _see(self._tables, receipt)
-        known = self._tables.get(url, {})
+        known = self._seen().tables.get(url, {})
         now = ((part.location, part.table) for part in parts)
         return {where: known[where] for where, table in now if known.get(where, table) != table}
+
+    def _seen(self) -> "_Known":
+        if self._known is None:
+            self._known = _Known()
+            for receipt in self.whole():
+                self._known.add(receipt)
+        return self._known
 
     def whole(self) -> Iterator[Receipt]:
         """Those that are as they were written, oldest first."""
@@ -140,13 +155,43 @@ class Receipts:
             return
 
 
-def _see(tables: dict[str, dict[str, str]], receipt: Receipt) -> None:
-    """What the store's tables are called now; where one was begun anew, the others may be, too."""
-    now = {part.location: part.table for part in receipt.parts if part.rows}
-    known = tables.setdefault(receipt.url, {})
-    if any(known.get(where, table) != table for where, table in now.items()):
-        known.clear()
-    known |= now
+def units_told(receipts: Iterable[Receipt]) -> dict[str, dict[str, str | None]]:
+    """Of each table, by its id, which units its columns had, as the newest receipt that tells it has it."""
+    known = _Known()
+    for receipt in receipts:
+        known.add(receipt)
+    return known.units
+
+
+class _Known:
+    """What receipts have told of stores and tables, together."""
+
+    def __init__(self) -> None:
+        self.tables: dict[str, dict[str, str]] = {}  # of a store: location → id
+        self.units: dict[str, dict[str, str | None]] = {}  # of a table's id: column → unit
+
+    def add(self, receipt: Receipt) -> None:
+        """What the store's tables are called now; where one was begun anew, the others may be, too."""
+        now = {part.location: part.table for part in receipt.parts if part.rows}
+        known = self.tables.setdefault(receipt.url, {})
+        if any(known.get(where, table) != table for where, table in now.items()):
+            known.clear()
+        known |= now
+        for part in receipt.parts:
+            if part.units:
+                self.units.setdefault(part.table, {}).update(part.units)
+
+    def briefly(self, receipt: Receipt) -> Receipt:
+        """The receipt without units that were told already."""
+        parts = [
+            msgspec.structs.replace(part, units=self._new(part)) if part.units else part
+            for part in receipt.parts
+        ]
+        return msgspec.structs.replace(receipt, parts=tuple(parts))
+
+    def _new(self, part: Part) -> dict[str, str | None]:
+        known = self.units.get(part.table, {})
+        return {name: unit for name, unit in part.units.items() if known.get(name, ...) != unit}
 
 
 def _read(line: bytes, before: int) -> Receipt | str:

@@ -193,7 +193,7 @@ def _telemetry(
     if not store.append(TELEMETRY, location, columns.schema, batches, writer, segment.number):
         look = functools.partial(lacking.of_telemetry, store, location)
         _complete(store, TELEMETRY, location, writer, segment.number, lambda: look(batches()))
-    return tally.parts(location, store.identity(location))
+    return tally.parts(location, store.identity(location), _units(store, location, columns.schema))
 
 
 def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -> Part:
@@ -201,7 +201,14 @@ def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -
     if not store.append(table, table.name, data.schema, again, writer, batch):
         look = functools.partial(lacking.of_rows, store, table, data)
         _complete(store, table, table.name, writer, batch, lambda: look().to_batches())
-    return tallied(data, table.name, store.identity(table.name))
+    units = _units(store, table.name, data.schema)
+    return tallied(data, table.name, store.identity(table.name), units)
+
+
+def _units(store: Store, location: str, schema: pa.Schema) -> dict[str, str | None]:
+    """Of these columns, as the table has them."""
+    found = store.units(location)
+    return {name: found[name] for name in schema.names if name in found}
 
 
 def _complete(

@@ -3,8 +3,10 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import sqlite3
+import zlib
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -146,6 +148,51 @@ def event_altered(place: Place) -> None:
     rewrite(place.files("events")[0], lambda rows: replaced(rows, "kind", pa.array(["marker"] * len(rows))))
 
 
+def in_the_log(change: Callable[[str], str]) -> Callable[[Place], None]:
+    """Other text in the entries of the telemetry's log."""
+
+    def damage(place: Place) -> None:
+        before = [entry.read_text() for entry in place.log()]
+        for entry, text in zip(place.log(), before, strict=True):
+            entry.write_text(change(text))
+        assert before != [entry.read_text() for entry in place.log()]
+
+    return damage
+
+
+def unit_altered(text: str) -> str:
+    return text.replace(r"\"unit\":\"rad\"", r"\"unit\":\"deg\"")
+
+
+def column_removed(text: str) -> str:
+    lines = [json.loads(line) for line in text.splitlines()]
+    for line in lines:
+        if "metaData" in line:
+            schema = json.loads(line["metaData"]["schemaString"])
+            schema["fields"] = [each for each in schema["fields"] if each["name"] != KNEE]
+            line["metaData"]["schemaString"] = json.dumps(schema)
+    return "".join(f"{json.dumps(line)}\n" for line in lines)
+
+
+def last_time_altered(text: str) -> str:
+    return re.sub(r'(\\"maxValues\\": ?\{[^}]*?\\"utc\\": ?\\")2', r"\g<1>1", text)
+
+
+def first_stamp_altered(text: str) -> str:
+    return re.sub(r'(\\"minValues\\": ?\{[^}]*?\\"stamp_ns\\": ?)5', r"\g<1>4", text)
+
+
+def time_in_the_footer_altered(place: Place) -> None:
+    """Of the file's own statistics, by which readers leave out rows."""
+    file = place.files()[0]
+    last = pq.read_table(file, partitioning=None)["utc"].cast(pa.int64()).to_pylist()[-1]
+    content = file.read_bytes()
+    begin = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    footer = content[begin:].replace(last.to_bytes(8, "little"), (last - 50_000).to_bytes(8, "little"))
+    assert footer != content[begin:]
+    file.write_bytes(content[:begin] + footer)
+
+
 def log_rolled_back(place: Place) -> None:
     place.log()[-1].unlink()
 
@@ -259,6 +306,11 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (of_file(misplaced), "altered (batch"),
     (of_file(nulled), "altered (batch"),
     (event_altered, "/events: the 2 rows are not as they were sent: altered (batch"),
+    (in_the_log(unit_altered), f"{KNEE} is in deg there, and its values were sent in rad"),
+    (in_the_log(column_removed), f"/telemetry/000 has no column {KNEE} any more"),
+    (in_the_log(last_time_altered), "the table's log says that utc goes from "),
+    (in_the_log(first_stamp_altered), "the table's log says that stamp_ns goes from 4"),
+    (time_in_the_footer_altered, "its own statistics say that utc goes from "),
     (log_rolled_back, "/telemetry/000: 100 of 100 rows are missing (batch 3 of "),
     (log_entry_missing, "/telemetry/000"),
     (
@@ -340,6 +392,72 @@ def test_counting_alone_finds_what_is_missing_and_not_what_is_altered(place: Pla
     assert place.verify("--quick") == (0, "")
     row_removed(place)
     assert "1 of 100 rows are missing" in place.verify("--quick")[1]
+
+
+def test_counting_alone_finds_a_row_that_is_there_twice_in_the_place_of_another(place: Place) -> None:
+    of_file(lambda rows: rows.take(pa.array([0, 0, *range(2, len(rows))])))(place)
+    assert "of the 100 rows some are missing and as many others doubled" in place.verify("--quick")[1]
+    rewrite(
+        place.files("events")[0], lambda rows: replaced(rows, "number", pa.array([7] * len(rows), pa.int64()))
+    )
+    assert "/events: of the 2 rows some are missing" in place.verify("--quick")[1]
+
+
+def test_what_is_younger_than_retention_is_missed_also_of_a_batch_that_is_partly_older(place: Place) -> None:
+    store = Store(place.url)
+    rows = store.dataset("telemetry/000").to_table(columns=["robot", "utc"]).to_pylist()
+    before = sorted(row["utc"] for row in rows if row["robot"] == "exo-02")[1]
+    retain(store, [TELEMETRY], before)
+    assert place.verify() == place.verify("--quick") == (0, "")
+    Store(place.url).table("telemetry/000").delete("robot = 'exo-02' AND seq = 15 AND row = 1")
+    assert "1 of " in place.verify()[1]
+    assert "rows are missing (batch 3 of " in place.verify("--quick")[1]
+
+
+def test_an_altered_value_is_found_in_what_retention_has_left_of_a_batch(place: Place) -> None:
+    store = Store(place.url)
+    rows = store.dataset("telemetry/000").to_table(columns=["robot", "utc"]).to_pylist()
+    retain(store, [TELEMETRY], sorted(row["utc"] for row in rows if row["robot"] == "exo-02")[1])
+    where = "robot = 'exo-02' AND seq = 15 AND row = 1"
+    Store(place.url).table("telemetry/000").update(updates={f'"{KNEE}"': "7.0"}, predicate=where)
+    assert "rows are not as they were sent: altered (batch 3 of " in place.verify()[1]
+
+
+def without_what_is_new(place: Place) -> None:
+    """Receipts as they were written before they had names, marks and units."""
+    file, lines = place.spool / RECEIPTS, b""
+    crc = 0
+    for line in file.read_bytes().splitlines():
+        told = json.loads(line)
+        parts = [
+            {name: value for name, value in part.items() if name not in ("names", "marks", "units")}
+            for part in told["parts"]
+        ]
+        assert parts != told["parts"]
+        body = json.dumps(
+            {name: told[name] for name in ("writer", "batch", "url")} | {"parts": parts, "lost": []}
+        )
+        crc = zlib.crc32(body[1:].encode(), crc)
+        lines += b'{"crc":"%08x",' % crc + body[1:].encode() + b"\n"
+    file.write_bytes(lines)
+
+
+def test_receipts_from_before_are_believed_and_prove_what_they_tell(place: Place) -> None:
+    without_what_is_new(place)
+    assert place.verify() == place.verify("--quick") == place.verify("--deep") == (0, "")
+    record(place.url, place.spool)
+    assert place.verify() == place.verify("--quick") == (0, "")
+    of_file(altered)(place)
+    row_removed(place)
+    assert "altered (batch" in place.verify()[1]
+    assert "1 of 100 rows are missing (batch 3 of " in place.verify()[1]
+
+
+def test_a_unit_that_was_accepted_is_told_no_more(place: Place) -> None:
+    in_the_log(unit_altered)(place)
+    assert place.verify("--quick")[0] == 1
+    place.told("mend", "--accept-loss", "--yes")
+    assert place.verify() == (0, "")
 
 
 def test_what_went_because_it_was_old_is_not_missed(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
