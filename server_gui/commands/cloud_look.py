@@ -80,6 +80,12 @@ def verify(argv: list[str]) -> int:
 
 def _verify(arguments: argparse.Namespace) -> int:
     mine = spool(arguments)
+    if arguments.url is None and not mine.exists():
+        raise SpoolUnusable(
+            f"there is no spool at {mine}, so nobody can say here whether rows are missing: bring it back "
+            "from a copy; where nothing was ever recorded on this computer, gwrms cloud verify "
+            f"{url(arguments)} looks at the files alone"
+        )
     try:
         store = reach(arguments)
     except NoSuchTable:

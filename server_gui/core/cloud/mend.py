@@ -107,7 +107,7 @@ def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMa
         gone = {(file.location, file.path) for file in broken}
         sound = [file for file in found if (file.location, file.path) not in gone]
         proof = prove(store, receipts, sound, advance)
-    whole = [each for each in receipts if isinstance(each, Receipt)]
+    whole = verify.own_receipts(receipts, spool.folder)
     if len(whole) < len(receipts):
         _rewrite(spool.folder / RECEIPTS, whole)
     for (writer, number), parts in sorted(proof.wrong.items()):

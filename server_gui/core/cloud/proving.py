@@ -21,7 +21,17 @@ from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from server_gui.core.cloud import extents
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Mark, Part, Receipt, units_told
+from server_gui.core.recording.receipts import (
+    RECEIPTS,
+    Altered,
+    Mark,
+    Part,
+    Receipt,
+    canonical,
+    is_of_batch,
+    units_told,
+    went_to,
+)
 from server_gui.core.recording.tally import NAMING, NUMBER, Units, named, times_us
 
 Advance = Callable[[int], object]
@@ -148,7 +158,10 @@ def prove(
         StoreUnreachable, StoreRefused: it could not be looked.
 
     """
-    proof, here = Proof(), _here(store)
+    receipts = list(receipts)
+    proof, here = Proof(), tables(store)
+    sent_here = went_to((each for each in receipts if isinstance(each, Receipt)), store.url)
+    here |= {part.table for each in sent_here for part in each.parts}
     newest: dict[Batch, Receipt] = {}
     all_here: list[Receipt] = []
     for found in receipts:
@@ -156,7 +169,9 @@ def prove(
             proof.problems.append(f"line {found.line} of the spool's {RECEIPTS} {found.text}")
         elif not found.parts:  # nothing of the batch could be sent
             continue
-        elif found.url == store.url or not here.isdisjoint(part.table for part in found.parts):
+        elif canonical(found.url) == canonical(store.url) or not here.isdisjoint(
+            part.table for part in found.parts
+        ):
             newest[found.writer, found.batch] = found
             all_here.append(found)
         else:
@@ -178,7 +193,7 @@ def prove(
             wrong.add(claim.batch)
         elif problem:
             wrong.add(claim.batch)
-            if claim.there[0] < claim.expected[0]:
+            if claim.there[0] < claim.expected[0] and is_of_batch(claim.batch[0]):
                 proof.lacking.add(claim.batch)
             proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
         else:
@@ -192,7 +207,7 @@ def prove(
     return proof
 
 
-def _here(store: Store) -> set[str]:
+def tables(store: Store) -> set[str]:
     """What the store's tables are called for ever."""
     found = set()
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):

@@ -4,12 +4,14 @@ A line of JSON a batch, synchronised before the spool lets go of the batch. Each
 that follows in it and of the CRC before it, so a line that was altered, taken out or put in is found.
 """
 
+import functools
 import os
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+from urllib.parse import unquote, urlsplit
 
 import msgspec
 
@@ -17,6 +19,9 @@ from ml.store.private import opener
 from server_gui.core.recording.errors import SpoolUnusable
 
 RECEIPTS: Final = "receipts.jsonl"
+LOST: Final = "lost"  # the writer of events that tell of batches which are lost, after the spool's id
+ANEW: Final = "anew"  # and of those that tell of a store which was begun anew
+EVENT_WRITERS: Final = (LOST, ANEW)
 _HEAD: Final = '{"crc":"%08x",'
 _LENGTH: Final = len(_HEAD % 0)
 _TAIL_BYTES: Final = 1 << 20  # of the file, that are read to find its last lines at first
@@ -70,6 +75,21 @@ class Receipt(msgspec.Struct, frozen=True):
     parts: tuple[Part, ...]
     lost: tuple[str, ...] = ()
 
+    @property
+    def spool(self) -> str:
+        """The id of the spool that it is of."""
+        return self.writer.partition("/")[0]
+
+    @property
+    def is_of_batch(self) -> bool:
+        """Whether it is of a batch itself, and not of an event that tells something of one."""
+        return is_of_batch(self.writer)
+
+
+def is_of_batch(writer: str) -> bool:
+    """Whether that is who brings batches to a store, and not events that tell something of them."""
+    return writer.partition("/")[2] not in EVENT_WRITERS
+
 
 @dataclass(frozen=True, slots=True)
 class Altered:
@@ -116,7 +136,7 @@ class Receipts:
 
     def begun_anew(self, url: str, parts: Iterable[Part]) -> dict[str, str]:
         """Where others went to another table than these parts: the location, and what that was called."""
-        known = self._seen().tables.get(url, {})
+        known = self._seen().tables.get(canonical(url), {})
         now = ((part.location, part.table) for part in parts)
         return {where: known[where] for where, table in now if known.get(where, table) != table}
 
@@ -132,7 +152,7 @@ class Receipts:
         return (each for each in self.all() if isinstance(each, Receipt))
 
     def newest(self) -> Receipt | None:
-        """The last one that is as it was written and follows the line before it."""
+        """The last one of a batch that is as it was written and follows the line before it."""
         try:
             with self.file.open("rb") as opened:
                 _, lines = _tail(opened.fileno())
@@ -140,7 +160,7 @@ class Receipts:
             return None
         pairs = zip(reversed(lines[1:]), reversed(lines[:-1]), strict=True)
         found = (_read(line, _stated(before)) for line, before in pairs)
-        return next((each for each in found if isinstance(each, Receipt)), None)
+        return next((each for each in found if isinstance(each, Receipt) and each.is_of_batch), None)
 
     def all(self) -> Iterator[Receipt | Altered]:
         """Each line, oldest first."""
@@ -153,6 +173,26 @@ class Receipts:
                     yield Altered(number, found) if isinstance(found, str) else found
         except FileNotFoundError:
             return
+
+
+@functools.lru_cache(100)
+def canonical(url: str) -> str:
+    """A store's URL in one spelling."""
+    parts = urlsplit(url)
+    if parts.scheme == "file":
+        return Path("/" + os.path.normpath(unquote(parts.path)).lstrip("/")).as_uri()
+    return f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}"
+
+
+def went_to(receipts: Iterable[Receipt], url: str) -> list[Receipt]:
+    """Those of what went to this store; however its URL is spelled, and before it was moved there."""
+    all_, wanted = list(receipts), canonical(url)
+    tables = {part.table for each in all_ if canonical(each.url) == wanted for part in each.parts}
+    return [
+        each
+        for each in all_
+        if canonical(each.url) == wanted or not tables.isdisjoint(part.table for part in each.parts)
+    ]
 
 
 def units_told(receipts: Iterable[Receipt]) -> dict[str, dict[str, str | None]]:
@@ -173,7 +213,7 @@ class _Known:
     def add(self, receipt: Receipt) -> None:
         """What the store's tables are called now; where one was begun anew, the others may be, too."""
         now = {part.location: part.table for part in receipt.parts if part.rows}
-        known = self.tables.setdefault(receipt.url, {})
+        known = self.tables.setdefault(canonical(receipt.url), {})
         if any(known.get(where, table) != table for where, table in now.items()):
             known.clear()
         known |= now

@@ -244,7 +244,7 @@ class Spool:
     def _settle(self, found: set[int], gone: set[int]) -> None:
         """Tell nothing of those that have a receipt, nor where a receipt that is damaged may be of them."""
         lines = list(self.receipts.all())
-        known = {each.batch for each in lines if isinstance(each, Receipt)}
+        known = {each.batch for each in lines if isinstance(each, Receipt) and each.is_of_batch}
         altered = [each.line for each in lines if isinstance(each, Altered)]
         if altered and (doubtful := sorted((found & gone) - known)):
             self._notice(

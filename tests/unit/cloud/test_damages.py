@@ -21,6 +21,7 @@ from gateway.main import main
 from ml.store import Store
 from ml.store.tables import RESOURCES, TABLES, TELEMETRY
 from ml.store.upkeep import compact, pin, retain, vacuum
+from server_gui.core.cloud import spooled, verify
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.recorder import Recorder
@@ -296,6 +297,32 @@ def segment_removed(place: Place) -> None:
     (place.spool / "00000004.db").unlink()
 
 
+def receipts_of_another_spool(place: Place) -> None:
+    other = place.spool.with_name("other")
+    for _ in range(3):
+        record((place.spool.with_name("another")).as_uri(), other, "exo-09")
+    (place.spool / RECEIPTS).write_bytes((other / RECEIPTS).read_bytes())
+
+
+def id_of_another_spool(place: Place) -> None:
+    (place.spool / "id").write_text("00000000-0000-4000-8000-000000000000\n")
+
+
+def id_emptied(place: Place) -> None:
+    (place.spool / "id").write_bytes(b"")
+
+
+def id_garbled(place: Place) -> None:
+    (place.spool / "id").write_bytes(b"\xff\n")
+
+
+def loss_untold(place: Place) -> None:
+    """The event goes that says what was lost."""
+    segment_removed(place)
+    assert "batch 4 of the spool" in place.told("upload")
+    Store(place.url).table("events").delete("kind = 'lost'")
+
+
 DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (file_deleted, "is not there, with 100 rows"),
     (file_cut_off, "bytes instead of"),
@@ -333,6 +360,12 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (segment_damaged, "00000004.damaged.db was set aside: 5 rows of exo-01, stream 1 from notification 7 on"),
     (segment_unreadable, "00000004.damaged.db was set aside: what batch 4 held is not in the store"),
     (segment_removed, "batch 4 of the spool"),
+    (receipts_of_another_spool, f"{RECEIPTS} are of another spool"),
+    (receipts_of_another_spool, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
+    (id_of_another_spool, "3 receipts in "),
+    (id_emptied, "id is damaged: bring it back from a copy"),
+    (id_garbled, "id is damaged: bring it back from a copy"),
+    (loss_untold, "/events: 2 of 2 rows are missing (batch 4 of "),
 ]
 
 
@@ -491,6 +524,72 @@ def test_what_went_to_another_store_is_not_missed_here(place: Place, tmp_path: P
     record((tmp_path / "other").as_uri(), place.spool)
     assert place.verify() == (0, "")
     assert place.verify((tmp_path / "other").as_uri()) == (0, "")
+
+
+def test_a_store_that_was_moved_and_then_lost_is_missed(place: Place) -> None:
+    old, moved = place.url, place.store.with_name("moved")
+    assert "files copied" in place.told("upload", moved.as_uri(), "--from", old)
+    assert place.verify(moved.as_uri()) == (0, "")
+    shutil.rmtree(moved)
+    assert "there is no store" in place.verify(moved.as_uri())[1]
+    assert "3 batches of the spool" in place.verify(f"{moved.as_uri()}/")[1]
+    record(moved.as_uri(), place.spool, "exo-07")
+    assert "/telemetry/000: 100 of 100 rows are missing (batch 1 of " in place.verify(moved.as_uri())[1]
+    assert place.verify(old)[1].count("rows are missing") == 0
+
+
+@pytest.mark.parametrize("spelled", ["{}/", "{}/.", "%73tore"])
+def test_a_store_is_the_same_however_its_url_is_spelled(place: Place, spelled: str) -> None:
+    url = spelled.format(place.url) if "{" in spelled else place.url.removesuffix("store") + spelled
+    shutil.rmtree(place.store)
+    assert "3 batches of the spool" in place.verify(url)[1]
+
+
+def test_a_loss_whose_event_has_gone_is_told_again(place: Place) -> None:
+    loss_untold(place)
+    place.told("upload")
+    assert "rows are missing" not in place.verify()[1]
+    events = Store(place.url).dataset("events").to_table()
+    assert events["kind"].to_pylist().count("lost") == 2
+
+
+def test_where_the_spool_is_gone_nobody_can_judge_and_files_alone_are_looked_at_by_url(place: Place) -> None:
+    shutil.rmtree(place.spool)
+    status, problems = place.verify()
+    assert status == 2
+    assert "there is no spool at" in problems
+    assert place.verify(place.url) == (0, "")
+
+
+def test_a_batch_that_goes_to_the_store_while_somebody_looks_is_no_problem(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record(place.url, place.spool, sent=False)
+    listed = verify.receipts_of
+
+    def late(spool: Path) -> Any:
+        found = listed(spool)
+        with Spool(place.spool, reserve_bytes=0) as opened:
+            for number in opened.waiting():
+                send(opened, number, Store(place.url))
+        return found
+
+    monkeypatch.setattr(verify, "receipts_of", late)
+    assert list(verify.batches_missing(Store(place.url), place.spool)) == []
+
+
+def test_a_second_copy_that_goes_while_somebody_looks_is_no_problem(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = spooled.uploaded
+
+    def late(spool: Path) -> list[int]:
+        found = listed(spool)
+        (spool / "00000001.uploaded.db").unlink(missing_ok=True)
+        return found
+
+    monkeypatch.setattr(spooled, "uploaded", late)
+    assert place.verify() == (0, "")
 
 
 def test_where_nobody_can_look_the_exit_status_says_so(place: Place, tmp_path: Path) -> None:
