@@ -20,7 +20,8 @@ from ml.store.private import FILE
 from ml.store.store import Store
 from server_gui.core.cloud import verify
 from server_gui.core.cloud.again import Again, Untouched, Whose, whose
-from server_gui.core.cloud.proving import Advance, Batch, Proof, prove
+from server_gui.core.cloud.counting import Advance, Batch
+from server_gui.core.cloud.proving import Proof, prove
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt, Receipts
 from server_gui.core.recording.segment import Segment
@@ -68,9 +69,9 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
     said = [Receipt(*batch, store.url, parts) for batch, parts in held.items()]
     broken, proof = _look(store, [*receipts, *said], expect, values=False)
     broken = [*broken, *proof.misread]
-    lacking = proof.lacking
+    lacking = set(proof.lacking)
     if broken or mending.taken_out(store)[0]:  # nobody can count what files held of these
-        lacking = lacking | proof.shortened
+        lacking |= {batch for batch, _ in proof.vague}
     again = {number for number, batch in copies.items() if batch in lacking} | unproven
     if broken:
         held |= _held(store, spool, {number for _, number in lacking} - unproven)
@@ -83,7 +84,8 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
     staying = [file for file in broken if whose(file) in kept]
     going = [file for file in broken if whose(file) not in kept]
     open_ = {batch for batch, part, _ in proof.missing if whose(part) not in kept}
-    behind = {batch for batch, part, _ in proof.missing if whose(part) in kept}
+    missing = [*((batch, part) for batch, part, _ in proof.missing), *proof.vague]
+    behind = {batch for batch, part in missing if whose(part) in kept}
     now = {number for number in again if copies[number] in open_ or copies[number] not in behind}
     lost += [_told(store, file) for file in staying]
     later = sorted(number for number in again if copies[number] in behind)
@@ -160,12 +162,12 @@ def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMa
     """
     receipts = verify.receipts_of(spool.folder)
     broken, proof = _look(store, receipts, expect, values=True)
-    if broken:
+    for file in (*broken, *proof.misread):
         raise StoreError(
-            f"nothing was accepted: {store.url}/{broken[0].location}/{broken[0].path} is damaged or gone; "
-            "run gwrms cloud mend again"
+            f"nothing was accepted: {store.url}/{file.location}/{file.path} is damaged or gone; bring it "
+            "back from a copy, or run gwrms cloud mend again"
         )
-    whole = [each for each in receipts if isinstance(each, Receipt)]
+    whole = verify.own_receipts(receipts, spool.folder)
     if len(whole) < len(receipts):
         _rewrite(spool.folder / RECEIPTS, whole)
     for (writer, number), parts in sorted(proof.wrong.items()):
@@ -197,8 +199,9 @@ def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
     draft = file.with_name(f"{file.name}.draft")
     draft.unlink(missing_ok=True)
     draft.touch(FILE)
+    anew = Receipts(draft)
     for each in receipts:
-        Receipts(draft).add(each)
+        anew.add(each)
     file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.damaged").hardlink_to(file)
     draft.replace(file)
     durable.synchronise([file])

@@ -27,7 +27,7 @@ from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Receipts, went_to
 
 _US: Final = timedelta(microseconds=1)
 Row = dict[str, Any]
@@ -96,7 +96,7 @@ class Recordings:
             receipts = list(Receipts(self._spool / RECEIPTS).whole())
         except OSError:  # nobody can say, and that the spool cannot be read is told besides
             return None
-        sent = [each for each in receipts if each.url == self._store.url]
+        sent = went_to(receipts, self._store.url)
         wanted = {part.location for each in sent for part in each.parts if part.stream and part.rows}
         lost = [location for location in sorted(wanted) if not self._is_there(location)]
         return (

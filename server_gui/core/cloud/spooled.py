@@ -19,6 +19,7 @@ from ml.store.tables import SESSIONS
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
 from server_gui.core.recording.segment import DATA, is_sound, translated, unaltered
+from server_gui.core.recording.spool_files import identity
 
 _NUMBER: Final = "[0-9]" * 8
 _decoder = msgspec.msgpack.Decoder(Record)
@@ -98,15 +99,6 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
     for (connection, stream, description), alike in itertools.groupby(found, lambda line: line[:3]):
         layout, data = _layout_decoder.decode(description), b"".join(line[3 + DATA] for line in alike)
         yield unpack(session.robot, session.session, connection, stream, layout, data)
-
-
-def identity(spool: Path) -> str:
-    """What the spool is called; nothing where there is none. Raises `SpoolUnusable` where it is damaged."""
-    file = spool / "id"
-    try:
-        return file.read_text().strip() if file.exists() else ""
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpoolUnusable(f"the spool's name {file} cannot be read: {error}; bring it back") from error
 
 
 def writer(spool: Path, number: int) -> str:

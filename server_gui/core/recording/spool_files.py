@@ -16,7 +16,6 @@ import os
 import re
 import shutil
 import sqlite3
-import uuid
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
@@ -30,6 +29,7 @@ from server_gui.core.recording.wal import lost_commits
 
 log = logging.getLogger(__name__)
 
+_ID: Final = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
@@ -87,18 +87,16 @@ class Files:
         """The numbers of those of which this has become."""
         return [number for number, kept in self.segments() if kept is wanted]
 
-    def identify(self) -> str:
-        """The name of this spool at the store, given once."""
+    def identify(self, name: str) -> None:
+        """Write down what this spool is called at the store."""
         file = self.folder / "id"
-        if not file.exists():
-            draft = file.with_name("id.draft")
-            with open(draft, "w", opener=opener) as out:
-                out.write(f"{uuid.uuid4()}\n")
-                out.flush()
-                os.fsync(out.fileno())
-            draft.rename(file)
-            durable.sync(self.folder)
-        return file.read_text().strip()
+        draft = file.with_name("id.draft")
+        with open(draft, "w", opener=opener) as out:
+            out.write(f"{name}\n")
+            out.flush()
+            os.fsync(out.fileno())
+        draft.rename(file)
+        durable.sync(self.folder)
 
     def keep_damaged_logs(self) -> None:
         """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
@@ -138,6 +136,29 @@ class Files:
                     "the log of batch %d was damaged: up to %d commits are lost; %s is a copy of both",
                     number, lost, copy,
                 )  # fmt: skip
+
+
+def identity(folder: Path) -> str:
+    """What the spool in this folder is called; nothing where there is none, or its `id` is damaged.
+
+    Raises:
+        SpoolUnusable: it may not be read.
+
+    """
+    file = folder / "id"
+    try:
+        told = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
+    except OSError as error:
+        raise SpoolUnusable(
+            f"the spool's name {file} cannot be read: {error.strerror or error}; run this as whom the spool "
+            "belongs to"
+        ) from error
+    return told if is_identity(told) else ""
+
+
+def is_identity(name: str) -> bool:
+    """Whether a spool may be called so."""
+    return _ID.fullmatch(name) is not None
 
 
 @contextlib.contextmanager

@@ -37,7 +37,7 @@ class UploaderState:
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
-    lost: tuple[str, ...] = ()  # batches that are lost as a whole, or a store that is no more, in words
+    lost: tuple[str, ...] = ()  # in words: batches that are lost as a whole, a store that is no more, damage
     ahead: tuple[str, ...] = ()  # where the store has what this spool has lost, in words
 
 
@@ -169,7 +169,7 @@ class Uploader:
     def _look(self, *, told: bool) -> None:
         """Alarm for batches that are lost as a whole, and have them `told` in the store."""
         lost = self._spool.untold()
-        self._alarm(lost.values())
+        self._alarm((*lost.values(), *self._spool.notices))
         if lost and told:
             self._store = self._store or self._reach()
             lost_batches(self._spool, self._store)
@@ -196,7 +196,7 @@ class Uploader:
             log.error("batch %d is not uploaded as a whole: %s", number, error)
             return
         finally:
-            self._alarm(self._spool.anew)
+            self._alarm(self._spool.notices)
         took_s, uploaded = time.monotonic() - began_s, self.state.uploaded + 1
         self.state = replace(self.state, uploaded=uploaded, upload_s=took_s, problem=self._problem)
         log.info("batch %d is in the store after %.1f s", number, took_s)

@@ -3,6 +3,7 @@
 import contextlib
 import shutil
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from ml.store.tables import TELEMETRY
 from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import mend, verify
 from server_gui.core.cloud.again import Again
-from server_gui.core.recording.receipts import RECEIPTS
+from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.recording.spool import Spool
 from tests.unit.cloud.recordings import record
 from tests.unit.cloud.test_damages import (
@@ -123,13 +124,31 @@ def test_the_same_loss_twice_is_mended_twice(place: Place) -> None:
         assert rows(place.url) == before
 
 
-def test_what_retention_has_removed_is_not_brought_again(place: Place) -> None:
-    store = Store(place.url)
-    times = sorted(store.dataset("telemetry/000").to_table()["utc"].to_pylist())
-    retain(store, [TELEMETRY], times[len(times) // 2])
-    before = rows(place.url)
+def telemetry_gone(place: Place) -> None:
     for file in place.store.glob("telemetry/000/robot=*/**/*.parquet"):
         file.unlink()
+
+
+def test_of_a_batch_that_retention_has_cut_in_two_the_rest_is_brought_again(place: Place) -> None:
+    receipts = Receipts(place.spool / RECEIPTS).whole()
+    _, middle, *_ = (part for each in receipts for part in each.parts if part.stream)
+    [mark, *_] = middle.marks
+    retain(
+        Store(place.url), [TELEMETRY], datetime.fromtimestamp(0, UTC) + timedelta(microseconds=mark.from_us)
+    )
+    before = rows(place.url)
+    telemetry_gone(place)
+    place.told("mend")
+    assert rows(place.url) == before
+    assert place.verify() == (0, "")
+
+
+def test_what_retention_has_removed_is_not_brought_again_where_nobody_can_count_it(place: Place) -> None:
+    times = sorted(Store(place.url).dataset("telemetry/000").to_table()["utc"].to_pylist())
+    retain(Store(place.url), [TELEMETRY], times[len(times) // 2])
+    before = rows(place.url)
+    telemetry_gone(place)
+    assert "stays in its table" in place.told("mend")
     place.told("mend", "--accept-loss", "--yes")
     assert rows(place.url) == before
     assert place.verify() == (0, "")
