@@ -71,6 +71,12 @@ def field(name: str, kind: Any, unit: str | None = None) -> pa.Field:
     return pa.field(name, kind, metadata=None if unit is None else {"unit": unit})
 
 
+def units(schema: pa.Schema) -> dict[str, str | None]:
+    """Each column's unit: empty where it has no dimension, None where none was given."""
+    found = ((each.name, (each.metadata or {}).get(b"unit")) for each in schema)
+    return {name: None if unit is None else unit.decode() for name, unit in found}
+
+
 # Which row of which server's spool it came from: what makes a row one, for ever.
 _ORIGIN: Final = (field("spool", pa.string()), field("batch", pa.int64()), field("number", pa.int64()))
 _WHOSE: Final = (field("robot", pa.string()), field("session", pa.string()), field("utc", UTC))

@@ -100,6 +100,16 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
         yield unpack(session.robot, session.session, connection, stream, layout, data)
 
 
+def layouts(spool: Path, batch: int) -> list[tuple[str, Layout]]:
+    """Each robot in this batch with each of its layouts, in the order in which they came."""
+    found: list[tuple[str, Layout]] = []
+    sql = "SELECT CAST(robot AS BLOB), description FROM layout ORDER BY id"
+    for robot, description in _read(spool, batch, sql):
+        with contextlib.suppress(msgspec.MsgspecError, TypeError, UnicodeError):  # its runs are damaged then
+            found.append((robot.decode(), _layout_decoder.decode(description)))
+    return found
+
+
 def identity(spool: Path) -> str:
     """What the spool is called; nothing where there is none."""
     file = spool / "id"
