@@ -13,6 +13,7 @@ from typing import Final, Self
 import msgspec
 
 from ml.store import durable
+from ml.store.later import opened_us
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
@@ -42,8 +43,9 @@ def _free_bytes(folder: Path) -> int:
 class Spool:
     """One server's spool; use it as a context manager.
 
-    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, and what no other
-    opening has, because no opening can know that nobody has changed the files since the one before.
+    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, when it was, and
+    what no other opening has, because no opening can know that nobody has changed the files since the one
+    before. Where the clock was set back, the time is just after the newest opening's that is known.
 
     `append` and `freeze` belong to one thread, the recorder's. Everything else may be called from others.
 
@@ -71,13 +73,13 @@ class Spool:
             with writing(folder):
                 self.id = self._files.identify()
                 durable.synchronise([folder / "id"])  # with the names of the folders above it
-                self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
                 self.receipts = Receipts(folder / RECEIPTS)
                 self._writers = {self.id}
                 self._settled: set[int] = set()  # numbers of which nothing is to be told any more
                 self._files.finish_names()
                 self._files.keep_damaged_logs()
                 self._heads = self._known_heads()
+                self.writer = self._name()
                 self._began_ns: int | None = None
                 self._current = self._resume()
                 self.first = self._current.number  # of what this opening writes
@@ -264,6 +266,12 @@ class Spool:
 
     def _roomy(self) -> bool:
         return self._free_bytes(self.folder) >= self._reserve_bytes
+
+    def _name(self) -> str:
+        """See `writer`, and ml/store/later.py."""
+        newest = self.receipts.newest()
+        known = max(map(opened_us, [*self._writers, *([newest.writer] if newest else [])]))
+        return f"{self.id}/{max(time.time_ns() // 1000, known + 1):016}-{uuid.uuid4().hex[:12]}"
 
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}
