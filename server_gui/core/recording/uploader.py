@@ -106,15 +106,17 @@ class Uploader:
         backoff = Backoff(LOOK_S, LONGEST_S)
         asked = False
         while not self._ending.is_set():
-            asked = asked or self._asked.is_set()
-            self._asked.clear()
+            if self._asked.is_set():  # what is asked from here on stays for the next time
+                self._asked.clear()
+                asked = True
             if self._empty(asked):
                 asked = False
                 backoff.reset()
                 self._compact()
             self._turned.set()
             self.worker.beat()
-            self._asked.wait(backoff.next_s())
+            if not self._ending.is_set():  # set before `_asked`, which may have been cleared since
+                self._asked.wait(backoff.next_s())
         if self._compacting is not None:
             self._compacting.close()
 
