@@ -435,12 +435,16 @@ class Recorder:
 
     def _freeze(self, ending: bool) -> None:
         settings = self._settings
+        is_full = self._spool.age_s >= settings.batch_s or self._spool.rows >= settings.batch_rows
+        if not (ending or self._cuts or is_full):
+            return
+        try:
+            self._spool.freeze()
+        except SpoolUnusable as error:  # tried again with the next turn
+            self._alarm(AlarmKind.SPOOL_FAILED, str(error))
+            return
+        self._alarm(AlarmKind.SPOOL_FAILED, None)
         cuts, self._cuts = self._cuts, []
-        if ending or cuts or self._spool.age_s >= settings.batch_s or self._spool.rows >= settings.batch_rows:
-            try:
-                self._spool.freeze()
-            except SpoolUnusable as error:
-                self._alarm(AlarmKind.SPOOL_FAILED, str(error))
         for then in cuts:
             then()
 

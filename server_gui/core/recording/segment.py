@@ -3,6 +3,7 @@
 import collections
 import contextlib
 import itertools
+import logging
 import operator
 import sqlite3
 import time
@@ -14,8 +15,11 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from ml.store.private import FILE
+from ml.store.tables import JOURNAL
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
+
+log = logging.getLogger(__name__)
 
 SCHEMA: Final = """
 BEGIN; -- one commit, so that a power cut leaves all of it or nothing
@@ -31,7 +35,10 @@ CREATE TABLE IF NOT EXISTS record (
     number INTEGER PRIMARY KEY, content BLOB NOT NULL,
     crc INTEGER -- of the content; null in segments from before there was one
 );
-CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS journal_head (
+    robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL,
+    crc INTEGER -- as `_head_crc`; null in segments from before there was one
+);
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL);
 COMMIT;
 """
@@ -130,7 +137,7 @@ class Segment:
 
     def _bring_forward(self) -> None:
         """Give a segment from before there were checksums room for them."""
-        for table in ("run", "record"):
+        for table in ("run", "record", "journal_head"):
             columns = [column[1] for column in self._database.execute(f"PRAGMA table_info({table})")]
             if "crc" not in columns:
                 self._database.execute(f"ALTER TABLE {table} ADD COLUMN crc INTEGER")
@@ -193,8 +200,8 @@ class Segment:
                 [(content, zlib.crc32(content)) for content in map(_encoder.encode, records)],
             )
             self._database.executemany(
-                "INSERT OR REPLACE INTO journal_head VALUES (?, ?, ?)",
-                [(robot, head.n, head.hash) for robot, head in heads.items()],
+                "INSERT OR REPLACE INTO journal_head (robot, n, hash, crc) VALUES (?, ?, ?, ?)",
+                [(robot, head.n, head.hash, _head_crc(robot, head)) for robot, head in heads.items()],
             )
         self.rows += sum(map(len, runs)) + len(records)
 
@@ -297,7 +304,7 @@ class Segment:
     def robots(self) -> set[str]:
         """Every robot that something is of, or was before."""
         told = {str(record.fields["robot"]) for record in self.records() if record.fields.get("robot")}
-        return {robot for robot, _ in self._layouts} | told | self.heads().keys()
+        return {robot for robot, _ in self._layouts} | told | self._heads()[0].keys()
 
     def _whose(self, content: Any) -> tuple[str, ...]:
         """Whose record it may have been: what it says itself, where that is a robot; else any."""
@@ -308,10 +315,24 @@ class Segment:
         return tuple(sorted(known))
 
     def heads(self) -> dict[str, JournalHead]:
-        """The newest journal entry of each robot that is known here."""
+        """The newest journal entry of each robot that is known here.
+
+        Where one is not as it was written, that is the newest of the entries that are here themselves.
+        """
+        found, are_whole = self._heads()
+        if are_whole:
+            return found
+        log.error("%s is damaged: up to where a journal is recorded is looked for in its entries", self.path)
+        entries = [record.fields for record in self.records() if record.table == JOURNAL.name]
+        return {entry["robot"]: JournalHead(entry["n"], entry["hash"]) for entry in entries} | found
+
+    def _heads(self) -> tuple[dict[str, JournalHead], bool]:
+        """Those that are as they were written, and whether these are all."""
         with translated(self.path):
-            found = self._database.execute("SELECT robot, n, hash FROM journal_head")
-            return {robot: JournalHead(n, digest) for robot, n, digest in found}
+            lines = self._database.execute("SELECT robot, n, hash, crc FROM journal_head").fetchall()
+        told = [(robot, JournalHead(n, digest), crc) for robot, n, digest, crc in lines]
+        found = {robot: head for robot, head, crc in told if crc in (None, _head_crc(robot, head))}
+        return found, len(lines) == len(found)
 
     def close(self) -> None:
         """Let go of the file; SQLite brings its log home."""
@@ -356,6 +377,10 @@ def _sum(robot: str, description: bytes) -> int:
 def _crc(layout: int, name: tuple[object, ...], data: bytes) -> int:
     """Of all that a run is: its layout (`_sum`), its name and its rows."""
     return zlib.crc32(data, zlib.crc32(repr(name).encode(), layout))
+
+
+def _head_crc(robot: str, head: JournalHead) -> int:
+    return zlib.crc32(repr((robot, head.n, head.hash)).encode())
 
 
 def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:

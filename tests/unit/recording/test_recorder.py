@@ -354,6 +354,35 @@ def _refuses(*_: object) -> None:
     raise SpoolUnusable("the disk refuses")
 
 
+def test_who_cuts_a_batch_is_called_when_it_waits_also_where_the_disk_refused_at_first(
+    spool: Spool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused: list[str] = []
+    freeze = spool.freeze
+
+    def refuse_once() -> None:
+        if not refused:
+            refused.append("")
+            raise SpoolUnusable("the disk is full")
+        freeze()
+
+    monkeypatch.setattr(spool, "freeze", refuse_once)
+    called = threading.Event()
+    waiting: list[list[int]] = []
+
+    def then() -> None:
+        waiting.append(spool.waiting())
+        called.set()
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+        recorder.cut(then)
+        assert called.wait(WAIT_S)
+        assert (refused, waiting) == ([""], [[1]])
+        assert recorder.flush(WAIT_S)
+        assert recorder.state.alarms == ()
+
+
 def test_a_batch_is_frozen_when_it_is_long_enough(spool: Spool) -> None:
     with Recorder(spool, settings=RecorderSettings(batch_rows=10)) as recorder:
         recorder.record("exo-01", 1, batch(0, rows=12))
