@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from gateway.client import Batch
 from gateway.messages import Description, ResourceSnapshot
-from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES, TELEMETRY
 from server_gui.core.recording import records
 from server_gui.core.recording.clocks import Moment, Reading
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
@@ -469,11 +469,12 @@ def _rows(part: Part) -> int:
 
 
 def _check(found: Sequence[Record]) -> None:
-    """Refuse what the store would not take, with `ValueError`."""
+    """Refuse what the store would not take, with `ValueError`: telemetry comes in runs alone."""
     by_table: dict[str, list[Mapping[str, Any]]] = {}
     for record in found:
         by_table.setdefault(record.table, []).append(record.fields)
     for name, rows in by_table.items():
-        if name not in TABLES:
-            raise ValueError(f"there is no table {name}; there are {', '.join(TABLES)}")
+        if name not in TABLES or name == TELEMETRY.name:
+            known = ", ".join(each for each in TABLES if each != TELEMETRY.name)
+            raise ValueError(f"there is no table {name} that takes single rows; there are {known}")
         TABLES[name].rows(rows)

@@ -155,9 +155,11 @@ class Uploader:
             yield
         except (StoreUnreachable, StoreRefused):
             raise
-        except StoreError as error:  # as where a file of the table is gone that this one is in
+        except (RecordingError, sqlite3.Error):
+            raise
+        except Exception as error:  # noqa: BLE001 - as where a file of the table is gone that this one is in
             self._store = None
-            self._left.append(f"{what}: {error}")
+            self._left.append(f"{what}: {_told(error)}")
             self.state = replace(self.state, problem=self._problem)
 
     @property
@@ -185,7 +187,7 @@ class Uploader:
 
     def _failed(self, what: str, error: Exception) -> bool:
         self._store = None
-        problem = str(error) if isinstance(error, KNOWN) else _unknown(error)
+        problem = _told(error)
         log.warning("%s: %s", what, problem)
         self.state = replace(self.state, problem=problem)
         return False
@@ -227,5 +229,7 @@ class Uploader:
         return waiting
 
 
-def _unknown(error: Exception) -> str:
+def _told(error: Exception) -> str:
+    if isinstance(error, KNOWN):
+        return str(error)
     return f"internal error, {type(error).__name__}"  # its text may quote keys

@@ -176,6 +176,14 @@ def test_markers_and_labels_are_kept(spool: Spool) -> None:
     assert [record.fields["label"] for record in kept(spool)[1] if record.table == "labels"] == ["walking"]
 
 
+@pytest.mark.parametrize("table", ["telemetry", "robots"])
+def test_a_row_that_no_upload_would_take_is_refused(spool: Spool, table: str) -> None:
+    fields = {"robot": "exo-01", "session": "s", "utc": 1, "stamp_ns": 1}
+    with Recorder(spool) as recorder, pytest.raises(ValueError, match=f"no table {table} that takes single"):
+        recorder.add(Record(table, fields))
+    assert spool.waiting() == []
+
+
 class StuckSpool(Spool):
     """A spool whose disk answers only when it is let go, or refuses."""
 

@@ -328,14 +328,17 @@ def test_what_a_library_raises_is_no_end_and_quotes_nothing(spool: Spool, folder
         until(lambda: uploader.state.uploaded == 1)
 
 
+@pytest.mark.parametrize(
+    ("kind", "words"), [(StoreError, "a file is gone"), (ValueError, "internal error, ValueError")]
+)
 def test_a_batch_that_cannot_be_completed_keeps_no_other_from_the_store(
-    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch
+    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch, kind: type[Exception], words: str
 ) -> None:
     failing = {1, 2}
 
     def fails(spool: Spool, number: int, store: Store) -> None:
         if number in failing:
-            raise StoreError(f"a file of the table is gone that batch {number} is in")
+            raise kind("a file is gone")
         send(spool, number, store)
 
     monkeypatch.setattr("server_gui.core.recording.uploader.send", fails)
@@ -349,10 +352,8 @@ def test_a_batch_that_cannot_be_completed_keeps_no_other_from_the_store(
     assert not uploader._empty(asked=True)
     assert spool.waiting() == [1, 2]
     assert (uploader.state.uploaded, uploader.state.waiting) == (last - 2, 2)
-    assert uploader.state.problem == (
-        "batch 1 is not in the store yet: a file of the table is gone that batch 1 is in "
-        "(and 1 other likewise)"
-    )
+    problem = f"batch 1 is not in the store yet: {words} (and 1 other likewise)"
+    assert uploader.state.problem == problem
     failing.clear()
     assert uploader._empty(asked=True)
     assert uploader.state == replace(uploader.state, problem=None, waiting=0)
