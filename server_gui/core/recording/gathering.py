@@ -83,10 +83,10 @@ class Gathering:
         _check(new)
         before = (batch.seq - 1, batch.dropped, batch.shed)
         follows = batch.link == self._link and self._newest.get(new.stream) == before
-        steps = self.clock.steps(batch.received_ns, new.clocks)
         why = None if follows else self._why_new(new)
         if why is not None:
-            self.clock.connection()
+            self.clock.connection()  # which may be of another boot: no step of its clock
+        steps = self.clock.steps(batch.received_ns, new.clocks)
         offset_ns = self.clock.take(new.stream, batch.stamps_ns, new.clocks)
         events = [] if follows and not steps else self._happened(new, why, steps, offset_ns)
         self._newest[new.stream] = (batch.seq, batch.dropped, batch.shed)

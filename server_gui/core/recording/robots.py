@@ -27,7 +27,7 @@ class Robots:
         self.heads = dict(heads)
         self._robots: dict[str, Gathering] = {}
         self._sessions: dict[str, Session] = {}
-        self._names: dict[str, str] = {}  # what robots call themselves → robot
+        self._names: dict[str, str] = {}  # what each robot calls itself
         self._told: set[tuple[str, str]] = set()  # robot and problem: each is said once
 
     def runs(self) -> list[Run]:
@@ -95,11 +95,14 @@ class Robots:
         if description.robot != robot:
             problem = f"{robot} in the server's file calls itself {description.robot}"
             found += self._tell(robot, problem, EventKind.NAME, now)
-        other = self._names.setdefault(description.robot, robot)
-        if other != robot:
+        self._names[robot] = description.robot
+        for other in self._others_called(description.robot, robot):
             problem = f"{robot} and {other} both call themselves {description.robot}"
             found += self._tell(robot, problem, EventKind.NAME, now)
         return found
+
+    def _others_called(self, name: str, robot: str) -> list[str]:
+        return [each for each, called in self._names.items() if called == name and each != robot]
 
     def resources(self, robot: str, now: Moment, snapshot: ResourceSnapshot) -> list[Record]:
         """A look at the robot's computer."""

@@ -199,12 +199,13 @@ class Spool:
         Numbers are given one after another, and uploaded segments go oldest first: one that is skipped was
         a batch, unless its receipt says that it was uploaded.
         """
+        written = self._current.number  # first: one that is begun now is no gap
         files = self._files.own()
         receipt = self.receipts.newest()
         kept = [number for number, kept in files if kept is not Kept.DAMAGED]
         first = min([*kept, *([receipt.batch + 1] if receipt else [])], default=0)
         aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
-        gone = set(range(first, self._current.number)) - {number for number, _ in files}
+        gone = set(range(first, written)) - {number for number, _ in files}
         if found := (aside | gone) - self._settled:
             self._settled |= found & {each.batch for each in self.receipts.all() if isinstance(each, Receipt)}
         return {

@@ -11,7 +11,9 @@ from gateway.main import main
 from ml.store import Store
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.spool_files import Files, Kept
 from server_gui.core.recording.uploader import Uploader
 from tests.unit.recording.robots import batch
 
@@ -116,6 +118,30 @@ def test_the_oldest_batch_that_waits_is_missed_where_others_were_uploaded(
         assert uploader._empty(asked=True)
         assert "batch 5 of the spool" in "".join(uploader.state.lost)
     assert told(Store(folder_url)) == [("exo-01", 5)]
+
+
+def test_a_batch_that_is_closed_while_somebody_looks_is_not_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+
+        def another() -> None:
+            spool.append([], [Record("events", {"robot": "exo-01"})])
+            spool.freeze()
+
+        own = Files.own
+
+        def meanwhile(files: Files) -> list[tuple[int, Kept]]:
+            found = own(files)
+            monkeypatch.setattr(Files, "own", own)
+            another()
+            another()
+            return found
+
+        another()
+        monkeypatch.setattr(Files, "own", meanwhile)
+        assert spool.untold() == {}
+        assert spool.waiting() == [1, 2, 3]
 
 
 def test_a_closed_batch_without_rows_is_damaged(tmp_path: Path, folder_url: str) -> None:

@@ -152,6 +152,23 @@ def test_a_name_that_differs_or_repeats_is_an_event(spool: Spool) -> None:
     ]
 
 
+def test_a_name_that_a_robot_has_given_up_is_free(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for robot, name in (("exo-01", "exo-02"), ("exo-01", "exo-01"), ("exo-02", "exo-02")):
+            recorder.describe(robot, description(name))
+    assert [event["text"] for event in events(spool, "name")] == [
+        "exo-01 in the server's file calls itself exo-02"
+    ]
+
+
+def test_a_reboot_is_no_clock_that_was_set(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for link, offset_ns in ((1, 10**15), (2, -(10**12))):
+            recorder.record("exo-01", 1, batch(0, link=link), offset_ns)
+    assert len(events(spool, "gap")) == 1
+    assert events(spool, "clock_step") == []
+
+
 def test_journal_entries_are_kept_once(spool: Spool) -> None:
     entries = [{"n": n, "hash": f"h{n}", "utc_ns": n, "who": "ada", "what": "write"} for n in range(1, 8)]
     with Recorder(spool) as recorder:
