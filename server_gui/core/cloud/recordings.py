@@ -23,7 +23,7 @@ from ml.store.labels import holding
 from ml.store.later import recorded_order
 from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
-from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, units
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
@@ -141,9 +141,9 @@ class Recordings:
     def _looked_into(self, session: Session) -> "_Waiting":
         shards = 1 if self._store is None else self._store.about.shards
         location = TELEMETRY.location(session.robot, shards)
-        known = {} if self._store is None else self._store.units(location)
+        there = {} if self._store is None else self._store.columns(location)
         batches = self._missing(location, self._batches)
-        return _Waiting(self._spool, batches, session, known, shards)
+        return _Waiting(self._spool, batches, session, there, shards)
 
     def _waiting(self, table: Table) -> list[Row]:
         return spooled.rows(self._spool, table, self._missing(table.name, self._batches))
@@ -186,14 +186,14 @@ class _Waiting:
         spool: Path,
         batches: Sequence[int],
         session: Session,
-        known: Mapping[str, str | None],
+        there: Mapping[str, Known],
         shards: int,
     ) -> None:
         self._spool = spool
         self._session = session
-        self._units = known
+        self._there = there
         self._shards = shards
-        self._before: dict[int, Mapping[str, str | None]] = {}  # the table's columns when a batch comes to it
+        self._before: dict[int, Mapping[str, Known]] = {}  # the table's columns when a batch comes to it
         self._samples: Counter[str] = Counter()
         self._pieces = {batch: piece for batch in batches if (piece := self._looked_into(batch))}
         self.rows = sum(piece.rows for piece in self._pieces.values())
@@ -215,8 +215,11 @@ class _Waiting:
     def channels(self, stored: Sequence[Channel]) -> list[Channel]:
         """With those that the store has of the session."""
         samples = self._samples + Counter({each.name: each.samples for each in stored})
-        known = {**self._units, **{each.name: each.unit for each in stored}}
-        return [Channel(name, known.get(name), samples[name]) for name in sorted(samples)]
+        told = {each.name: each.unit for each in stored}
+        return [Channel(name, told.get(name, self._unit(name)), samples[name]) for name in sorted(samples)]
+
+    def _unit(self, column: str) -> str | None:
+        return self._there.get(column, Known()).unit
 
     def added_to(self, session: Session) -> Session:
         """The session with the extent of all of its rows."""
@@ -228,9 +231,9 @@ class _Waiting:
         return msgspec.structs.replace(session, first=first, last=last, rows=session.rows + self.rows)
 
     def _looked_into(self, batch: int) -> Piece | None:
-        self._before[batch] = self._units
+        self._before[batch] = self._there
         rows = self._table(batch)
-        self._units = {**self._units, **units(rows.schema)}
+        self._there = {**self._there, **columns(rows.schema)}
         if not rows.num_rows:
             return None
         for name in rows.column_names:
@@ -248,5 +251,5 @@ class _Waiting:
             for robot, layout in spooled.layouts(self._spool, batch)
             if TELEMETRY.location(robot, self._shards) == here
         ]
-        columns = Columns(layouts, self._before[batch])
-        return pa.Table.from_batches(map(columns.batch, runs), schema=columns.schema)
+        found = Columns(layouts, self._before[batch])
+        return pa.Table.from_batches(map(found.batch, runs), schema=found.schema)

@@ -179,7 +179,7 @@ def _telemetry(
     segment: Segment, writer: str, store: Store, location: str, robots: set[str]
 ) -> Iterable[Part]:
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
-    columns = Columns(layouts, store.units(location))
+    columns = Columns(layouts, store.columns(location))
     tally = Tally()
 
     def batches() -> Iterator[pa.RecordBatch]:

@@ -17,7 +17,7 @@ import pytest
 from gateway.messages import ResourceSnapshot
 from ml.store import Store, StoreError, StoreUnreachable, durable
 from ml.store.labels import Label
-from ml.store.tables import TELEMETRY
+from ml.store.tables import TELEMETRY, Known
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
@@ -130,14 +130,14 @@ def test_values_in_different_units_never_share_a_column(spool: Spool, folder_url
         recorder.describe("exo-01", description("exo-01"))
         recorder.record("exo-01", 1, batch(0))
     upload_all(spool, store)
-    columns = Columns([Layout(("left_knee.position", "left_knee.torque"), ("°", "N·m"))], store.units(HERE))
+    columns = Columns([Layout(("left_knee.position", "left_knee.torque"), ("°", "N·m"))], store.columns(HERE))
     assert {"left_knee.position@°", "left_knee.torque"} <= set(columns.schema.names)
     assert "left_knee.position" not in columns.schema.names
 
 
 def test_a_column_that_was_written_without_a_unit_takes_none_later() -> None:
     layouts = [Layout(("knee",), (unit,)) for unit in ("rad", "°", None)]
-    assert Columns(layouts, {"knee": None}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
+    assert Columns(layouts, {"knee": Known()}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
     assert Columns([Layout(("knee",), (unit,)) for unit in (None, "rad")], {}).schema.names[-1] == "knee"
 
 
