@@ -12,7 +12,7 @@ from deltalake import DeltaTable
 from ml.store import NoSuchTable, Store, StoreError, durable
 from ml.store.alone import COUNTS, PLACE, Claim
 from ml.store.tables import TELEMETRY
-from ml.store.upkeep import Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
+from ml.store.upkeep import GRACE, Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
 from tests.unit.store.test_store import HERE, numbers, telemetry
 
 NOW = timedelta(0)
@@ -50,10 +50,24 @@ def test_vacuum_keeps_what_is_pinned_until_it_is_unpinned(store_url: str) -> Non
     assert numbers(store) == list(range(18))
 
 
-def test_vacuum_leaves_files_that_somebody_may_still_read(store_url: str) -> None:
+def test_of_several_pinned_versions_each_stays_readable(folder_url: str) -> None:
+    store = filled(folder_url)
+    versions = [store.table(HERE).version()]
+    compact(store)
+    store.append(TELEMETRY, HERE, *telemetry(3, 100), "spool-b", 1)
+    versions.append(store.table(HERE).version())
+    for version in versions:
+        pin(store, HERE, version, "gait-3")
+    compact(store)
+    vacuum(store, grace=NOW)
+    assert [store.dataset(HERE, version).to_table().num_rows for version in versions] == [18, 21]
+
+
+@pytest.mark.parametrize("grace", [GRACE, timedelta(minutes=10)])
+def test_vacuum_leaves_files_that_somebody_may_still_read(store_url: str, grace: timedelta) -> None:
     store = filled(store_url)
     compact(store)
-    assert vacuum(store) == []
+    assert vacuum(store, grace=grace) == []
 
 
 def test_old_rows_go_and_new_ones_stay(folder_url: str) -> None:
