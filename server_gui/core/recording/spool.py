@@ -221,6 +221,15 @@ class Spool:
         """Whether the segment was set aside, and is still there."""
         return self._files.path(number, Kept.DAMAGED).exists()
 
+    def loss_name(self, number: int) -> str:
+        """What the loss of this batch is called at the store: the same whoever tells it how often.
+
+        Where an older copy of the spool takes its place, and a batch is lost under the number again, it is
+        another. Raises `SpoolUnusable`.
+        """
+        with writing(self.folder):
+            return self._files.name_loss(number, f"{self.writer}/lost")
+
     def told(self, number: int) -> None:
         """The store knows that this batch is lost."""
         self._settled.add(number)

@@ -6,6 +6,7 @@ is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are
 stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
 somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
 `00000004.cut.db` is a copy of a segment whose log was damaged, as it was found: commits at its end are lost.
+`00000003.lost` is what the loss of a whole batch is called at the store, by whichever opening it is told.
 `receipts.jsonl` says what of each segment is in the store (receipts.py).
 """
 
@@ -89,11 +90,19 @@ class Files:
 
     def identify(self) -> str:
         """The name of this spool at the store, given once."""
-        file = self.folder / "id"
+        return self._once("id", str(uuid.uuid4()))
+
+    def name_loss(self, number: int, name: str) -> str:
+        """What the loss of this batch is called at the store; `name` where it has no name yet."""
+        return self._once(f"{number:08}.lost", name)
+
+    def _once(self, name: str, text: str) -> str:
+        """What a file says; this where it is not there yet."""
+        file = self.folder / name
         if not file.exists():
-            draft = file.with_name("id.draft")
+            draft = file.with_name(f"{name}.draft")
             with open(draft, "w", opener=opener) as out:
-                out.write(f"{uuid.uuid4()}\n")
+                out.write(f"{text}\n")
                 out.flush()
                 os.fsync(out.fileno())
             draft.rename(file)

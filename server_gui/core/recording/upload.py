@@ -67,6 +67,7 @@ def lost_batches(spool: Spool, store: Store) -> list[str]:
 
     Raises:
         StoreError: it is not known whether that is in the store.
+        SpoolUnusable: the spool's disk refuses what is noted of it.
 
     """
     return [text for number, text in spool.untold().items() if _tell(spool, number, text, store)]
@@ -78,7 +79,7 @@ def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
     One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
     """
     lost = _Lost(_WHOLE, text, tuple(sorted(spool.robots_beside(number))), None, None, {"batch": number})
-    new = _append(store, lost, f"{spool.id}/lost", number, number)
+    new = _append(store, lost, spool.loss_name(number), number, number)
     if spool.is_aside(number):
         spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
     spool.told(number)

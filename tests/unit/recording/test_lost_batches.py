@@ -1,6 +1,7 @@
 """Batches that are lost as a whole, before anybody has uploaded them, are never taken for empty ones."""
 
 import itertools
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -118,6 +119,31 @@ def test_the_oldest_batch_that_waits_is_missed_where_others_were_uploaded(
         assert uploader._empty(asked=True)
         assert "batch 5 of the spool" in "".join(uploader.state.lost)
     assert told(Store(folder_url)) == [("exo-01", 5)]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_loss_under_a_number_whose_loss_was_told_before_a_roll_back_is_told_too(
+    tmp_path: Path, folder_url: str, damage: Callable[[Path], object]
+) -> None:
+    spool, copy, store = tmp_path / "spool", tmp_path / "copy", Store(folder_url)
+
+    def lose() -> None:
+        recorded(spool)
+        for _ in range(2):  # the second opening has nothing new to tell
+            damage(spool / "00000005.db") if (spool / "00000005.db").exists() else None
+            with Spool(spool, reserve_bytes=0) as opened:
+                Uploader(opened, lambda: store)._empty(asked=True)
+
+    recorded(spool)
+    with Spool(spool, reserve_bytes=0) as opened:
+        assert Uploader(opened, lambda: store)._empty(asked=True)
+    shutil.copytree(spool, copy)
+    lose()
+    assert told(store) == [("exo-01", 5)]
+    shutil.rmtree(spool)
+    copy.rename(spool)
+    lose()
+    assert told(store) == [("exo-01", 5), ("exo-01", 5)]
 
 
 def test_a_batch_that_is_closed_while_somebody_looks_is_not_gone(
