@@ -77,10 +77,7 @@ class Gathering:
             Unfit: it cannot be kept, and is as if it had never come.
 
         """
-        batch = new.batch
-        channels = tuple(batch.columns)
-        layout = self._layouts.get(channels) or self._layout(channels)
-        _check(new)
+        batch, layout = new.batch, self.check(new)
         before = (batch.seq - 1, batch.dropped, batch.shed)
         follows = batch.link == self._link and self._newest.get(new.stream) == before
         why = None if follows else self._why_new(new)
@@ -94,6 +91,13 @@ class Gathering:
             name = (self.session, self.connection, new.stream, id(layout))
             self._gathered.setdefault(name, (layout, []))[1].append((batch, offset_ns))
         return events
+
+    def check(self, new: Notification) -> Layout:
+        """How its rows are laid out; raises as `take` would, and changes nothing."""
+        channels = tuple(new.batch.columns)
+        layout = self._layouts.get(channels) or self._layout(channels)
+        _check(new)
+        return layout
 
     def runs(self) -> list[Run]:
         """Everything gathered, and begin anew."""

@@ -576,6 +576,47 @@ def test_a_mistake_of_ours_is_an_alarm_and_the_recorder_goes_on(
     assert rows(kept(spool)[0])[-1][3] == 1
 
 
+def test_what_is_lost_of_a_robot_of_which_nothing_was_kept_yet_is_told_in_its_recording(
+    tmp_path: Path,
+) -> None:
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+        with Recorder(spool, settings=RecorderSettings(capacity=4)) as recorder:
+            recorder.record("exo-01", 1, batch(0, rows=5))
+            assert recorder.flush(WAIT_S)
+        (event,) = events(spool, "lost")
+        assert (event["robot"], json.loads(str(event["data"]))["rows"]) == ("exo-01", 5)
+
+
+def test_a_first_notification_that_is_unfit_begins_no_session_that_nobody_is_told_of(spool: Spool) -> None:
+    unfit = batch(0)
+    unfit.columns[CHANNELS[0]].append(1.0)
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, unfit)
+        assert recorder.flush(WAIT_S)
+        recorder.record("exo-01", 1, batch(1))
+        recorder.cut(lambda: None)
+        assert recorder.flush(WAIT_S)
+        runs, records = kept(spool)  # before its end, which is told again
+    told = {record.fields["session"] for record in records if record.table == "sessions"}
+    assert told == {run.session for run in runs}
+
+
+def test_a_prediction_has_the_utc_of_the_rows_of_its_own_session(spool: Spool) -> None:
+    """One that comes late, when the robot's computer has started anew."""
+    with Recorder(spool) as recorder:
+        sessions = []
+        for link, offset_ns in ((1, 0), (2, -(10**15))):
+            sessions.append(recorder.begin("exo-01", Facts()))
+            recorder.record("exo-01", 1, batch(0, link=link), offset_ns)
+        for session in (*sessions, "another"):
+            fields = {"robot": "exo-01", "session": session, "utc": 7, "stamp_ns": stamp_ns(0, 0)}
+            recorder.add(Record("predictions", fields))
+    runs, records = kept(spool)
+    rows_ns = {run.session: int(run.stamps_ns[0] + run.utc_offset_ns[0]) for run in runs}
+    said_ns = {each.fields["session"]: each.fields["utc"] for each in records if each.table == "predictions"}
+    assert said_ns == {**rows_ns, "another": 7}
+
+
 def test_the_flood_of_one_robot_takes_no_room_from_another_and_is_told_in_its_own_recording(
     tmp_path: Path,
 ) -> None:
