@@ -587,6 +587,26 @@ def test_what_is_lost_of_a_robot_of_which_nothing_was_kept_yet_is_told_in_its_re
         assert (event["robot"], json.loads(str(event["data"]))["rows"]) == ("exo-01", 5)
 
 
+@pytest.mark.parametrize(
+    "value",
+    [math.inf, -math.inf, math.nan, "1", [1.0], 10**400],
+    ids=["inf", "-inf", "nan", "text", "list", "large"],
+)
+@pytest.mark.parametrize("missing", [(), CHANNELS[:1]])
+def test_a_value_that_is_no_finite_number_is_refused_and_disturbs_no_other_robot(
+    spool: Spool, value: Any, missing: tuple[str, ...]
+) -> None:
+    unfit = batch(0, rows=2, missing=missing)
+    unfit.columns[CHANNELS[0]][1] = value
+    with Recorder(spool) as recorder:
+        recorder.record("good", 1, batch(0))
+        recorder.record("bad", 1, unfit)
+        recorder.record("bad", 1, batch(1, missing=missing))
+    assert sorted((row[0], row[3]) for row in rows(kept(spool)[0])) == [("bad", 1), ("good", 0)]
+    [event] = events(spool, "refused")
+    assert f"bad sent what cannot be kept: a value of '{CHANNELS[0]}' is no number" in str(event["text"])
+
+
 def test_a_first_notification_that_is_unfit_begins_no_session_that_nobody_is_told_of(spool: Spool) -> None:
     unfit = batch(0)
     unfit.columns[CHANNELS[0]].append(1.0)

@@ -217,7 +217,7 @@ class Elsewhere:
 @pytest.mark.parametrize("left", [b"", b"no claim", b'{"who":"a/b","until":"2026-01-01T00:00:00Z"}'])
 @pytest.mark.parametrize("goes", [False, True])
 def test_of_two_that_find_a_dead_compaction_one_goes_on(left: bytes, goes: bool) -> None:
-    """The other begins, or begins and ends, between the look and the claim of the first; then a third comes."""
+    """The other begins, or begins and ends, between the look and the claim of the first."""
     objects = Elsewhere()
     store = cast("Store", objects)
     objects.held[f"{PLACE}/t.json"] = left
