@@ -4,6 +4,7 @@ import contextlib
 import functools
 import hashlib
 import itertools
+import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
@@ -228,7 +229,10 @@ def vacuum(
     *,
     dry_run: bool = False,
 ) -> list[str]:
-    """Delete files that no version newer than `grace` needs, nor one that is pinned; their names."""
+    """Delete files that no version newer than `grace` needs, nor one that is pinned; their names.
+
+    `grace` is taken in whole hours, rounded up.
+    """
     if not dry_run:
         _mend(store, tables)
     kept: dict[str, list[int]] = {}
@@ -252,7 +256,7 @@ def _vacuum(
         if not dry_run:  # nothing goes before what stands for it lasts
             store.make_last(location, delta)
         gone = delta.vacuum(
-            retention_hours=int(grace / timedelta(hours=1)),
+            retention_hours=math.ceil(grace / timedelta(hours=1)),
             enforce_retention_duration=False,
             dry_run=dry_run,
             keep_versions=versions or None,

@@ -16,9 +16,10 @@ from ml.store import sessions as sessions_
 from ml.store.fragments import Extent
 from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
+from server_gui.core.recording.checksums import DATA, is_sound, unaltered
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
-from server_gui.core.recording.segment import DATA, is_sound, translated, unaltered
+from server_gui.core.recording.segment import translated
 from server_gui.core.recording.spool_files import identity
 
 _NUMBER: Final = "[0-9]" * 8
@@ -99,6 +100,16 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
     for (connection, stream, description), alike in itertools.groupby(found, lambda line: line[:3]):
         layout, data = _layout_decoder.decode(description), b"".join(line[3 + DATA] for line in alike)
         yield unpack(session.robot, session.session, connection, stream, layout, data)
+
+
+def layouts(spool: Path, batch: int) -> list[tuple[str, Layout]]:
+    """Each robot in this batch with each of its layouts, in the order in which they came."""
+    found: list[tuple[str, Layout]] = []
+    sql = "SELECT CAST(robot AS BLOB), description FROM layout ORDER BY id"
+    for robot, description in _read(spool, batch, sql):
+        with contextlib.suppress(msgspec.MsgspecError, TypeError, UnicodeError):  # its runs are damaged then
+            found.append((robot.decode(), _layout_decoder.decode(description)))
+    return found
 
 
 def writer(spool: Path, number: int) -> str:

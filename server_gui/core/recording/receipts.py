@@ -20,7 +20,7 @@ from ml.store.private import opener
 from server_gui.core.recording.errors import SpoolUnusable
 
 RECEIPTS: Final = "receipts.jsonl"
-LOST: Final = "lost"  # the writer of events that tell of batches which are lost, after the spool's id
+LOST: Final = "lost"  # how the writer of events ends that tell of a batch which is lost
 ANEW: Final = "anew"  # and of those that tell of a store which was begun anew
 EVENT_WRITERS: Final = (LOST, ANEW)
 _HEAD: Final = '{"crc":"%08x",'
@@ -89,7 +89,7 @@ class Receipt(msgspec.Struct, frozen=True):
 
 def is_of_batch(writer: str) -> bool:
     """Whether that is who brings batches to a store, and not events that tell something of them."""
-    return writer.partition("/")[2] not in EVENT_WRITERS
+    return writer.rpartition("/")[2] not in EVENT_WRITERS
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ import msgspec
 
 from gateway.cli.text import counted
 from ml.store import durable
+from ml.store.later import opened_us
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
+from server_gui.core.recording.receipts import LOST, RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import Segment
 from server_gui.core.recording.spool_files import (
@@ -51,8 +52,9 @@ def _free_bytes(folder: Path) -> int:
 class Spool:
     """One server's spool; use it as a context manager.
 
-    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, and what no other
-    opening has, because no opening can know that nobody has changed the files since the one before.
+    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, when it was, and
+    what no other opening has, because no opening can know that nobody has changed the files since the one
+    before. Where the clock was set back, the time is just after the newest opening's that is known.
 
     `append` and `freeze` belong to one thread, the recorder's. Everything else may be called from others.
 
@@ -83,10 +85,10 @@ class Spool:
                 self._files.keep_damaged_logs()
                 self.id = self._identify()
                 durable.synchronise([folder / "id"])  # with the names of the folders above it
-                self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
                 self._writers = {self.id}
                 self._settled: set[int] = set()  # numbers of which nothing is to be told any more
                 self._heads = self._known_heads()
+                self.writer = self._name()
                 self._began_ns: int | None = None
                 self._current = self._resume()
                 self.first = self._current.number  # of what this opening writes
@@ -206,12 +208,13 @@ class Spool:
         Numbers are given one after another, and uploaded segments go oldest first: one that is skipped was
         a batch, unless its receipt says that it was uploaded.
         """
+        written = self._current.number  # first: one that is begun now is no gap
         files = self._files.own()
         receipt = self.receipts.newest()
         kept = [number for number, kept in files if kept is not Kept.DAMAGED]
         first = min([*kept, *([receipt.batch + 1] if receipt else [])], default=0)
         aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
-        gone = set(range(first, self._current.number)) - {number for number, _ in files}
+        gone = set(range(first, written)) - {number for number, _ in files}
         if found := (aside | gone) - self._settled:
             self._settle(found, gone)
         return {
@@ -240,6 +243,15 @@ class Spool:
     def is_aside(self, number: int) -> bool:
         """Whether the segment was set aside, and is still there."""
         return self._files.path(number, Kept.DAMAGED).exists()
+
+    def loss_name(self, number: int) -> str:
+        """What the loss of this batch is called at the store: the same whoever tells it how often.
+
+        Where an older copy of the spool takes its place, and a batch is lost under the number again, it is
+        another. Raises `SpoolUnusable`.
+        """
+        with writing(self.folder):
+            return self._files.name_loss(number, f"{self.writer}/{LOST}")
 
     def told(self, number: int) -> None:
         """The store knows that this batch is lost."""
@@ -317,6 +329,12 @@ class Spool:
     def _notice(self, text: str) -> None:
         log.error("%s", text)
         self.notices.append(text)
+
+    def _name(self) -> str:
+        """See `writer`, and ml/store/later.py."""
+        newest = self.receipts.newest()
+        known = max(map(opened_us, [*self._writers, *([newest.writer] if newest else [])]))
+        return f"{self.id}/{max(time.time_ns() // 1000, known + 1):016}-{uuid.uuid4().hex[:12]}"
 
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}

@@ -6,6 +6,7 @@ is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are
 stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
 somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
 `00000004.cut.db` is a copy of a segment whose log was damaged, as it was found: commits at its end are lost.
+`00000003.lost` is what the loss of a whole batch is called at the store, by whichever opening it is told.
 `receipts.jsonl` says what of each segment is in the store (receipts.py).
 """
 
@@ -30,6 +31,7 @@ from server_gui.core.recording.wal import lost_commits
 log = logging.getLogger(__name__)
 
 _ID: Final = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
+_LOSS: Final = re.compile(rf"{_ID.pattern}/[0-9]{{16}}-[0-9a-f]{{12}}/lost")
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
@@ -89,10 +91,22 @@ class Files:
 
     def identify(self, name: str) -> None:
         """Write down what this spool is called at the store."""
-        file = self.folder / "id"
-        draft = file.with_name("id.draft")
+        self._write("id", name)
+
+    def name_loss(self, number: int, name: str) -> str:
+        """What the loss of this batch is called at the store; `name` where it has no name yet."""
+        file = self.folder / f"{number:08}.lost"
+        known = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
+        if not _LOSS.fullmatch(known):
+            self._write(file.name, name)
+            return name
+        return known
+
+    def _write(self, name: str, text: str) -> None:
+        file = self.folder / name
+        draft = file.with_name(f"{name}.draft")
         with open(draft, "w", opener=opener) as out:
-            out.write(f"{name}\n")
+            out.write(f"{text}\n")
             out.flush()
             os.fsync(out.fileno())
         draft.rename(file)

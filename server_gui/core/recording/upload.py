@@ -22,7 +22,7 @@ from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.gathering import EventKind
 from server_gui.core.recording.lost import told_time
-from server_gui.core.recording.receipts import ANEW, LOST, Part, Receipt, went_to
+from server_gui.core.recording.receipts import ANEW, Part, Receipt, went_to
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
 from server_gui.core.recording.spool import Spool
@@ -69,6 +69,7 @@ def lost_batches(spool: Spool, store: Store) -> list[str]:
 
     Raises:
         StoreError: it is not known whether that is in the store.
+        SpoolUnusable: the spool's disk refuses what is noted of it.
 
     """
     return [text for number, text in spool.untold().items() if _tell(spool, number, text, store)]
@@ -80,7 +81,7 @@ def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
     One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
     """
     lost = _Lost(_WHOLE, text, tuple(sorted(spool.robots_beside(number))), None, None, {"batch": number})
-    new = _append(spool, store, lost, LOST, number, number)
+    new = _append(spool, store, lost, spool.loss_name(number), number, number)
     if spool.is_aside(number):
         spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
     spool.told(number)
@@ -102,13 +103,12 @@ def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -
         "end the collector and run gwrms cloud mend, which brings again what the spool still has"
     )
     lost = _Lost(_WHOLE, text, tuple(sorted(robots)), None, None, {"batches": count})
-    _append(spool, store, lost, ANEW, number, gone[0][1])
+    _append(spool, store, lost, f"{spool.id}/{ANEW}", number, gone[0][1])
     spool.notices.append(text)
 
 
-def _append(spool: Spool, store: Store, lost: "_Lost", kind: str, number: int, named: object) -> bool:
+def _append(spool: Spool, store: Store, lost: "_Lost", writer: str, number: int, named: object) -> bool:
     """The events that tell a loss, once, and their receipt; False where the store has them already."""
-    writer = f"{spool.id}/{kind}"
     origin = {"spool": writer, "batch": number}
     now_ns = Moment.now().utc_ns
     rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
@@ -200,7 +200,7 @@ def _telemetry(
     segment: Segment, writer: str, store: Store, location: str, robots: set[str]
 ) -> Iterable[Part]:
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
-    columns = Columns(layouts, store.units(location))
+    columns = Columns(layouts, store.columns(location))
     tally = Tally()
 
     def batches() -> Iterator[pa.RecordBatch]:
