@@ -14,8 +14,8 @@ from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, JOURNAL, LABELS, TELEMETRY, Table
 from server_gui.core.cloud import verify
 from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.errors import RecordingError
-from server_gui.core.recording.gathering import EventKind
 from tests.explore_store import damages
 from tests.explore_store.ledger import Amended, Entry, Fate, Mark, Row, Said
 from tests.explore_store.robots import ANGLE, COUNT

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 
 from gateway.client import Batch
-from gateway.messages import Description
+from gateway.wire.messages import Description
 
 COUNT, ANGLE = "x.count", "knee.angle"
 EVERY_NS = 10_000_000  # between rows
