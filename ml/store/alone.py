@@ -2,10 +2,15 @@
 
 Each then replaces the same files by its own, and every row is there twice. In a folder a lock keeps the
 second away, which ends with its process; elsewhere an object that is created once, and counts for some hours.
+
+An object whose owner has died is not removed by who finds it: two may, and the later one would remove what
+the earlier has put in its place. Who takes over creates another object, which is named after the dead one,
+so that only one can; and removes both, the older first, when it has done its work.
 """
 
 import contextlib
 import fcntl
+import hashlib
 import os
 import uuid
 from collections.abc import Iterator
@@ -56,27 +61,47 @@ def _locked(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _claimed(store: Store, location: str) -> Iterator[None]:
-    path = f"{PLACE}/{location.replace('/', '-')}.json"
-    now = datetime.now(UTC)
-    known = _claim(store, path)
-    if known is not None and not timedelta(0) < known.until - now <= COUNTS:
-        store.objects.remove(path)
+    base = f"{PLACE}/{location.replace('/', '-')}"
+    path, now = f"{base}.json", datetime.now(UTC)
+    dead: list[tuple[str, Claim]] = []
+    while (known := _claim(store, path)) is not None:
+        if timedelta(0) < known.until - now <= 2 * COUNTS:  # further away than a clock may be ahead
+            raise _busy(store, location, path)
+        dead.append((path, known))
+        path = f"{base}.{_digest(path, known.who)}.json"
     mine = Claim(uuid.uuid4().hex, now + COUNTS)
     if not store.objects.create(path, msgspec.json.encode(mine)):
-        raise StoreError(
-            f"{store.url}/{location} is being compacted by another; where that has died, remove the object "
-            f"{path}, or wait {COUNTS / timedelta(hours=1):g} h"
-        )
+        raise _busy(store, location, path)
+    is_first = False
     try:
+        is_first = all(_claim(store, each) == claim for each, claim in dead)
+        if not is_first:  # whoever took it over has done so and gone since, and a third may have come
+            raise _busy(store, location, f"{base}.json")
         yield
     finally:
-        if _claim(store, path) == mine:
-            store.objects.remove(path)
+        if datetime.now(UTC) < mine.until:  # else it may have been taken over
+            for each in [*(dead if is_first else ()), (path, mine)]:
+                store.objects.remove(each[0])
+
+
+def _busy(store: Store, location: str, path: str) -> StoreError:
+    return StoreError(
+        f"{store.url}/{location} is being compacted by another; where that has died, remove the object "
+        f"{path}, or wait {COUNTS / timedelta(hours=1):g} h"
+    )
 
 
 def _claim(store: Store, path: str) -> Claim | None:
+    """What an object claims; one that cannot be read counts as long as any, since it was written."""
     data = store.objects.read(path)
-    try:
-        return None if data is None else msgspec.json.decode(data, type=Claim)
-    except msgspec.DecodeError:
+    if data is None:
         return None
+    try:
+        return msgspec.json.decode(data, type=Claim)
+    except msgspec.DecodeError:
+        found = store.objects.find(path)
+        return None if found is None else Claim(_digest(path, data.hex()), found.changed + COUNTS)
+
+
+def _digest(*words: str) -> str:
+    return hashlib.blake2b("/".join(words).encode(), digest_size=8).hexdigest()

@@ -6,7 +6,7 @@ early (a LIMIT, an error) and the interpreter is going: the process then hangs o
 
 import os
 from typing import Final
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 import pyarrow.fs
 
@@ -25,9 +25,10 @@ _ARGUMENTS: Final = {
 def filesystem(url: str) -> pyarrow.fs.FileSystem:
     """What is under a store's URL, with paths from there."""
     parts = urlsplit(url)
+    path = unquote(parts.path)
     if parts.scheme == "file":
-        return pyarrow.fs.SubTreeFileSystem(parts.path, pyarrow.fs.LocalFileSystem())
-    return pyarrow.fs.SubTreeFileSystem(f"{parts.netloc}{parts.path}", _s3())
+        return pyarrow.fs.SubTreeFileSystem(path, pyarrow.fs.LocalFileSystem())
+    return pyarrow.fs.SubTreeFileSystem(f"{parts.netloc}{path}", _s3())
 
 
 def _s3() -> pyarrow.fs.FileSystem:

@@ -4,18 +4,20 @@ First it is noted what goes (`mended/` in the store), then what is still there o
 `mended/` too, then the table's log lets go of the files. Interrupted anywhere, it is simply called again.
 """
 
+import time
 import uuid
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from datetime import datetime
 from typing import Final
-from urllib.parse import unquote
 
 import msgspec
+from deltalake import CommitProperties, DeltaTable, Transaction
 from deltalake.exceptions import CommitFailedError
+from deltalake.transaction import RemoveAction
 
 from ml.store import durable
 from ml.store.errors import StoreError, translated
-from ml.store.fragments import DataFile
+from ml.store.fragments import DataFile, data_files
 from ml.store.store import NO_HOOKS, Store
 
 _NOTED: Final = "mended"
@@ -52,15 +54,21 @@ def take_out(store: Store, files: Sequence[DataFile], advance: Callable[[int], o
         advance(len(mine))
 
 
-def taken_out(store: Store) -> list[TakenOut]:
-    """Every file that was taken out of a table, once."""
-    names = [name for name in store.objects.names(_NOTED) if name.endswith(".json")]
-    notes = (store.objects.read(name) for name in names)
-    try:
-        found = [each for data in notes if data for each in msgspec.json.decode(data, type=list[TakenOut])]
-    except msgspec.DecodeError as error:
-        raise StoreError(f"a note in {store.url}/{_NOTED} is damaged: {error}") from error
-    return list({(each.location, each.path): each for each in found}.values())
+def taken_out(store: Store) -> tuple[list[TakenOut], list[str]]:
+    """Every file that was taken out of a table, once; in words, which notes of that cannot be read."""
+    found: dict[tuple[str, str], TakenOut] = {}
+    problems = []
+    for name in store.objects.names(_NOTED):
+        if "/" not in name.removeprefix(f"{_NOTED}/") and name.endswith(".json"):
+            try:
+                told = msgspec.json.decode(store.objects.read(name) or b"[]", type=list[TakenOut])
+                found |= {(each.location, each.path): each for each in told}
+            except (msgspec.DecodeError, UnicodeDecodeError) as error:
+                problems.append(
+                    f"{store.url}/{name} is damaged ({error}): bring it back from a copy of the store, or "
+                    "remove it; it says what gwrms cloud mend has taken out"
+                )
+    return list(found.values()), problems
 
 
 def _note(store: Store, location: str, files: Iterable[DataFile]) -> None:
@@ -84,23 +92,38 @@ def _move(store: Store, path: str) -> None:
     store.objects.remove(path)
 
 
-def _let_go(store: Store, location: str, paths: set[str]) -> None:
+def _let_go(store: Store, location: str, paths: Set[str]) -> None:
+    """Of these files alone: others of the table may be gone too, and are to stay in its log."""
+    there = [path for path in paths if store.objects.find(f"{location}/{path}") is not None]
+    if there:
+        raise StoreError(
+            f"{store.url}/{location} has {len(there)} files that were damaged or gone a moment ago: "
+            "nothing was taken out of it; try again later"
+        )
     for _ in range(ATTEMPTS):
         delta = store.table(location)
-        gone = {unquote(path) for path in delta.repair(dry_run=True)["files_removed"]}
-        there = [path for path in gone if store.objects.find(f"{location}/{path}") is not None]
-        if there or gone - paths:
-            raise StoreError(
-                f"{store.url}/{location} is listed without {len(there) or len(gone - paths)} files that are "
-                "there, or were a moment ago: nothing was taken out of it; try again later"
-            )
+        gone = sorted(paths & {file.path for file in data_files(delta, location)})
         if not gone:
             return
         with store.unfinished(location):
             try:
-                delta.repair(post_commithook_properties=NO_HOOKS)
+                _remove(delta, gone)
             except CommitFailedError:
                 continue
             store.make_last(location, delta)
         return
     raise StoreError(f"{store.url}/{location} was changed meanwhile, {ATTEMPTS} times; try again later")
+
+
+def _remove(delta: DeltaTable, paths: Iterable[str]) -> None:
+    now_ms = time.time_ns() // 1_000_000
+    named = Transaction(f"{_NOTED}/{uuid.uuid4().hex}", 1)  # by its end an entry is known to be whole
+    delta.create_write_transaction(
+        [RemoveAction(path, True, now_ms) for path in paths],
+        "append",
+        delta.schema(),
+        delta.metadata().partition_columns,
+        commit_properties=CommitProperties(app_transactions=[named]),
+        post_commithook_properties=NO_HOOKS,
+    )
+    delta.update_incremental()

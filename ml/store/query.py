@@ -13,6 +13,7 @@ import pyarrow as pa
 
 from ml.store import reading
 from ml.store.errors import StoreError, translated
+from ml.store.later import OPENED
 from ml.store.store import Store
 from ml.store.tables import TABLES
 
@@ -34,7 +35,8 @@ _DOTTED: Final = re.compile(r'Referenced table "(\w+)" not found')
 _ABOUT: Final = "robot, session, utc, ended, label, author, source"
 _HOLDING: Final = f"""SELECT * FROM (SELECT * FROM every QUALIFY 1 = row_number() OVER (
     PARTITION BY {_ABOUT}, split_part(coalesce(spool, ''), '/', 1)
-    ORDER BY coalesce(batch, 0) DESC, coalesce(number, 0) DESC, written DESC NULLS LAST))
+    ORDER BY regexp_extract(coalesce(spool, ''), '{OPENED}', 1) DESC,
+    coalesce(batch, 0) DESC, coalesce(number, 0) DESC, written DESC NULLS LAST))
     QUALIFY NOT coalesce(removed, false)
     AND 1 = row_number() OVER (PARTITION BY {_ABOUT} ORDER BY written DESC NULLS LAST)"""
 

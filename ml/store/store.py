@@ -39,7 +39,7 @@ from ml.store.files import filesystem
 from ml.store.fragments import as_dataset
 from ml.store.objects import RETRIES, Objects, s3_options
 from ml.store.probe import probe
-from ml.store.tables import Table
+from ml.store.tables import Known, Table
 
 ATTEMPTS: Final = 20  # races that an append may lose before it gives up
 CHECKPOINT_EVERY: Final = 50  # commits; a reader never replays more log than this
@@ -235,11 +235,15 @@ class Store:
 
     def units(self, location: str) -> dict[str, str | None]:
         """Each column's unit, None where none was given; nothing where there is no table yet."""
+        return {name: known.unit for name, known in self.columns(location).items()}
+
+    def columns(self, location: str) -> dict[str, Known]:
+        """What is known of each column; nothing where there is no table yet."""
         try:
             delta = self._open.get(location) or self.table(location)
         except NoSuchTable:
             return {}
-        return {field.name: field.metadata.get("unit") for field in delta.schema().fields}
+        return _known(delta.schema())
 
     def identity(self, location: str) -> str:
         """What the table is called for ever, in copies of the store too."""
@@ -261,7 +265,7 @@ class Store:
             data = self.objects.read(ABOUT) or b""
         try:
             about = msgspec.json.decode(data, type=About)
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise StoreError(
                 f"{self.url}/{ABOUT} is damaged: {error}; bring it back from a copy of the store, or write "
                 '{"format":1,"shards":N,"several_writers":true} into it, N for the folders in telemetry'
@@ -326,14 +330,19 @@ class Store:
             delta.alter.add_columns(new, post_commithook_properties=NO_HOOKS)
 
     def _check_units(self, delta: DeltaTable, table: Table, location: str, schema: pa.Schema) -> None:
-        """Values in different units never stand in one column, also where another has just added it."""
-        known = {each.name: each.metadata.get("unit") for each in delta.schema().fields}
-        for each in DeltaSchema.from_arrow(schema).fields:
-            unit = each.metadata.get("unit")
-            if each.name not in table.schema.names and known.get(each.name, unit) != unit:
+        """Values in different units, or of two channels, never share a column, even a new one."""
+        there, where = _known(delta.schema()), f"{self.url}/{location}"
+        for name, (unit, channel) in _known(DeltaSchema.from_arrow(schema)).items():
+            known = there.get(name, Known(unit))
+            if name not in table.schema.names and known.unit != unit:
                 raise StoreError(
-                    f"{self.url}/{location} has {each.name} in {known[each.name] or 'no unit'}, and it was "
-                    f"to be written in {unit or 'no unit'}: look at its units again, and upload again"
+                    f"{where} has {name} in {known.unit or 'no unit'}, and it was to be written in "
+                    f"{unit or 'no unit'}: look at its units again, and upload again"
+                )
+            if None not in (channel, known.channel) and known.channel != channel:
+                raise StoreError(
+                    f"{where} has {known.channel} in the column {name}, to which {channel} was to be "
+                    "written: look at its columns again, and upload again"
                 )
 
     def _commit(
@@ -348,6 +357,12 @@ class Store:
             post_commithook_properties=NO_HOOKS,
         )
         delta.update_incremental()
+
+
+def _known(schema: DeltaSchema) -> dict[str, Known]:
+    return {
+        each.name: Known(each.metadata.get("unit"), each.metadata.get("channel")) for each in schema.fields
+    }
 
 
 def writer_properties(schema: pa.Schema) -> WriterProperties:

@@ -3,7 +3,7 @@
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import pyarrow as pa
 
@@ -66,9 +66,28 @@ def shard_of(robot: str, shards: int) -> int:
     return zlib.crc32(robot.encode()) % shards
 
 
-def field(name: str, kind: Any, unit: str | None = None) -> pa.Field:
-    """A column; its unit is in its metadata."""
-    return pa.field(name, kind, metadata=None if unit is None else {"unit": unit})
+def field(name: str, kind: Any, unit: str | None = None, channel: str | None = None) -> pa.Field:
+    """A column; in its metadata are its unit, and the channel that it is of where its name may mislead."""
+    told = {key: text for key, text in (("unit", unit), ("channel", channel)) if text is not None}
+    return pa.field(name, kind, metadata=told or None)
+
+
+class Known(NamedTuple):
+    """What is known of a column: its unit, empty where it has no dimension, and whose values are in it."""
+
+    unit: str | None = None
+    channel: str | None = None
+
+
+def columns(schema: pa.Schema) -> dict[str, Known]:
+    """What its fields tell."""
+    found: dict[str, Known] = {}
+    for each in schema:
+        told = each.metadata or {}
+        found[each.name] = Known(
+            *(told[key].decode() if key in told else None for key in (b"unit", b"channel"))
+        )
+    return found
 
 
 # Which row of which server's spool it came from: what makes a row one, for ever.

@@ -4,6 +4,7 @@ import contextlib
 import functools
 import hashlib
 import itertools
+import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
@@ -127,7 +128,7 @@ def pins(store: Store) -> list[Pin]:
 def _pin(store: Store, name: str, data: bytes) -> Pin:
     try:
         return msgspec.json.decode(data, type=Pin)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise StoreError(
             f"{store.url}/{name} is damaged: bring it back from a copy of the store; it says which version "
             "of a table a model needs"
@@ -192,9 +193,24 @@ def _again(store: Store, location: str, work: Callable[[], Done]) -> Done:
 
 
 def retained(store: Store, location: str) -> datetime | None:
-    """Up to which time rows of the table were removed because they were old; None where none were."""
-    names = [name.rpartition("/")[2].removesuffix(".json") for name in store.objects.names(_noted(location))]
-    return max((datetime.strptime(name, _INSTANT).replace(tzinfo=UTC) for name in names), default=None)
+    """Up to which time rows of the table were removed because they were old; None where none were.
+
+    Raises:
+        StoreError: a note of that is damaged.
+
+    """
+    names = [name for name in store.objects.names(_noted(location)) if name.endswith(".json")]
+    try:
+        return max((_instant(name) for name in names), default=None)
+    except ValueError as error:
+        raise StoreError(
+            f"a note in {store.url}/{_noted(location)} has no time for a name ({error}): bring it back from "
+            "a copy of the store, or remove it; by it is known which rows gwrms cloud retain has removed"
+        ) from error
+
+
+def _instant(name: str) -> datetime:
+    return datetime.strptime(name.rpartition("/")[2].removesuffix(".json"), _INSTANT).replace(tzinfo=UTC)
 
 
 def _note(store: Store, location: str, before: datetime) -> None:
@@ -213,7 +229,10 @@ def vacuum(
     *,
     dry_run: bool = False,
 ) -> list[str]:
-    """Delete files that no version newer than `grace` needs, nor one that is pinned; their names."""
+    """Delete files that no version newer than `grace` needs, nor one that is pinned; their names.
+
+    `grace` is taken in whole hours, rounded up.
+    """
     if not dry_run:
         _mend(store, tables)
     kept: dict[str, list[int]] = {}
@@ -237,7 +256,7 @@ def _vacuum(
         if not dry_run:  # nothing goes before what stands for it lasts
             store.make_last(location, delta)
         gone = delta.vacuum(
-            retention_hours=int(grace / timedelta(hours=1)),
+            retention_hours=math.ceil(grace / timedelta(hours=1)),
             enforce_retention_duration=False,
             dry_run=dry_run,
             keep_versions=versions or None,

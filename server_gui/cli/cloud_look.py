@@ -12,6 +12,7 @@ from server_gui.cli.cloud_reach import add_url, parser, progress, reach, spool, 
 from server_gui.core.cloud import usage
 from server_gui.core.cloud import verify as checks
 from server_gui.core.cloud.usage import Usage
+from server_gui.core.cloud.verdict import Verdict
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings.server_file import SettingsError
 
@@ -80,6 +81,12 @@ def verify(argv: list[str]) -> int:
 
 def _verify(arguments: argparse.Namespace) -> int:
     mine = spool(arguments)
+    if arguments.url is None and not mine.exists():
+        raise SpoolUnusable(
+            f"there is no spool at {mine}, so nobody can say here whether rows are missing: bring it back "
+            "from a copy; where nothing was ever recorded on this computer, gwrms cloud verify "
+            f"{url(arguments)} looks at the files alone"
+        )
     try:
         store = reach(arguments)
     except NoSuchTable:
@@ -99,7 +106,7 @@ def _verify(arguments: argparse.Namespace) -> int:
 def _verdict(
     arguments: argparse.Namespace,
     problems: Sequence[str],
-    found: checks.Verdict | None = None,
+    found: Verdict | None = None,
     whole: str = "",
 ) -> int:
     if arguments.json:
@@ -111,7 +118,7 @@ def _verdict(
     return NOT_WHOLE if problems else 0
 
 
-def _counts(found: checks.Verdict | None) -> dict[str, object]:
+def _counts(found: Verdict | None) -> dict[str, object]:
     """How much was looked at, and how much of that is proven."""
     if found is None:
         return {"files": 0, "rows": 0, "rows_proven": 0, "batches": 0, "receipts": 0, "notes": ()}

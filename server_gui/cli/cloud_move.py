@@ -12,9 +12,11 @@ from ml.store.errors import StoreError
 from ml.store.sessions import Session
 from ml.store.store import Store, checked_url
 from server_gui.cli.cloud_reach import add_url, parser, progress, reach, url
-from server_gui.core.cloud import emptying, parts, transfer
+from server_gui.core.cloud import emptying, moving, parts, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.receipts import RECEIPTS
+from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import load
 
 UPLOAD_EPILOG = """Without --from: what waits in this computer's spool goes to the store now. A collector
@@ -43,7 +45,9 @@ def upload(argv: list[str]) -> int:
     made.add_argument("--from", dest="source", metavar="URL", help="the store to copy")
     arguments = made.parse_args(argv)
     if arguments.source is not None:
-        return _copy(checked_url(arguments.source), checked_url(url(arguments)), arguments)
+        status = _copy(checked_url(arguments.source), checked_url(url(arguments)), arguments)
+        _note(arguments)
+        return status
     folder = load(arguments.config).recorder.spool
     if not folder.is_dir():
         raise SpoolUnusable(f"there is no spool at {folder}: nothing was recorded on this computer")
@@ -66,6 +70,18 @@ def upload(argv: list[str]) -> int:
         return 0
     warn("cloud", f"it tries again, and could not the last time: {problem}")
     return 1
+
+
+def _note(arguments: argparse.Namespace) -> None:
+    """The spool's receipts say from now on that its batches are in the copy too, so that this is missed."""
+    folder = load(arguments.config).recorder.spool
+    if not (folder / RECEIPTS).exists():
+        return
+    try:
+        with Spool(folder) as spool:
+            moving.note(spool, Store.existing(url(arguments)))
+    except SpoolUnusable as error:
+        warn("cloud", f"that batches of this computer are in the copy is not noted in its spool: {error}")
 
 
 def _empty(folder: Path, arguments: argparse.Namespace) -> int:

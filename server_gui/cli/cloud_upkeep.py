@@ -44,7 +44,9 @@ def retain(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     store = _writable(arguments)
     tables = [TABLES[name] for name in arguments.table or (TELEMETRY.name, RESOURCES.name)]
+    # Whole minutes: at these receipts tell how many rows of a batch are to be there still.
     before = datetime.now(UTC) - timedelta(days=arguments.days)
+    before = before.replace(second=0, microsecond=0) if arguments.days else before
     old = upkeep.retain(store, tables, before, dry_run=True)
     total = sum(old.values())
     question = f"remove {total} rows from before {when(before)} UTC of {store.url}?"

@@ -138,7 +138,7 @@ class Labelling:
                 store = connect(self._settings.store)
                 for number in spool.waiting():
                     send(spool, number, store)
-                for text in spool.anew:
+                for text in spool.notices:
                     log.error("%s", text)
             except StoreError as error:
                 return Where.SPOOL, str(error)

@@ -10,7 +10,7 @@ from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.objects import Objects
 from ml.store.store import ABOUT
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.receipt_check import Advance
+from server_gui.core.cloud.counting import Advance
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, lost_batches, send
@@ -58,4 +58,4 @@ def empty(
                 except StoreError as error:  # as where a file of the table is gone that this one is in
                     waits.append(f"batch {number} waits: {error}")
                 advance(1)
-        return Emptied(store.url, uploaded, [*spool.anew, *problems], waits, notes)
+        return Emptied(store.url, uploaded, [*spool.notices, *problems], waits, notes)

@@ -1,44 +1,32 @@
 """A store mended: files that are gone or damaged taken out of its tables, and batches brought again.
 
 What is brought is what the receipts say was there and is not, and what went to a store and has no receipt
-(any more); both from the spool's second copies. Interrupted anywhere, it is simply called again.
+(any more); both from the spool's second copies. A file goes only where all that it held comes back so.
+Interrupted anywhere, it is simply called again.
 """
 
 import contextlib
 import uuid
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-import pyarrow as pa
-
 from ml.store import durable, mending
+from ml.store.errors import StoreError
 from ml.store.fragments import DataFile
 from ml.store.private import FILE
-from ml.store.store import Batches, Store
-from ml.store.tables import Table
+from ml.store.store import Store
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.receipt_check import Advance, Proof, prove
+from server_gui.core.cloud.again import Again, Untouched, Whose, whose
+from server_gui.core.cloud.counting import Advance, Batch
+from server_gui.core.cloud.receipt_check import Proof, prove
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt, Receipts
 from server_gui.core.recording.segment import Segment
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import upload
-
-
-class Again(Store):
-    """A store to which what completes a batch may be brought, also where that was brought before and lost."""
-
-    def append(
-        self, table: Table, location: str, schema: pa.Schema, batches: Batches, writer: str, sequence: int
-    ) -> bool:
-        """As `Store.append`; what completes a batch is asked for only where it is known to be missing."""
-        if super().append(table, location, schema, batches, writer, sequence):
-            return True
-        completes = "." in writer.rpartition("/")[2]
-        named = f"{writer}.{uuid.uuid4().hex[:12]}"
-        return completes and super().append(table, location, schema, batches, named, sequence)
+from server_gui.core.recording.upload import Sent, upload
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +36,23 @@ class Plan:
     files: Sequence[DataFile]
     batches: Sequence[int]
     lost: Sequence[str]
+    kept: Sequence[DataFile] = ()  # damaged, and they stay: rows of them are in no second copy
+    behind: Sequence[int] = ()  # second copies that cannot be brought as a whole while these are there
+
+    @property
+    def accepted(self) -> "Plan":
+        """The same, where somebody accepts that such rows are lost."""
+        batches = sorted({*self.batches, *self.behind})
+        return Plan([*self.files, *self.kept], batches, self.lost)
+
+
+@dataclass(frozen=True, slots=True)
+class Mended:
+    """What was done, and in words what could not be done."""
+
+    files: Sequence[DataFile]
+    batches: Sequence[int]
+    problems: Sequence[str]
 
 
 def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> Plan:
@@ -57,53 +62,115 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
         StoreError: it could not be looked, or a table's log is damaged.
 
     """
-    seen = _look(store, spool, expect, deep=True)
+    receipts = verify.receipts_of(spool.folder)
     copies = verify.second_copies(spool.folder)
-    unproven = {batch.number for batch in verify.copies(spool.folder, _known(seen.receipts))[0]}
-    lacking = seen.proof.lacking
-    if seen.broken or mending.taken_out(store):  # nobody can count what files held of these
-        lacking = lacking | seen.proof.shortened
+    unproven = {batch.number for batch in verify.copies(spool.folder, _known(receipts))[0]}
+    held = _held(store, spool, unproven)
+    said = [Receipt(*batch, store.url, parts) for batch, parts in held.items()]
+    broken, proof = _look(store, [*receipts, *said], expect, values=False)
+    broken = [*broken, *proof.misread]
+    lacking = set(proof.lacking)
+    if broken or mending.taken_out(store)[0]:  # nobody can count what files held of these
+        lacking |= {batch for batch, _ in proof.vague}
     again = {number for number, batch in copies.items() if batch in lacking} | unproven
+    if broken:
+        held |= _held(store, spool, {number for _, number in lacking} - unproven)
+    kept = _kept(broken, proof, held)
     waiting = spool.waiting()  # the next upload brings these
-    nowhere = sorted(
-        number for _, number in seen.proof.lacking - set(copies.values()) if number not in waiting
-    )
+    nowhere = sorted(number for _, number in proof.lacking - set(copies.values()) if number not in waiting)
     lost = (
         [f"the spool has no second copy of {verify.told_batches(nowhere)}: bring one back"] if nowhere else []
     )
-    return Plan(seen.broken, sorted(again), lost)
+    staying = [file for file in broken if whose(file) in kept]
+    going = [file for file in broken if whose(file) not in kept]
+    open_ = {batch for batch, part, _ in proof.missing if whose(part) not in kept}
+    missing = [*((batch, part) for batch, part, _ in proof.missing), *proof.vague]
+    behind = {batch for batch, part in missing if whose(part) in kept}
+    now = {number for number in again if copies[number] in open_ or copies[number] not in behind}
+    lost += [_told(store, file) for file in staying]
+    later = sorted(number for number in again if copies[number] in behind)
+    return Plan(going, sorted(now), lost, staying, later)
 
 
-def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object]) -> list[str]:
-    """Do it; in words, what could not be done.
+def _told(store: Store, file: DataFile) -> str:
+    return (
+        f"{store.url}/{file.location}/{file.path} is damaged or gone, and stays in its table: not all of its "
+        f"{file.rows} rows are in second copies here. Bring it back from a copy of the store; with "
+        "--accept-loss it is taken out, and what can be brought is brought"
+    )
+
+
+def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, tuple[Part, ...]]:
+    """What second copies, and batches that wait, could bring; nothing of those that cannot be read."""
+    found = {}
+    untouched = Untouched.existing(store.url) if numbers else store
+    for number in numbers:
+        with contextlib.suppress(SpoolUnusable):
+            sent = _sent(untouched, spool, number)
+            found[sent.writer, number] = sent.parts
+    return found
+
+
+def _kept(broken: Iterable[DataFile], proof: Proof, held: Mapping[Batch, Iterable[Part]]) -> set[Whose]:
+    """Where damaged files hold more than comes back when they go."""
+    rows: Counter[tuple[Batch, Whose, object]] = Counter()
+    for batch, parts in held.items():
+        rows.update({_name(batch, part): part.rows for part in parts})
+    comes: Counter[Whose] = Counter()
+    nowhere = set()
+    for batch, part, missing in proof.missing:
+        if rows[_name(batch, part)] < part.rows:
+            nowhere.add(whose(part))
+        comes[whose(part)] += missing
+    goes: Counter[Whose] = Counter()
+    for file in broken:
+        goes[whose(file)] += file.rows
+    return {each for each in goes if each in nowhere or comes[each] < goes[each]}
+
+
+def _name(batch: Batch, part: Part) -> tuple[Batch, Whose, object]:
+    """By what a receipt's part is found again in a second copy, of which some may be damaged."""
+    return batch, whose(part), part.stream and (part.stream.connection, part.stream.stream)
+
+
+def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object]) -> Mended:
+    """Do it.
 
     Raises:
         StoreError: it is not known what was done; call it again.
 
     """
     mending.take_out(store, plan.files, advance)
-    problems = list(plan.lost)
+    store.closed = frozenset(whose(file) for file in plan.kept)
+    brought, problems = [], list(plan.lost)
     for number in plan.batches:
         try:
-            _bring(store, spool, number)
+            _bring(store, spool, number, is_behind=number in plan.behind)
+            brought.append(number)
         except (Damaged, SpoolUnusable) as error:
             problems.append(f"batch {number}: {error}")
         advance(1)
-    return problems
+    return Mended(plan.files, brought, problems)
 
 
 def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> None:
     """From now on what is there counts as what was sent; what was said before is kept beside.
 
     Raises:
-        StoreError: a table's log is damaged, so nobody can say what is there.
+        StoreError: something is damaged, so nobody can say what is there.
 
     """
-    seen = _look(store, spool, expect, deep=False)
-    whole = [each for each in seen.receipts if isinstance(each, Receipt)]
-    if len(whole) < len(seen.receipts):
+    receipts = verify.receipts_of(spool.folder)
+    broken, proof = _look(store, receipts, expect, values=True)
+    for file in (*broken, *proof.misread):
+        raise StoreError(
+            f"nothing was accepted: {store.url}/{file.location}/{file.path} is damaged or gone; bring it "
+            "back from a copy, or run gwrms cloud mend again"
+        )
+    whole = verify.own_receipts(receipts, spool.folder)
+    if len(whole) < len(receipts):
         _rewrite(spool.folder / RECEIPTS, whole)
-    for (writer, number), parts in sorted(seen.proof.wrong.items()):
+    for (writer, number), parts in sorted(proof.wrong.items()):
         spool.receipts.add(
             Receipt(writer, number, store.url, parts, ("what was missing of it was accepted",))
         )
@@ -111,26 +178,20 @@ def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMa
         spool.receipts.add(Receipt(spool.id, number, store.url, (), ("that it is nowhere was accepted",)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """What receipts say, which files cannot be read, and what the others prove."""
-
-    receipts: Sequence[Receipt | Altered]
-    broken: Sequence[DataFile]
-    proof: Proof
-
-
 def _look(
-    store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]], *, deep: bool
-) -> _Seen:
-    """With `deep` each value is read; without, it is compared with what was sent."""
-    receipts = verify.receipts_of(spool.folder)
+    store: Store,
+    receipts: Sequence[Receipt | Altered],
+    expect: Callable[[int], AbstractContextManager[Advance]],
+    *,
+    values: bool,
+) -> tuple[list[DataFile], Proof]:
+    """Which files are damaged or gone, and what the others prove; with `values` whether it is as sent."""
     found = verify.files(store)
     with expect(2 * len(found)) as advance:
-        broken = verify.broken(store, found, advance, deep=deep)
+        broken = verify.broken(store, found, advance, deep=True)
         gone = {(file.location, file.path) for file in broken}
         sound = [file for file in found if (file.location, file.path) not in gone]
-        return _Seen(receipts, broken, prove(store, receipts, sound, advance, values=not deep))
+        return broken, prove(store, receipts, sound, advance, values=values)
 
 
 def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
@@ -138,21 +199,33 @@ def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
     draft = file.with_name(f"{file.name}.draft")
     draft.unlink(missing_ok=True)
     draft.touch(FILE)
+    anew = Receipts(draft)
     for each in receipts:
-        Receipts(draft).add(each)
+        anew.add(each)
     file.with_name(f"{file.name}.{uuid.uuid4().hex[:8]}.damaged").hardlink_to(file)
     draft.replace(file)
     durable.synchronise([file])
 
 
-def _bring(store: Again, spool: Spool, number: int) -> None:
+def _bring(store: Again, spool: Spool, number: int, *, is_behind: bool) -> None:
     """What the store lacks of a second copy, and its receipt where there is none."""
-    file = spool.folder / f"{number:08}.uploaded.db"
-    with contextlib.closing(Segment(file, number)) as segment:
-        sent = upload(segment, spool.id, store)
+    store.left.clear()
+    store.passed.clear()
+    sent = _sent(store, spool, number)
+    left = list(store.left)
+    if is_behind:
+        left += (f"{store.url}/{each} waits for its damaged files" for each in sorted(store.passed))
+    if left:
+        raise Damaged(f"{'; '.join(left)}; all else of it is in the store")
     if sent.is_damaged and (sent.writer, number) in _known(verify.receipts_of(spool.folder)):
         raise Damaged("; ".join(sent.lost))  # what its receipt says of the whole batch still counts
     spool.receipts.add(Receipt(sent.writer, number, store.url, sent.parts, sent.lost))
+
+
+def _sent(store: Store, spool: Spool, number: int) -> Sent:
+    copy, waits = (spool.folder / f"{number:08}{suffix}" for suffix in (".uploaded.db", ".db"))
+    with contextlib.closing(Segment(copy if copy.exists() else waits, number, written=True)) as segment:
+        return upload(segment, spool.id, store)
 
 
 def _known(receipts: Sequence[object]) -> set[tuple[str, int]]:

@@ -1,43 +1,35 @@
 """Whether what receipts say is in the store: each batch's rows once, and as they were sent."""
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
 import msgspec
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from ml.store import sums, upkeep
-from ml.store.errors import StoreError, StoreRefused, StoreUnreachable, translated
+from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.fragments import DataFile
 from ml.store.store import Store
-from ml.store.tables import TABLES, TELEMETRY
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt
+from ml.store.tables import TABLES
+from server_gui.core.cloud.counting import Advance, Batch, Claim, count
+from server_gui.core.recording.receipts import (
+    RECEIPTS,
+    Altered,
+    Mark,
+    Part,
+    Receipt,
+    canonical,
+    is_of_batch,
+    units_told,
+    went_to,
+)
+from server_gui.core.recording.tally import Units
 
-Advance = Callable[[int], object]
-AT_ONCE: Final = 4  # files
-NAMING: Final = ("connection", "stream", "seq")
-ORIGIN: Final = ("spool", "batch")
-_OWN: Final = {each.name: each.type for each in TELEMETRY.schema}
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
-
-Batch = tuple[str, int]  # its writer and number
-_Whose = tuple[str, str | None, str | None]  # location, robot, session
-
-
-@dataclass(slots=True)
-class _Claim:
-    """What a receipt says of rows in a table, and what is found of them."""
-
-    batch: Batch
-    part: Part
-    rows: int = 0
-    sum: int = 0
+_US: Final = timedelta(microseconds=1)
+_MINUTE: Final = timedelta(minutes=1)  # what marks are apart, if they are not less
 
 
 @dataclass(slots=True)
@@ -52,7 +44,9 @@ class Proof:
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
     lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
-    shortened: set[Batch] = field(default_factory=set)  # by retention: how many others there are is not known
+    missing: list[tuple[Batch, Part, int]] = field(default_factory=list)  # how many rows of which parts
+    vague: list[tuple[Batch, Part]] = field(default_factory=list)  # how many retention has left nobody knows
+    misread: Sequence[DataFile] = ()  # files that have not the columns that they should have
     wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
 
 
@@ -72,46 +66,70 @@ def prove(
     The receipts are older than the list of files: what they speak of was in the store by then.
 
     Raises:
-        StoreUnreachable, StoreRefused: it could not be looked.
+        StoreError: it could not be looked.
 
     """
-    proof, here = Proof(), _here(store)
-    newest: dict[Batch, Receipt] = {}
-    for found in receipts:
-        if isinstance(found, Altered):
-            proof.problems.append(f"line {found.line} of the spool's {RECEIPTS} {found.text}")
-        elif not found.parts:  # nothing of the batch could be sent
-            continue
-        elif found.url == store.url or not here.isdisjoint(part.table for part in found.parts):
-            newest[found.writer, found.batch] = found
-        else:
-            proof.elsewhere += 1
-    claims = [_Claim(batch, part) for batch, each in newest.items() for part in each.parts]
-    proof.problems += _count(store, claims, files, advance, values=values)
-    retained = {location: upkeep.retained(store, location) for location in {c.part.location for c in claims}}
-    wrong = set()
+    proof = Proof()
+    all_here = _here(store, list(receipts), proof)
+    newest = {(each.writer, each.batch): each for each in all_here}
+    parts = [(batch, part) for batch, each in newest.items() for part in each.parts]
+    retained = _retained(store, {part.location for _, part in parts}, proof.problems)
+    claims = [_claim(batch, part, retained[part.location]) for batch, part in parts]
+    told = units_told(all_here)
+    units = {location: store.units(location) for location in retained if location not in unknown}
+    problems, proof.misread = count(store, claims, files, units, advance, values=values)
+    proof.problems += problems
+    wrong = _units_wrong(store, claims, told, units, proof)
+    wrong |= {claim.batch for claim in claims if claim.part.location in unknown}
+    known = (claim for claim in claims if claim.part.location not in unknown)
+    wrong |= {claim.batch for claim in known if not _judge(store, claim, proof, values=values)}
+    proof.seen = sum(claim.found.rows for claim in claims)
+    mine = defaultdict(list)
     for claim in claims:
-        proof.seen += claim.rows
-        problem = _problem(claim, retained[claim.part.location], values=values)
-        if claim.part.location in unknown:
-            wrong.add(claim.batch)
-        elif problem:
-            wrong.add(claim.batch)
-            if claim.rows < claim.part.rows:
-                proof.lacking.add(claim.batch)
-            proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
-        else:
-            proof.rows += claim.rows
-            proof.retained += claim.part.rows - claim.rows
-            if claim.rows < claim.part.rows and _outlasts(claim.part, retained[claim.part.location]):
-                proof.shortened.add(claim.batch)
-    for batch in wrong:
-        proof.wrong[batch] = tuple(_found(claim) for claim in claims if claim.batch == batch)
+        mine[claim.batch].append(claim)
+    proof.problems += _columns_gone(store, (claim for claim in claims if claim.batch in wrong), told, units)
+    proof.wrong = {batch: tuple(_found(claim, told, units) for claim in mine[batch]) for batch in wrong}
     proof.here, proof.batches = len(newest), len(newest) - len(wrong)
     return proof
 
 
-def _here(store: Store) -> set[str]:
+def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> list[Receipt]:
+    """Those of what went to this store, by its URL or by what its tables are called."""
+    here = tables(store)
+    sent_here = went_to((each for each in receipts if isinstance(each, Receipt)), store.url)
+    here |= {part.table for each in sent_here for part in each.parts}
+    found = []
+    for each in receipts:
+        if isinstance(each, Altered):
+            proof.problems.append(f"line {each.line} of the spool's {RECEIPTS} {each.text}")
+        elif not each.parts:  # nothing of the batch could be sent
+            continue
+        elif canonical(each.url) == canonical(store.url) or any(part.table in here for part in each.parts):
+            found.append(each)
+        else:
+            proof.elsewhere += 1
+    return found
+
+
+def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
+    """Whether its rows are as they were sent, as far as retention has left them."""
+    problem = _problem(claim, values=values)
+    missing = claim.expected[0] - claim.there[0]
+    if not problem:
+        proof.rows += claim.found.rows
+        proof.retained += claim.part.rows - claim.found.rows
+    else:
+        proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
+    if is_of_batch(claim.batch[0]):  # all else no second copy brings
+        if problem and missing > 0:
+            proof.lacking.add(claim.batch)
+            proof.missing.append((claim.batch, claim.part, missing))
+        if claim.went and not claim.is_all:
+            proof.vague.append((claim.batch, claim.part))
+    return not problem
+
+
+def tables(store: Store) -> set[str]:
     """What the store's tables are called for ever."""
     found = set()
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
@@ -124,163 +142,97 @@ def _here(store: Store) -> set[str]:
     return found
 
 
-def _count(
-    store: Store, claims: Sequence[_Claim], files: Sequence[DataFile], advance: Advance, *, values: bool
-) -> list[str]:
-    """Count what is there of each claim; which files cannot be read."""
-    streams: dict[_Whose, list[_Claim]] = defaultdict(list)
-    others: dict[str, dict[Batch, _Claim]] = defaultdict(dict)
-    for claim in claims:
-        part, whose = claim.part, claim.part.stream
-        if whose is None:
-            others[part.location][claim.batch] = claim
-        else:
-            streams[part.location, whose.robot, whose.session].append(claim)
-    ordered = {whose: _Streams(mine) for whose, mine in streams.items()}
-
-    def look(file: DataFile) -> Sequence["_Seen"] | str:
-        mine = ordered.get((file.location, file.robot, file.session))
-        theirs = others.get(file.location)
+def _retained(store: Store, locations: Set[str], problems: list[str]) -> dict[str, datetime | None]:
+    """Up to which time rows were removed; where nobody can say, none were, and it is told."""
+    found: dict[str, datetime | None] = {}
+    for location in sorted(locations):
         try:
-            if mine is not None:
-                return _merged(mine.seen(batch, file, values) for batch in _rows(store, file, values, NAMING))
-            if theirs:
-                return _merged(_seen(theirs, batch, values) for batch in _rows(store, file, values, ORIGIN))
+            found[location] = upkeep.retained(store, location)
+        except (StoreUnreachable, StoreRefused):
+            raise
         except StoreError as error:
-            return str(error)
-        except pa.ArrowException as error:
-            return f"{store.url}/{file.location}/{file.path} is not as it was written: {error}"
-        finally:
-            advance(1)
-        return ()
-
-    with ThreadPoolExecutor(AT_ONCE, "prove") as pool:
-        problems: list[str] = []
-        for seen in pool.map(look, files):
-            if isinstance(seen, str):
-                problems.append(seen)
-                continue
-            for claim, rows, total in seen:
-                claim.rows += rows
-                claim.sum += total
-    return problems
+            found[location] = None
+            problems.append(str(error))
+    return found
 
 
-_Seen = tuple[_Claim, int, int]  # rows of it, their sum
+def _units_wrong(
+    store: Store,
+    claims: Sequence[Claim],
+    told: Mapping[str, Units],
+    units: Mapping[str, Units],
+    proof: Proof,
+) -> set[Batch]:
+    """Tell where a column has another unit than what was sent; the newest batch of each such table."""
+    newest = {claim.part.location: claim for claim in claims}
+    wrong = set()
+    for location, claim in newest.items():
+        there = units.get(location, {})
+        for name, unit in told.get(claim.part.table, {}).items():
+            if there.get(name, unit) != unit:
+                wrong.add(claim.batch)
+                proof.problems.append(
+                    f"{store.url}/{location}: {name} is in {there[name] or 'no unit'} there, and its values "
+                    f"were sent in {unit or 'no unit'}: bring the table's log back from a copy"
+                )
+    return wrong
 
 
-def _merged(found: Iterable[Sequence[_Seen]]) -> Sequence[_Seen]:
-    """All of a file, or nothing where it cannot be read to its end."""
-    return [seen for batch in found for seen in batch]
+def _columns_gone(
+    store: Store, wrong: Iterable[Claim], told: Mapping[str, Units], units: Mapping[str, Units]
+) -> Iterator[str]:
+    """Which columns these claims' tables have no more."""
+    for location, table in {claim.part.location: claim.part.table for claim in wrong}.items():
+        if gone := [name for name in told.get(table, {}) if name not in units.get(location, told[table])]:
+            yield (
+                f"{store.url}/{location} has no column {', '.join(gone)} any more: bring the table's log "
+                "back from a copy"
+            )
 
 
-def _rows(store: Store, file: DataFile, values: bool, naming: Sequence[str]) -> Iterator[pa.RecordBatch]:
-    name = f"{file.location}/{file.path}"
-    with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
-        for batch in pq.ParquetFile(opened).iter_batches(columns=None if values else list(naming)):
-            yield _plain(batch)
-
-
-def _plain(batch: pa.RecordBatch) -> pa.RecordBatch:
-    """Texts as texts: the table format's library has a way of its own to write them."""
-    for place, column in enumerate(batch.schema):
-        if column.type == pa.string_view():
-            batch = batch.set_column(place, column.name, batch.column(place).cast(pa.string()))
-    return batch
-
-
-class _Streams:
-    """The claims on one robot's session, to be found by connection, stream and notification."""
-
-    def __init__(self, claims: Sequence[_Claim]) -> None:
-        self._claims: dict[tuple[str, int], list[_Claim]] = defaultdict(list)
-        for claim in claims:
-            if claim.part.stream is not None:
-                self._claims[claim.part.stream.connection, claim.part.stream.stream].append(claim)
-        self._firsts: dict[tuple[str, int], np.ndarray[tuple[int], np.dtype[np.int64]]] = {}
-        for name, mine in self._claims.items():
-            mine.sort(key=_first)
-            self._firsts[name] = np.array([_first(claim) for claim in mine], np.int64)
-
-    def seen(self, batch: pa.RecordBatch, file: DataFile, values: bool) -> Sequence[_Seen]:
-        """What these rows of a file are of each claim."""
-        connections, streams, seqs = (batch[name].to_numpy(zero_copy_only=False) for name in NAMING)
-        found: list[_Seen] = []
-        for connection in batch["connection"].unique().to_pylist():
-            mine = connections == connection
-            for stream in np.unique(streams[mine]).tolist():
-                rows = np.flatnonzero(mine & (streams == stream))
-                claims = self._claims.get((connection, stream))
-                if claims:
-                    same = {"robot": str(file.robot), "session": str(file.session), "connection": connection}
-                    each = _sums(batch.take(pa.array(rows)), same) if values else None
-                    found += _shared(claims, self._firsts[connection, stream], seqs[rows], each)
-        return found
-
-
-def _shared(
-    claims: Sequence[_Claim],
-    firsts: np.ndarray[tuple[int], np.dtype[np.int64]],
-    seqs: np.ndarray[tuple[int], np.dtype[np.int64]],
-    each: sums.Sums | None,
-) -> Iterator[_Seen]:
-    """Rows of one stream among the claims on it, each of which begins with one of `firsts`."""
-    places = np.searchsorted(firsts, seqs, "right") - 1
-    for place in np.unique(places[places >= 0]).tolist():
-        claim = claims[place]
-        stream = claim.part.stream
-        rows = (places == place) & (seqs <= (stream.last if stream else 0))
-        yield claim, int(rows.sum()), 0 if each is None else int(each[rows].sum(dtype=np.uint64))
-
-
-def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> sums.Sums:
-    """Of rows of telemetry, whatever types somebody may have given them."""
-    names = [name for name in batch.schema.names if name not in same]
-    columns = [batch[name].cast(_OWN.get(name, pa.float64()), safe=False) for name in names]
-    return sums.of_numbers(pa.record_batch(columns, names=names), same)
-
-
-def _seen(claims: Mapping[Batch, _Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
-    """What these rows of another table are of each claim."""
-    each = sums.of_rows(pa.Table.from_batches([batch])).tolist() if values else [0] * batch.num_rows
-    names = zip(batch["spool"].to_pylist(), batch["batch"].to_pylist(), strict=True)
-    found: dict[Batch, list[int]] = defaultdict(list)
-    for name, total in zip(names, each, strict=True):
-        if name in claims:
-            found[name].append(total)
-    return [(claims[name], len(mine), sum(mine)) for name, mine in found.items()]
-
-
-def _found(claim: _Claim) -> Part:
+def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> Part:
     """What is there of a claim, as its receipt would say it."""
-    return msgspec.structs.replace(claim.part, rows=claim.rows, sum=sums.told(claim.sum))
+    part, there = claim.part, units.get(claim.part.location, {})
+    return msgspec.structs.replace(
+        part,
+        rows=claim.found.rows,
+        sum=sums.told(claim.found.sum),
+        names="",
+        marks=(),
+        units={name: there[name] for name in told.get(part.table, {}) if name in there},
+    )
 
 
-def _first(claim: _Claim) -> int:
-    return claim.part.stream.first if claim.part.stream else 0
+def _claim(batch: Batch, part: Part, retained: datetime | None) -> Claim:
+    if retained is None or part.begin_us is None or _time(part.begin_us) >= retained:
+        return Claim(batch, part)
+    from_us = (retained - _EPOCH) // _US
+    if part.end_us is not None and part.end_us < from_us:
+        return Claim(batch, part, is_old=True, rest=Mark(from_us, 0, sums.told(0)))
+    rest = next((mark for mark in part.marks if mark.from_us >= from_us), None)
+    exact = rest is not None and (rest.from_us == from_us or not (retained - _EPOCH) % _MINUTE)
+    return Claim(batch, part, is_old=True, rest=rest, is_all=exact)
 
 
-def _problem(claim: _Claim, retained: datetime | None, *, values: bool) -> str | None:
+def _problem(claim: Claim, *, values: bool) -> str | None:
     """What is wrong with the rows of a claim, in words."""
     part, (writer, batch) = claim.part, claim.batch
-    whole = claim.rows == part.rows and (not values or sums.told(claim.sum) == part.sum)
-    old = retained is not None and part.begin_us is not None and _time(part.begin_us) < retained
-    if whole or (old and claim.rows < part.rows):
+    (sent, total), (rows, found) = claim.expected, claim.there
+    if claim.is_open:
         return None
     whose = f"batch {batch} of {writer}"
     if part.stream is not None:
         whose += f", {part.stream.robot}, session {part.stream.session}, stream {part.stream.stream}"
-    if claim.rows < part.rows:
-        return f"{part.rows - claim.rows} of {part.rows} rows are missing ({whose})"
-    if claim.rows > part.rows:
-        return f"{claim.rows - part.rows} rows more than the {part.rows} that were sent: doubled ({whose})"
-    return f"the {part.rows} rows are not as they were sent: altered ({whose})"
-
-
-def _outlasts(part: Part, retained: datetime | None) -> bool:
-    """Whether some of its rows are newer than what was removed."""
-    return retained is not None and part.end_us is not None and _time(part.end_us) >= retained
+    if rows < sent:
+        return f"{sent - rows} of {sent} rows are missing ({whose})"
+    if rows > sent:
+        return f"{rows - sent} rows more than the {sent} that were sent: doubled ({whose})"
+    if values and found != total:
+        return f"the {sent} rows are not as they were sent: altered ({whose})"
+    if not values and part.names and rows == part.rows and sums.told(claim.found.names) != part.names:
+        return f"of the {sent} rows some are missing and as many others doubled or renamed ({whose})"
+    return None
 
 
 def _time(us: int) -> datetime:
-    return _EPOCH + timedelta(microseconds=us)
+    return _EPOCH + us * _US

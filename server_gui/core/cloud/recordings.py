@@ -6,7 +6,7 @@ neither missed nor found twice.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -23,11 +23,11 @@ from ml.store.labels import holding
 from ml.store.later import recorded_order
 from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
-from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
 from server_gui.core.cloud import spooled
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Receipts, went_to
 
 _US: Final = timedelta(microseconds=1)
 Row = dict[str, Any]
@@ -96,7 +96,7 @@ class Recordings:
             receipts = list(Receipts(self._spool / RECEIPTS).whole())
         except OSError:  # nobody can say, and that the spool cannot be read is told besides
             return None
-        sent = [each for each in receipts if each.url == self._store.url]
+        sent = went_to(receipts, self._store.url)
         wanted = {part.location for each in sent for part in each.parts if part.stream and part.rows}
         lost = [location for location in sorted(wanted) if not self._is_there(location)]
         return (
@@ -158,9 +158,11 @@ class Recordings:
             return []
 
     def _looked_into(self, session: Session) -> "_Waiting":
-        location = TELEMETRY.location(session.robot, 1 if self._store is None else self._store.about.shards)
-        units = {} if self._store is None else self._store.units(location)
-        return _Waiting(self._spool, self._missing(location, self._batches), session, units)
+        shards = 1 if self._store is None else self._store.about.shards
+        location = TELEMETRY.location(session.robot, shards)
+        there = {} if self._store is None else self._store.columns(location)
+        batches = self._missing(location, self._batches)
+        return _Waiting(self._spool, batches, session, there, shards)
 
     def _is_there(self, location: str) -> bool:
         try:
@@ -205,11 +207,18 @@ class _Waiting:
     """A session's telemetry in these batches, as columns of the store; read when it is asked for."""
 
     def __init__(
-        self, spool: Path, batches: Sequence[int], session: Session, units: dict[str, str | None]
+        self,
+        spool: Path,
+        batches: Sequence[int],
+        session: Session,
+        there: Mapping[str, Known],
+        shards: int,
     ) -> None:
         self._spool = spool
         self._session = session
-        self._units = units
+        self._there = there
+        self._shards = shards
+        self._before: dict[int, Mapping[str, Known]] = {}  # the table's columns when a batch comes to it
         self._samples: Counter[str] = Counter()
         self._pieces = {batch: piece for batch in batches if (piece := self._looked_into(batch))}
         self.rows = sum(piece.rows for piece in self._pieces.values())
@@ -231,10 +240,11 @@ class _Waiting:
     def channels(self, stored: Sequence[Channel]) -> list[Channel]:
         """With those that the store has of the session."""
         samples = self._samples + Counter({each.name: each.samples for each in stored})
-        units = {each.name: each.unit for each in stored}
-        return [
-            Channel(name, units.get(name) or self._units.get(name), samples[name]) for name in sorted(samples)
-        ]
+        told = {each.name: each.unit for each in stored}
+        return [Channel(name, told.get(name, self._unit(name)), samples[name]) for name in sorted(samples)]
+
+    def _unit(self, column: str) -> str | None:
+        return self._there.get(column, Known()).unit
 
     def added_to(self, session: Session) -> Session:
         """The session with the extent of all of its rows."""
@@ -246,7 +256,9 @@ class _Waiting:
         return msgspec.structs.replace(session, first=first, last=last, rows=session.rows + self.rows)
 
     def _looked_into(self, batch: int) -> Piece | None:
+        self._before[batch] = self._there
         rows = self._table(batch)
+        self._there = {**self._there, **columns(rows.schema)}
         if not rows.num_rows:
             return None
         for name in rows.column_names:
@@ -256,9 +268,13 @@ class _Waiting:
         return Piece(utc["min"], utc["max"] + _US, stamps["min"], stamps["max"], rows.num_rows)
 
     def _table(self, batch: int) -> pa.Table:
+        """With the columns to which the upload brings the batch, which has other robots' channels too."""
         runs = list(spooled.runs(self._spool, self._session, batch))
-        columns = Columns((run.layout for run in runs), self._units)
-        self._units |= {
-            each.name: (each.metadata or {}).get(b"unit", b"").decode() or None for each in columns.schema
-        }
-        return pa.Table.from_batches(map(columns.batch, runs), schema=columns.schema)
+        here = TELEMETRY.location(self._session.robot, self._shards)
+        layouts = [
+            layout
+            for robot, layout in spooled.layouts(self._spool, batch)
+            if TELEMETRY.location(robot, self._shards) == here
+        ]
+        found = Columns(layouts, self._before[batch])
+        return pa.Table.from_batches(map(found.batch, runs), schema=found.schema)

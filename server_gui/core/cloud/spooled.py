@@ -16,9 +16,11 @@ from ml.store import sessions as sessions_
 from ml.store.fragments import Extent
 from ml.store.sessions import Session, unstored
 from ml.store.tables import SESSIONS
+from server_gui.core.recording.checksums import DATA, is_sound, unaltered
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import Layout, Record, Run, unpack
-from server_gui.core.recording.segment import DATA, is_sound, translated, unaltered
+from server_gui.core.recording.segment import translated
+from server_gui.core.recording.spool_files import identity
 
 _NUMBER: Final = "[0-9]" * 8
 _decoder = msgspec.msgpack.Decoder(Record)
@@ -100,10 +102,14 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
         yield unpack(session.robot, session.session, connection, stream, layout, data)
 
 
-def identity(spool: Path) -> str:
-    """What the spool is called; nothing where there is none."""
-    file = spool / "id"
-    return file.read_text().strip() if file.exists() else ""
+def layouts(spool: Path, batch: int) -> list[tuple[str, Layout]]:
+    """Each robot in this batch with each of its layouts, in the order in which they came."""
+    found: list[tuple[str, Layout]] = []
+    sql = "SELECT CAST(robot AS BLOB), description FROM layout ORDER BY id"
+    for robot, description in _read(spool, batch, sql):
+        with contextlib.suppress(msgspec.MsgspecError, TypeError, UnicodeError):  # its runs are damaged then
+            found.append((robot.decode(), _layout_decoder.decode(description)))
+    return found
 
 
 def writer(spool: Path, number: int) -> str:
@@ -153,12 +159,16 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
                 translated(file),
                 contextlib.closing(sqlite3.connect(f"{file.as_uri()}?mode=ro", uri=True)) as database,
             ):
-                return database.execute(sql, values).fetchall()
+                return database.execute(sql, values).fetchall() if _has(database, sql) else []
         except Damaged as error:
             raise Damaged(f"{error}; {what_to_do}") from error
-        except SpoolUnusable as error:
-            if "no such table" in str(error):
-                return []
+        except SpoolUnusable:
             if file.exists():
                 raise
     raise SpoolUnusable(f"batch {batch} of the spool {spool} has just gone to the store; ask again")
+
+
+def _has(database: sqlite3.Connection, sql: str) -> bool:
+    """Whether there is what is asked for: there may be no tables yet, and once there was no `meta`."""
+    tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+    return bool(tables) and ("meta" in tables or " meta " not in sql)

@@ -1,6 +1,6 @@
 """A recorded session to be played: its rows by time, from the store and from what waits in the spool."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final, Self
@@ -9,17 +9,16 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from ml.store import NoSuchTable, Store, sessions
+from ml.store import NoSuchTable, StoreError, sessions
 from ml.store.labels import utc_ns
-from ml.store.sessions import Session
-from ml.store.tables import EVENTS
-from server_gui.core.cloud import spooled
-from server_gui.core.recording.rows import Floats, Ints, Run
+from ml.store.sessions import Channel, Session
+from server_gui.core.cloud.recordings import Recorded, Recordings
+from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.rows import Floats, Ints
 from server_gui.core.settings.server_file import ServerSettings
 
 Bools = npt.NDArray[np.bool_]
 
-MOST_WAITING: Final = 400_000  # rows of the spool that are held in memory, the newest: above an hour of them
 US_NS: Final = 1_000  # the store keeps UTC to the microsecond
 
 
@@ -60,18 +59,20 @@ class Rows:
         return cls(np.maximum.accumulate(utc[order]), stamps_ns[order], columns)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Tape:
-    """A session, what happened in it, and how its rows are read; `units` are those of its channels."""
+    """A session, what happened in it, and how its rows are read; `units` are those of its channels.
+
+    It is as it was when it was opened. For one thread at a time.
+    """
 
     session: Session
     units: Mapping[str, str]
     events: Sequence[Mapping[str, Any]]
     first_ns: int
     last_ns: int
-    waiting: Rows
-    _stored: tuple[str, ...] = field(repr=False)
-    _url: str
+    _recorded: Recorded = field(repr=False)
+    _settings: ServerSettings = field(repr=False)
 
     @classmethod
     def open(cls, settings: ServerSettings, session: Session) -> Self:
@@ -82,70 +83,41 @@ class Tape:
             SpoolUnusable: what waits cannot be read.
 
         """
-        spool = settings.recorder.spool
-        batches = spooled.waiting(spool)
-        runs = (run for batch in batches for run in spooled.runs(spool, session, batch))
-        waiting = Rows.joined(_newest(map(_rows_of, runs)))
-        events: list[Mapping[str, Any]] = list(_of(session, spooled.rows(spool, EVENTS, batches)))
-        stored: dict[str, str | None] = {}
-        if session.uploaded and session.rows:
-            store = Store.existing(settings.store.url)
-            stored = {each.name: each.unit for each in sessions.channels(store, session)}
-            events = _once([*sessions.happenings(store, session), *events])
-        first_ns, last_ns = _extent(session, waiting)
-        units = _units(session, {**dict.fromkeys(waiting.columns), **stored})
-        return cls(session, units, events, first_ns, last_ns, waiting, tuple(stored), settings.store.url)
+        recordings, recorded = _look(settings, session)
+        session = recorded.session
+        if session.first is None or session.last is None:
+            raise NoSuchTable(
+                f"the session {session.session} has no telemetry, neither in the store nor in the spool"
+            )
+        events, units = recordings.happenings(session), _units(session, recorded.channels)
+        ends = utc_ns(session.first), utc_ns(session.last)
+        return cls(session, units, events, *ends, recorded, settings)
 
     def read(self, begin_ns: int, end_ns: int) -> Rows:
-        """The rows from `begin_ns` up to before `end_ns`; blocks. Raises `StoreError`."""
-        parts = [self.waiting.between(begin_ns, end_ns)]
-        if self._stored:
-            store = Store.existing(self._url)
-            found = sessions.telemetry(store, self.session, self._stored, as_time(begin_ns), as_time(end_ns))
-            parts += [_rows(table) for table in found]
-        return Rows.joined(parts)
+        """The rows from `begin_ns` up to before `end_ns`; blocks. Raises as `open`."""
+        try:
+            return self._read(begin_ns, end_ns)
+        except (SpoolUnusable, StoreError):  # what waited may have gone to the store, and old files
+            _, self._recorded = _look(self._settings, self.session)
+            return self._read(begin_ns, end_ns)
+
+    def _read(self, begin_ns: int, end_ns: int) -> Rows:
+        found = self._recorded.telemetry([*self.units], as_time(begin_ns), as_time(end_ns))
+        return Rows.joined([_rows(table) for table in found])
 
 
-def _units(session: Session, held: Mapping[str, str | None]) -> dict[str, str]:
-    """The unit of each channel that is there, in the robot's order; what the store says goes before."""
+def _look(settings: ServerSettings, session: Session) -> tuple[Recordings, Recorded]:
+    recordings = Recordings(settings.store.url, settings.recorder.spool)
+    if recordings.problem is not None and session.uploaded:
+        raise recordings.problem
+    return recordings, recordings.open(recordings.find(session.session, session.robot))
+
+
+def _units(session: Session, channels: Iterable[Channel]) -> dict[str, str]:
+    """The unit of each channel that is there, in the robot's order; what its column says goes before."""
+    held = {each.name: each.unit for each in channels}
     told = {name: str(unit) for name, unit in session.units.items() if name in held}
-    return told | {name: unit or told.get(name, "") for name, unit in held.items()}
-
-
-def _of(session: Session, rows: Iterable[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
-    return (row for row in rows if (row["robot"], row["session"]) == (session.robot, session.session))
-
-
-def _extent(session: Session, waiting: Rows) -> tuple[int, int]:
-    """From its first row to its last, in ns since 1970."""
-    begins = [utc_ns(time) for time in (session.first,) if time is not None]
-    ends = [utc_ns(time) for time in (session.last,) if time is not None]
-    if len(waiting):
-        begins.append(int(waiting.utc_ns[0]))
-        ends.append(int(waiting.utc_ns[-1]) + 1)
-    if not begins:
-        raise NoSuchTable(
-            f"the session {session.session} has no telemetry, neither in the store nor in the spool"
-        )
-    return min(begins), max(ends)
-
-
-def _newest(parts: Iterable[Rows]) -> list[Rows]:
-    """The newest `MOST_WAITING` rows of these."""
-    found = sorted((part for part in parts if len(part)), key=lambda part: int(part.stamps_ns[0]))
-    rows = 0
-    kept: list[Rows] = []
-    for part in reversed(found):
-        rows += len(part)
-        if rows > MOST_WAITING:
-            break
-        kept.append(part)
-    return kept
-
-
-def _rows_of(run: Run) -> Rows:
-    columns = dict(zip(run.layout.channels, run.values, strict=True))
-    return Rows(run.stamps_ns + run.utc_offset_ns, run.stamps_ns, columns)
+    return told | {name: told.get(name, "") if unit is None else unit for name, unit in held.items()}
 
 
 def _rows(table: pa.Table) -> Rows:
@@ -176,12 +148,6 @@ def _again(stamps_ns: Ints, columns: Mapping[str, Floats], order: Ints) -> Bools
 def _column(part: Rows, name: str) -> Floats:
     column = part.columns.get(name)
     return np.full(len(part), np.nan) if column is None else column
-
-
-def _once(events: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """In time's order; what was uploaded meanwhile is in both."""
-    found = {(row["utc"], row["kind"], row["text"]): row for row in events}
-    return [found[key] for key in sorted(found)]
 
 
 def as_time(instant_ns: int) -> datetime:

@@ -1,68 +1,27 @@
 """Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
 
 import contextlib
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
-import pyarrow.parquet as pq
-
-from gateway.cli.text import counted, size
+from gateway.cli.text import counted
 from ml.store import mending, reading
-from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, translated
+from ml.store.damage import damage
+from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable
 from ml.store.fragments import DataFile, data_files
-from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spooled
-from server_gui.core.cloud.receipt_check import Advance, Batch, Proof, prove
+from server_gui.core.cloud.counting import AT_ONCE, Advance, Batch
+from server_gui.core.cloud.receipt_check import Proof, prove
+from server_gui.core.cloud.verdict import Verdict
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts
-
-AT_ONCE: Final = 4  # files
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What was looked at, and in words what is wrong with it."""
-
-    files: Sequence[DataFile]
-    proof: Proof
-    problems: Sequence[str]
-    notes: Sequence[str] = ()  # what is not wrong, and worth knowing
-    rows_unproven: int = 0  # of the files that are whole, rows that no receipt here speaks of
-
-    @property
-    def rows(self) -> int:
-        """In the newest versions of the tables."""
-        return sum(file.rows for file in self.files)
-
-    @property
-    def unproven(self) -> str:
-        """How many rows no receipt speaks of, in words; nothing where there is none."""
-        rows = self.rows_unproven
-        return f"{rows} of {self.rows} rows are proven by no receipt here" if rows > 0 else ""
-
-    @property
-    def text(self) -> str:
-        """What is whole, and how far that is proven."""
-        rows = self.rows
-        size_bytes = sum(file.size_bytes for file in self.files)
-        told = [f"{len(self.files)} files with {rows} rows, {size(size_bytes)}"]
-        batches = counted(self.proof.batches, "batch", "batches")
-        if self.proof.batches:
-            told.append(f"all {self.proof.rows} rows of {batches} by their receipts")
-        else:
-            told.append("no receipts of it here, so nobody can say whether rows are missing")
-        if self.proof.retained:
-            told.append(f"{self.proof.retained} rows removed by retention")
-        if self.proof.elsewhere:
-            told.append(f"{self.proof.elsewhere} batches of this spool went to other stores")
-        return "; ".join(told)
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts, went_to
+from server_gui.core.recording.spool_files import identity
 
 
 def whole(
@@ -79,12 +38,12 @@ def whole(
     besides, also of rows that have no receipt.
 
     Raises:
-        StoreUnreachable, StoreRefused: it could not be looked.
+        StoreError: it could not be looked.
 
     """
     receipts = receipts_of(spool)  # before the files: what is sent meanwhile counts
     found, unreadable = look(store)
-    problems = list(unreadable.values())
+    problems = [*_not_its_own(spool, receipts), *unreadable.values()]
     pinned, gone = _pinned(store, found)
     problems += gone
     with expect(2 * len(found) + len(pinned)) as advance:
@@ -96,9 +55,12 @@ def whole(
         advance(len(found) - len(sound))
         proof = prove(store, receipts, sound, advance, values=values, unknown=unreadable.keys())
     problems += proof.problems
-    if proof.here or not proof.elsewhere:
+    # Where all went to other stores, this one need not have its batches; another's receipts do not say that.
+    if proof.here or not (proof.elsewhere and own_receipts(receipts, spool)):
         problems += batches_missing(store, spool)
-    notes = [*_notes(store, spool, proof, receipts)]
+    taken_out, unknown = mending.taken_out(store)
+    problems += unknown
+    notes = [*_notes(store, spool, proof, receipts, taken_out)]
     unproven = sum(file.rows for file in sound) - proof.seen
     return Verdict(found, proof, list(dict.fromkeys(problems)), notes, unproven)
 
@@ -120,11 +82,34 @@ def receipts_of(spool: Path) -> list[Receipt | Altered]:
         ) from error
 
 
+def _not_its_own(spool: Path, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
+    """Where the spool's name is damaged, and where receipts are another's, which prove nothing of its own."""
+    file, own = spool / "id", identity(spool)
+    if not own and (file.exists() or receipts):
+        yield (
+            f"{file} is {'damaged' if file.exists() else 'gone'}: bring it back from a copy; else the next "
+            "collector or gwrms cloud upload writes what its batches call it"
+        )
+    others = [each for each in receipts if isinstance(each, Receipt) and own and each.spool != own]
+    if others:
+        yield (
+            f"{counted(len(others), 'receipt')} in {spool / RECEIPTS} are of another spool, "
+            f"{others[0].spool}, and this one is {own}: bring its own {RECEIPTS}, or its id, back from a "
+            "copy; without one, gwrms cloud mend --accept-loss goes on without them"
+        )
+
+
 def _known(spool: Path) -> list[Receipt]:
     return [each for each in receipts_of(spool) if isinstance(each, Receipt)]
 
 
-def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
+def _notes(
+    store: Store,
+    spool: Path,
+    proof: Proof,
+    receipts: Sequence[Receipt | Altered],
+    gone: Sequence[mending.TakenOut],
+) -> Iterator[str]:
     """What can be done about it, what was done, and what is still to come."""
     if any(isinstance(each, Altered) for each in receipts):
         yield (
@@ -139,7 +124,7 @@ def _notes(store: Store, spool: Path, proof: Proof, receipts: Sequence[Receipt |
             f"the spool still has a second copy of {told_batches(again)}: end the collector and run gwrms "
             "cloud mend, which brings what is missing of it"
         )
-    if gone := mending.taken_out(store):
+    if gone:
         yield (
             f"{sum(each.rows for each in gone)} rows in {counted(len(gone), 'file')} were taken out "
             f"by gwrms cloud mend ({store.url}/mended says which); what receipts here prove is back"
@@ -157,7 +142,7 @@ def second_copies(spool: Path) -> dict[int, Batch]:
 
 def sent_to(url: str, spool: Path) -> int:
     """How many batches of the spool went to the store of this URL."""
-    return len({(each.writer, each.batch) for each in _known(spool) if each.url == url})
+    return len({(each.writer, each.batch) for each in went_to(_known(spool), url) if each.is_of_batch})
 
 
 def no_store(url: str, spool: Path) -> str:
@@ -226,12 +211,16 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
     """What is wrong with these files, in words: absent, of another size, unreadable, other rows.
 
     Each file's footer is read, and with `deep` every value.
+
+    Raises:
+        StoreError: of one of them nobody can say.
+
     """
     return filter(None, _each(store, wanted, advance, deep=deep))
 
 
 def broken(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> list[DataFile]:
-    """Which of these files are absent, cut off or unreadable."""
+    """Which of these files are absent, cut off or unreadable; raises as `damages` does."""
     told = _each(store, wanted, advance, deep=deep)
     return [file for file, problem in zip(wanted, told, strict=True) if problem]
 
@@ -240,7 +229,7 @@ def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: b
     sizes = {found.path: found.size_bytes for found in store.objects.listing()}
 
     def check(file: DataFile) -> str | None:
-        problem = _damage(store, file, sizes.get(f"{file.location}/{file.path}"), deep=deep)
+        problem = damage(store, file, sizes.get(f"{file.location}/{file.path}"), deep=deep)
         advance(1)
         return problem
 
@@ -248,92 +237,90 @@ def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: b
         yield from pool.map(check, wanted)
 
 
-def _damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) -> str | None:
-    name = f"{store.url}/{file.location}/{file.path}"
-    if size_bytes is None:
-        return f"{name} is not there, with {file.rows} rows"
-    if size_bytes != file.size_bytes:
-        return f"{name} has {size_bytes} bytes instead of {file.size_bytes}"
-    try:
-        rows = _decoded(store, file) if deep else footer(store, file).num_rows
-    except StoreError as error:
-        return str(error)
-    return None if rows == file.rows else f"{name} has {rows} rows instead of {file.rows}"
-
-
-def _decoded(store: Store, file: DataFile) -> int:
-    """How many rows it has, each of which was read."""
-    name = f"{file.location}/{file.path}"
-    with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
-        return sum(batch.num_rows for batch in pq.ParquetFile(opened).iter_batches())
-
-
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
     """The spool's batches that were set aside, are nowhere, or have no receipt though they were uploaded.
 
-    Of those with a receipt `prove` knows more.
+    Of those with a receipt `prove` knows more. Receipts are read last: a batch has its own before its file
+    has another name.
     """
-    receipts = _known(spool)
-    yield from _set_aside(spool, receipts)
-    unproven, problems = copies(spool, {(each.writer, each.batch) for each in receipts})
-    yield from _nowhere(spool, receipts)
+    aside, before = spooled.damaged(spool), _there(spool)
+    found, problems = _second_batches(spool)
+    receipts = [each for each in own_receipts(receipts_of(spool), spool) if each.is_of_batch]
+    yield from _set_aside(aside, receipts)
+    yield from _nowhere(spool, receipts, before)
     yield from problems
+    known = {(each.writer, each.batch) for each in receipts}
+    unproven = [batch for batch in found if (batch.writer, batch.number) not in known]
     yield from _without_receipt(spool, unproven)
     yield from _unknown(store, spool, unproven)
 
 
-def _set_aside(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
-    for number, file in spooled.damaged(spool):
+def own_receipts(receipts: Iterable[Receipt | Altered], spool: Path) -> list[Receipt]:
+    """Those that the spool itself has written, as far as its name is known."""
+    own = identity(spool)
+    return [each for each in receipts if isinstance(each, Receipt) and (not own or each.spool == own)]
+
+
+def _set_aside(aside: Iterable[tuple[int, Path]], receipts: Sequence[Receipt]) -> Iterator[str]:
+    for number, file in aside:
         lost = [each.lost for each in receipts if each.batch == number]
         told = "; ".join(lost[-1]) if lost else f"what batch {number} held is not in the store as a whole"
         yield f"{file} was set aside: {told}"
 
 
-def _nowhere(spool: Path, receipts: Sequence[Receipt]) -> Iterator[str]:
+def _nowhere(spool: Path, receipts: Sequence[Receipt], before: Set[int]) -> Iterator[str]:
     """Numbers are given one after another: one that is skipped was a batch."""
-    there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
-    if not receipts and there and min(there) > 1 and _has_name(spool, min(there)):
+    if not receipts and before and min(before) > 1 and _has_name(spool, min(before)):
         yield (
-            f"{spool / RECEIPTS} is not there, though the spool had {told_batches(range(1, min(there)))}: "
+            f"{spool / RECEIPTS} is not there, though the spool had {told_batches(range(1, min(before)))}: "
             "bring it back from a copy; without it nobody can say whether their rows are in the store"
         )
-    for number in nowhere(spool, receipts):
+    for number in nowhere(spool, receipts, before):
         yield f"batch {number} of the spool {spool} is nowhere: no receipt says that it was uploaded"
 
 
-def nowhere(spool: Path, receipts: Sequence[Receipt]) -> list[int]:
-    """Numbers of batches that neither a file nor a receipt has."""
-    there = {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
-    known = there | {each.batch for each in receipts}
-    first = min((each.batch for each in receipts), default=min(there, default=1))
+def nowhere(spool: Path, receipts: Sequence[Receipt], before: Set[int] = frozenset()) -> list[int]:
+    """Numbers of batches that neither a file has, now or `before` the receipts were read, nor a receipt."""
+    there = _there(spool) | before
+    batches = [each.batch for each in receipts if each.is_of_batch]
+    known = there.union(batches)
+    first = min(batches, default=min(there, default=1))
     return sorted(set(range(first, max(known, default=0))) - known)
+
+
+def _there(spool: Path) -> set[int]:
+    return {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
 
 
 def _has_name(spool: Path, number: int) -> bool:
     """Whether a batch was made since there are receipts."""
     try:
-        return spooled.writer(spool, number) != spooled.identity(spool)
+        return spooled.writer(spool, number) != identity(spool)
     except SpoolUnusable:
         return False
 
 
-def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
-    """The second copies that have no receipt, and which cannot be read."""
+def _second_batches(spool: Path) -> tuple[list[spooled.Batch], list[str]]:
+    """The second copies, and which cannot be read; not those that go meanwhile, to make room."""
     found, problems = [], []
     for number in spooled.uploaded(spool):
         try:
-            batch = spooled.batch(spool, number)
+            found.append(spooled.batch(spool, number))
         except SpoolUnusable as error:
-            problems.append(str(error))
-            continue
-        if (batch.writer, batch.number) not in known:
-            found.append(batch)
+            if number in spooled.uploaded(spool):
+                problems.append(str(error))
     return found, problems
+
+
+def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
+    """The second copies that have no receipt, and which cannot be read."""
+    found, problems = _second_batches(spool)
+    return [batch for batch in found if (batch.writer, batch.number) not in known], problems
 
 
 def _without_receipt(spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
     """Each had one before it was called uploaded; but for those from before there were any."""
-    own = spooled.identity(spool)
+    own = identity(spool)
     numbers = [batch.number for batch in unproven if batch.writer != own]
     if numbers:
         yield (
@@ -375,3 +362,7 @@ def _newest(store: Store, location: str, writer: str) -> int:
         return store.table(location).transaction_version(writer) or 0
     except NoSuchTable:
         return 0
+    except (StoreUnreachable, StoreRefused):
+        raise
+    except StoreError:  # which `look` tells
+        return sys.maxsize

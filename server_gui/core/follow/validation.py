@@ -3,6 +3,7 @@
 What does not pass raises `Unfit` and is as if it had never come. A robot may lie; no other one notices.
 """
 
+import contextlib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -125,7 +126,7 @@ def name(what: str, given: str) -> None:
 
 
 def batch(stream: int, given: Batch) -> None:
-    """Refuse rows that are not whole, or have numbers that 8 bytes do not hold."""
+    """Refuse rows that are not whole, or have numbers that 8 bytes do not hold, or values that are none."""
     rows = len(given.stamps_ns)
     if rows > MOST_ROWS:
         raise Unfit(f"{rows} rows in one notification; {MOST_ROWS} are the most that are taken at once")
@@ -135,6 +136,17 @@ def batch(stream: int, given: Batch) -> None:
         raise Unfit("a stamp, or another number, is larger than 8 bytes hold")
     if given.seq < 0 or not all(count in COUNTS for count in (given.dropped, given.missed, given.shed)):
         raise Unfit("a count of notifications or rows is negative, or larger than can be")
+    for channel, values in given.columns.items():
+        if not _are_numbers(values):
+            raise Unfit(f"a value of {channel!r:.80} is no number, or infinite")
+
+
+def _are_numbers(values: Sequence[float | None]) -> bool:
+    """Whether each is finite or missing."""
+    with contextlib.suppress(TypeError, OverflowError):
+        quickly = math.isfinite(sum(filter(None, values)))  # large ones may add up to what is not
+        return quickly or all(value is None or math.isfinite(value) for value in values)
+    return False
 
 
 def journal(entries: Sequence[Mapping[str, Any]]) -> None:

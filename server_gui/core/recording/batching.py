@@ -77,16 +77,13 @@ class Gathering:
             Unfit: it cannot be kept, and is as if it had never come.
 
         """
-        batch = new.batch
-        channels = tuple(batch.columns)
-        layout = self._layouts.get(channels) or self._layout(channels)
-        _check(new)
+        batch, layout = new.batch, self.check(new)
         before = (batch.seq - 1, batch.dropped, batch.shed)
         follows = batch.link == self._link and self._newest.get(new.stream) == before
-        steps = self.clock.steps(batch.received_ns, new.clocks)
         why = None if follows else self._why_new(new)
         if why is not None:
-            self.clock.connection()
+            self.clock.connection()  # which may be of another boot: no step of its clock
+        steps = self.clock.steps(batch.received_ns, new.clocks)
         offset_ns = self.clock.take(new.stream, batch.stamps_ns, new.clocks)
         events = [] if follows and not steps else self._happened(new, why, steps, offset_ns)
         self._newest[new.stream] = (batch.seq, batch.dropped, batch.shed)
@@ -94,6 +91,13 @@ class Gathering:
             name = (self.session, self.connection, new.stream, id(layout))
             self._gathered.setdefault(name, (layout, []))[1].append((batch, offset_ns))
         return events
+
+    def check(self, new: Notification) -> Layout:
+        """How its rows are laid out; raises as `take` would, and changes nothing."""
+        channels = tuple(new.batch.columns)
+        layout = self._layouts.get(channels) or self._layout(channels)
+        _check(new)
+        return layout
 
     def runs(self) -> list[Run]:
         """Everything gathered, and begin anew."""

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from ml.store.tables import TELEMETRY, UTC, field
+from ml.store.tables import TELEMETRY, UTC, Known, field
 from server_gui.core.recording.rows import Layout, Run
 
 OWN: Final = frozenset(TELEMETRY.schema.names)
@@ -19,13 +19,15 @@ class Columns:
 
     A channel's column has its name. Where that column has another unit, because another robot means something
     else by the name, or none although this channel has one, it is `name@unit`: values in different units
-    never stand in one column. Where the name is one of the table's own, or another in other letters' case,
-    which the table format takes for the same, it is `name@2`.
+    never stand in one column. Where the name is one of the table's own, another in other letters' case, which
+    the table format takes for the same, or a column that is another channel's already, it is `name@2`. A
+    column with such a name tells in its metadata whose it is; older ones do not.
     """
 
-    def __init__(self, layouts: Iterable[Layout], units: Mapping[str, str | None]) -> None:
-        self._there = frozenset(name.lower() for name in units)  # whose unit, or that they have none, stays
-        self._columns = {name.lower(): (name, unit) for name, unit in units.items()}
+    def __init__(self, layouts: Iterable[Layout], there: Mapping[str, Known]) -> None:
+        self._there = {name.lower(): known for name, known in there.items()}  # what these tell stays
+        self._columns = {name.lower(): (name, known.unit) for name, known in there.items()}
+        self._whose = {name: known.channel for name, known in self._there.items() if known.channel}
         self._names: dict[tuple[str, str | None], str] = {}
         for layout in layouts:
             for key in zip(layout.channels, layout.units, strict=True):
@@ -35,21 +37,28 @@ class Columns:
         self.schema = pa.schema(
             [
                 *TELEMETRY.schema,
-                *(field(name, pa.float64(), self._columns[name.lower()][1]) for name in channels),
+                *(self._field(name) for name in channels),
             ]
         )
 
     def _place(self, channel: str, unit: str | None) -> str:
         named = [channel] if unit is None else [channel, f"{channel}@{unit}"]
         further = (f"{channel}@{number}" for number in itertools.count(2))
-        name = next(name for name in itertools.chain(named, further) if self._fits(name, unit))
+        name = next(name for name in itertools.chain(named, further) if self._fits(name, unit, channel))
         known = self._columns.get(name.lower(), (name, None))[1]
         self._columns[name.lower()] = (name, unit if known is None else known)
+        self._whose[name.lower()] = channel
         return name
 
-    def _fits(self, name: str, unit: str | None) -> bool:
-        """Whether values in this unit may stand in the column of this name."""
-        if name.lower() in OWN:
+    def _field(self, name: str) -> pa.Field:
+        known = self._there.get(
+            name.lower(), Known(channel=self._whose[name.lower()] if "@" in name else None)
+        )
+        return field(name, pa.float64(), self._columns[name.lower()][1], known.channel)
+
+    def _fits(self, name: str, unit: str | None, channel: str) -> bool:
+        """Whether values of this channel, in this unit, may stand in the column of this name."""
+        if name.lower() in OWN or self._whose.get(name.lower(), channel) != channel:
             return False
         taken, known = self._columns.get(name.lower(), (name, None))
         open_ = known is None and name.lower() not in self._there

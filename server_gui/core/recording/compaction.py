@@ -28,15 +28,21 @@ class Compacting:
         self._noted = folder / "compacted"
         self._every_s = every_s
         self._process: subprocess.Popen[str] | None = None
+        self._problem = ""  # that kept it from beginning or ending, last
 
     def look(self) -> None:
-        """Begin when it is time, or see to what was begun; returns at once."""
-        if self._process is None:
-            if self._is_due():
-                self._begin()
-        elif self._process.poll() is not None:
-            self._ended(self._process)
-            self._process = None
+        """Begin when it is time, or see to what was begun; returns at once. What fails is said in the log."""
+        try:
+            if self._process is None:
+                if self._is_due():
+                    self._begin()
+            elif self._process.poll() is not None:
+                process, self._process = self._process, None
+                self._ended(process)
+        except (OSError, ValueError) as error:  # no memory or file for a process; what it said is cut off
+            if str(error) != self._problem:
+                log.warning("the store was not compacted: %s", error)
+            self._problem = str(error)
 
     def close(self) -> None:
         """End what was begun: nothing of it counts then, and nothing is lost. Idempotent."""
@@ -68,6 +74,7 @@ class Compacting:
             text=True,
             process_group=0,  # our Ctrl-C is not its
         )
+        self._problem = ""
         os.setpriority(os.PRIO_PROCESS, self._process.pid, NICENESS)
 
     def _ended(self, process: subprocess.Popen[str]) -> None:

@@ -6,7 +6,7 @@ to be brought, and what is there stays as it is.
 """
 
 import hashlib
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -20,47 +20,57 @@ from server_gui.core.recording.errors import Contradicted
 
 TEXTS = ("robot", "session", "connection")  # alike in all rows of a run
 _column = pyarrow.dataset.field
+Hear = Callable[[str], object]  # what contradicts, in words
 
 
-def of_telemetry(store: Store, location: str, batches: Iterable[pa.RecordBatch]) -> list[pa.RecordBatch]:
-    """The rows of these runs that the table does not have.
+def refuse(text: str) -> None:
+    """Bring nothing where something contradicts."""
+    raise Contradicted(text)
+
+
+def of_telemetry(
+    store: Store, location: str, batches: Iterable[pa.RecordBatch], hear: Hear = refuse
+) -> list[pa.RecordBatch]:
+    """The rows of these runs that the table does not have; `hear` of one twice, or with other values.
 
     Raises:
-        Contradicted: it has one of them twice, or with other values.
+        Contradicted: there is one, and nobody else wants to hear of it.
 
     """
     with translated(f"{store.url}/{location} cannot be read"):
         rows = store.dataset(location)
-        found = [_lacking(rows, batch, f"{store.url}/{location}") for batch in batches]
+        found = [_lacking(rows, batch, f"{store.url}/{location}", hear) for batch in batches]
     return [batch for batch in found if batch.num_rows]
 
 
-def of_rows(store: Store, table: Table, rows: pa.Table) -> pa.Table:
+def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> pa.Table:
     """The same of a batch's rows in another table."""
     mine = (_column("spool") == rows["spool"][0]) & (_column("batch") == rows["batch"][0])
     with translated(f"{store.url}/{table.name} cannot be read"):
         found = store.dataset(table.name).to_table(filter=mine)
     numbers = rows["number"].to_pylist()
-    known = _once(found["number"].to_pylist(), sums.of_rows(found).tolist(), f"{store.url}/{table.name}")
+    where = f"{store.url}/{table.name}"
+    known = _once(found["number"].to_pylist(), sums.of_rows(found).tolist(), where, hear)
     wrong = [
         number
         for number, ours in zip(numbers, sums.of_rows(rows).tolist(), strict=True)
         if number >= 0 and known.get(number, ours) != ours  # below: losses, as they were told the first time
     ]
     if wrong:
-        raise Contradicted(
-            f"{store.url}/{table.name} has something else as row {wrong[0]} of this batch; "
+        hear(
+            f"{where} has something else as row {wrong[0]} of this batch; "
             f"so it has of {len(wrong)} of {len(numbers)} rows"
         )
     return rows.filter(pa.array([number not in known for number in numbers]))
 
 
 def newer(rows: Sequence[pa.RecordBatch], store: Store, location: str) -> list[pa.RecordBatch]:
-    """Those of them that retention does not mean to be gone."""
+    """Those of them that retention does not mean to be gone; what has no time is never too old."""
     until = upkeep.retained(store, location) if rows else None
     if until is None:
         return list(rows)
-    found = [each.filter(pc.greater_equal(each["utc"], pa.scalar(until, each["utc"].type))) for each in rows]
+    young = (pc.greater_equal(each["utc"], pa.scalar(until, each["utc"].type)) for each in rows)
+    found = [each.filter(pc.fill_null(mask, True)) for each, mask in zip(rows, young, strict=True)]
     return [each for each in found if each.num_rows]
 
 
@@ -76,7 +86,7 @@ def numbers_alone(batch: pa.RecordBatch) -> tuple[pa.RecordBatch, dict[str, str]
     return batch.drop_columns(list(TEXTS)), {name: batch[name][0].as_py() for name in TEXTS}
 
 
-def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str) -> pa.RecordBatch:
+def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str, hear: Hear) -> pa.RecordBatch:
     mine, same = numbers_alone(batch)
     extent = pc.min_max(batch["utc"])
     named = (_column("utc") >= extent["min"]) & (_column("utc") <= extent["max"])
@@ -84,7 +94,7 @@ def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str) -
         named &= _column(key) == value
     found = rows.to_table(columns=mine.schema.names, filter=named).combine_chunks()
     [theirs] = found.to_batches() or [mine.slice(0, 0)]
-    known = _once(_keys(theirs), sums.of_numbers(theirs, same).tolist(), where)
+    known = _once(_keys(theirs), sums.of_numbers(theirs, same).tolist(), where, hear)
     keys = list(_keys(mine))
     wrong = [
         key
@@ -92,7 +102,7 @@ def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str) -
         if known.get(key, ours) != ours
     ]
     if wrong:
-        raise Contradicted(
+        hear(
             f"{where} has other values in {len(wrong)} of {len(keys)} rows of {same['robot']}, session "
             f"{same['session']}, connection {same['connection']}, from notification {wrong[0][0]} on"
         )
@@ -103,8 +113,8 @@ def _keys(batch: pa.RecordBatch) -> Iterator[tuple[int, int]]:
     return zip(batch["seq"].to_pylist(), batch["row"].to_pylist(), strict=True)
 
 
-def _once(keys: Iterable[Hashable], found: Sequence[int], where: str) -> dict[Hashable, int]:
+def _once(keys: Iterable[Hashable], found: Sequence[int], where: str, hear: Hear) -> dict[Hashable, int]:
     known = dict(zip(keys, found, strict=True))
     if len(known) < len(found):
-        raise Contradicted(f"{where} has {len(found) - len(known)} rows of this batch twice")
+        hear(f"{where} has {len(found) - len(known)} rows of this batch twice")
     return known

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple, Self
 from gateway.client import Batch
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
-from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES, TELEMETRY
 from server_gui.core.recording import records
 from server_gui.core.recording.batching import EventKind, Notification
 from server_gui.core.recording.clocks import Moment, Reading
@@ -436,12 +436,16 @@ class Recorder:
 
     def _freeze(self, ending: bool) -> None:
         settings = self._settings
+        is_full = self._spool.age_s >= settings.batch_s or self._spool.rows >= settings.batch_rows
+        if not (ending or self._cuts or is_full):
+            return
+        try:
+            self._spool.freeze()
+        except SpoolUnusable as error:  # tried again with the next turn
+            self._alarm(AlarmKind.SPOOL_FAILED, str(error))
+            return
+        self._alarm(AlarmKind.SPOOL_FAILED, None)
         cuts, self._cuts = self._cuts, []
-        if ending or cuts or self._spool.age_s >= settings.batch_s or self._spool.rows >= settings.batch_rows:
-            try:
-                self._spool.freeze()
-            except SpoolUnusable as error:
-                self._alarm(AlarmKind.SPOOL_FAILED, str(error))
         for then in cuts:
             then()
 
@@ -466,11 +470,12 @@ def _rows(part: Part) -> int:
 
 
 def _check(found: Sequence[Record]) -> None:
-    """Refuse what the store would not take, with `ValueError`."""
+    """Refuse what the store would not take, with `ValueError`: telemetry comes in runs alone."""
     by_table: dict[str, list[Mapping[str, Any]]] = {}
     for record in found:
         by_table.setdefault(record.table, []).append(record.fields)
     for name, rows in by_table.items():
-        if name not in TABLES:
-            raise ValueError(f"there is no table {name}; there are {', '.join(TABLES)}")
+        if name not in TABLES or name == TELEMETRY.name:
+            known = ", ".join(each for each in TABLES if each != TELEMETRY.name)
+            raise ValueError(f"there is no table {name} that takes single rows; there are {known}")
         TABLES[name].rows(rows)

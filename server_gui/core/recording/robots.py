@@ -28,7 +28,10 @@ class Robots:
         self.heads = dict(heads)
         self._robots: dict[str, Gathering] = {}
         self._sessions: dict[str, Session] = {}
-        self._names: dict[str, str] = {}  # what robots call themselves → robot
+        self._before: dict[
+            str, tuple[str, int | None]
+        ] = {}  # each one's last session, and its clock's UTC at 0
+        self._names: dict[str, str] = {}  # what each robot calls itself
         self._told: set[tuple[str, str]] = set()  # robot and problem: each is said once
 
     def runs(self) -> list[Run]:
@@ -40,8 +43,9 @@ class Robots:
         return self._robots.setdefault(robot, Gathering(robot))
 
     def take(self, robot: str, new: Notification) -> Iterable[Record]:
-        """Keep a notification; where there is no session it begins one."""
+        """Keep a notification; where there is no session it begins one. Raises as `Gathering.take`."""
         known = self.known(robot)
+        known.check(new)  # else a session would have begun of which nobody is told
         begun = [] if known.session else self.begin(records.begin(robot, Facts(units=known.units)))
         return [*begun, *known.take(new)]
 
@@ -67,6 +71,8 @@ class Robots:
     def end(self, robot: str, now: Moment) -> list[Record]:
         """End the robot's session, if there is one."""
         known = self.known(robot)
+        if known.session:
+            self._before[robot] = known.session, known.clock.utc_ns(0)
         known.session = ""
         session = self._sessions.pop(robot, None)
         return [] if session is None else [session.ended(known.clock.recorded_ns(now)).record()]
@@ -82,12 +88,17 @@ class Robots:
 
     def timed(self, record: Record) -> Record:
         """A prediction with the UTC that the row has which it is about; any other record as it is."""
-        known = self._robots.get(record.fields.get("robot", ""))
-        stamp_ns = record.fields.get("stamp_ns")
+        robot, session, stamp_ns = (record.fields.get(name) for name in ("robot", "session", "stamp_ns"))
+        known = self._robots.get(robot or "")
         if record.table != PREDICTIONS.name or known is None or stamp_ns is None:
             return record
-        utc_ns = known.clock.utc_ns(stamp_ns)
-        return record if utc_ns is None else Record(record.table, record.fields | {"utc": utc_ns})
+        of_sessions = (self._before.get(known.robot, ("", None)), (known.session, known.clock.utc_ns(0)))
+        offset_ns = dict(of_sessions).get(
+            session or ""
+        )  # each session is of one boot, with a clock of its own
+        if offset_ns is None:
+            return record
+        return Record(record.table, record.fields | {"utc": stamp_ns + offset_ns})
 
     def describe(self, robot: str, description: Description, now: Moment) -> list[Record]:
         """Take the channels' units; a name that differs from `robot`, or is another's too, is an event."""
@@ -96,11 +107,14 @@ class Robots:
         if description.robot != robot:
             problem = f"{robot} in the server's file calls itself {description.robot}"
             found += self._tell(robot, problem, EventKind.NAME, now)
-        other = self._names.setdefault(description.robot, robot)
-        if other != robot:
+        self._names[robot] = description.robot
+        for other in self._others_called(description.robot, robot):
             problem = f"{robot} and {other} both call themselves {description.robot}"
             found += self._tell(robot, problem, EventKind.NAME, now)
         return found
+
+    def _others_called(self, name: str, robot: str) -> list[str]:
+        return [each for each, called in self._names.items() if called == name and each != robot]
 
     def resources(self, robot: str, now: Moment, snapshot: ResourceSnapshot) -> list[Record]:
         """A look at the robot's computer."""
@@ -133,7 +147,7 @@ class Robots:
     def lost(self, whose: str, lost: Lost, what: str) -> list[Record]:
         """That rows were lost here; of nobody knows whom: told in the recording of every robot there is."""
         now = Moment.now()
-        known = [self._robots[whose]] if whose in self._robots else list(self._robots.values())
+        known = [self.known(whose)] if whose else [*self._robots.values()] or [Gathering("")]
         text = f"this server lost rows of {whose or 'all its robots'}: {what}"
         data = {"rows": lost.rows} | dict(zip(("from", "to"), lost.times_ns, strict=False))
         return [robot.now(EventKind.LOST, text, now, **data) for robot in known]

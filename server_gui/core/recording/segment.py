@@ -3,7 +3,9 @@
 import collections
 import contextlib
 import itertools
+import logging
 import operator
+import os
 import sqlite3
 import time
 import zlib
@@ -14,8 +16,12 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from ml.store.private import FILE
+from ml.store.tables import JOURNAL
+from server_gui.core.recording.checksums import DATA, of_head, of_layout, of_run, unaltered
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run, pack, unpack
+
+log = logging.getLogger(__name__)
 
 SCHEMA: Final = """
 BEGIN; -- one commit, so that a power cut leaves all of it or nothing
@@ -24,14 +30,17 @@ CREATE TABLE IF NOT EXISTS run (
     robot TEXT NOT NULL, connection TEXT NOT NULL, stream INTEGER NOT NULL,
     seq INTEGER NOT NULL, row INTEGER NOT NULL, -- of the first of its rows
     rows INTEGER NOT NULL, session TEXT NOT NULL, layout INTEGER NOT NULL, data BLOB NOT NULL,
-    crc INTEGER, -- as `_crc`; null in segments from before there was one
+    crc INTEGER, -- as `checksums.of_run`; null in segments from before there was one
     PRIMARY KEY (robot, connection, stream, seq, row)
 );
 CREATE TABLE IF NOT EXISTS record (
     number INTEGER PRIMARY KEY, content BLOB NOT NULL,
     crc INTEGER -- of the content; null in segments from before there was one
 );
-CREATE TABLE IF NOT EXISTS journal_head (robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS journal_head (
+    robot TEXT PRIMARY KEY, n INTEGER NOT NULL, hash TEXT NOT NULL,
+    crc INTEGER -- as `checksums.of_head`; null in segments from before there was one
+);
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL);
 COMMIT;
 """
@@ -40,7 +49,6 @@ PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hard
 MAPPED_BYTES: Final = 1 << 28
 _ALIKE: Final = operator.itemgetter(0, 6, 1, 2, 7)
 _COLUMNS: Final = "robot, connection, stream, seq, row, rows, session, layout, data, crc"
-DATA: Final = 8  # which of them is its rows
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
 # The last one: a statement of ours is refused, because the tables are not called as we have called them.
@@ -57,7 +65,9 @@ def translated(file: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        damaged = getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        # A file that we may write and that says it is only to be read does not say what we wrote.
+        damaged = code in _DAMAGED or (code == sqlite3.SQLITE_READONLY and os.access(file, os.W_OK))
         kind, how = (Damaged, "is damaged") if damaged else (SpoolUnusable, "cannot be used")
         raise kind(f"the spool's file {file} {how}: {error}") from error
     except OSError as error:
@@ -125,13 +135,13 @@ class Segment:
         self._sums: dict[int, int] = {}  # of each layout, which its runs' checksums begin with
         for number, robot, description in self._database.execute("SELECT * FROM layout"):
             self._layouts[robot, _layout_decoder.decode(description)] = number
-            self._sums[number] = _sum(robot, description)
+            self._sums[number] = of_layout(robot, description)
         self.rows = self._count()
         self.writer = self._told("writer")
 
     def _bring_forward(self) -> None:
         """Give a segment from before there were checksums room for them."""
-        for table in ("run", "record"):
+        for table in ("run", "record", "journal_head"):
             columns = [column[1] for column in self._database.execute(f"PRAGMA table_info({table})")]
             if "crc" not in columns:
                 self._database.execute(f"ALTER TABLE {table} ADD COLUMN crc INTEGER")
@@ -194,8 +204,8 @@ class Segment:
                 [(content, zlib.crc32(content)) for content in map(_encoder.encode, records)],
             )
             self._database.executemany(
-                "INSERT OR REPLACE INTO journal_head VALUES (?, ?, ?)",
-                [(robot, head.n, head.hash) for robot, head in heads.items()],
+                "INSERT OR REPLACE INTO journal_head (robot, n, hash, crc) VALUES (?, ?, ?, ?)",
+                [(robot, head.n, head.hash, of_head(robot, head)) for robot, head in heads.items()],
             )
         self.rows += sum(map(len, runs)) + len(records)
 
@@ -204,7 +214,7 @@ class Segment:
         layout = self._layout(run)
         name = (run.robot, run.connection, run.stream, *first, len(run), run.session, layout)
         data = pack(run)
-        return (*name, data, _crc(self._sums[layout], name, data))
+        return (*name, data, of_run(self._sums[layout], name, data))
 
     def _layout(self, run: Run) -> int:
         number = self._layouts.get((run.robot, run.layout))
@@ -213,7 +223,7 @@ class Segment:
             description = _encoder.encode(run.layout)
             line = (number, run.robot, description)
             self._database.execute("INSERT INTO layout VALUES (?, ?, ?)", line)
-            self._sums[number] = _sum(run.robot, description)
+            self._sums[number] = of_layout(run.robot, description)
             self._layouts[run.robot, run.layout] = number
         return number
 
@@ -273,7 +283,7 @@ class Segment:
         data, crc = line[DATA], line[DATA + 1]
         if not isinstance(data, bytes):
             return False
-        return crc is None or crc == _crc(self._sums.get(line[DATA - 1], 0), line[:DATA], data)
+        return crc is None or crc == of_run(self._sums.get(line[DATA - 1], 0), line[:DATA], data)
 
     def records(self) -> Iterator[Record]:
         """Every record, in the order in which it was recorded; without those that are `damaged_records`."""
@@ -298,7 +308,7 @@ class Segment:
     def robots(self) -> set[str]:
         """Every robot that something is of, or was before."""
         told = {str(record.fields["robot"]) for record in self.records() if record.fields.get("robot")}
-        return {robot for robot, _ in self._layouts} | told | self.heads().keys()
+        return {robot for robot, _ in self._layouts} | told | self._heads()[0].keys()
 
     def _whose(self, content: Any) -> tuple[str, ...]:
         """Whose record it may have been: what it says itself, where that is a robot; else any."""
@@ -309,10 +319,24 @@ class Segment:
         return tuple(sorted(known))
 
     def heads(self) -> dict[str, JournalHead]:
-        """The newest journal entry of each robot that is known here."""
+        """The newest journal entry of each robot that is known here.
+
+        Where one is not as it was written, that is the newest of the entries that are here themselves.
+        """
+        found, are_whole = self._heads()
+        if are_whole:
+            return found
+        log.error("%s is damaged: up to where a journal is recorded is looked for in its entries", self.path)
+        entries = [record.fields for record in self.records() if record.table == JOURNAL.name]
+        return {entry["robot"]: JournalHead(entry["n"], entry["hash"]) for entry in entries} | found
+
+    def _heads(self) -> tuple[dict[str, JournalHead], bool]:
+        """Those that are as they were written, and whether these are all."""
         with translated(self.path):
-            found = self._database.execute("SELECT robot, n, hash FROM journal_head")
-            return {robot: JournalHead(n, digest) for robot, n, digest in found}
+            lines = self._database.execute("SELECT robot, n, hash, crc FROM journal_head").fetchall()
+        told = [(robot, JournalHead(n, digest), crc) for robot, n, digest, crc in lines]
+        found = {robot: head for robot, head, crc in told if crc in (None, of_head(robot, head))}
+        return found, len(lines) == len(found)
 
     def close(self) -> None:
         """Let go of the file; SQLite brings its log home."""
@@ -334,29 +358,9 @@ class Segment:
         return size
 
 
-def unaltered(content: object, crc: int | None = None) -> bool:
-    """Whether a record is as it was written, as far as anybody knows."""
-    return isinstance(content, bytes) and crc in (None, zlib.crc32(content))
-
-
-def is_sound(robot: str, description: bytes, *line: Any) -> bool:
-    """Whether a run is as it was written, by its layout's description and all of its columns."""
-    data, crc = line[DATA], line[DATA + 1] if len(line) > DATA + 1 else None
-    return isinstance(data, bytes) and crc in (None, _crc(_sum(robot, description), line[:DATA], data))
-
-
 def _text(raw: bytes) -> str:
     """Also what is no text any more: its checksum tells."""
     return raw.decode(errors="replace")
-
-
-def _sum(robot: str, description: bytes) -> int:
-    return zlib.crc32(description, zlib.crc32(robot.encode()))
-
-
-def _crc(layout: int, name: tuple[object, ...], data: bytes) -> int:
-    """Of all that a run is: its layout (`_sum`), its name and its rows."""
-    return zlib.crc32(data, zlib.crc32(repr(name).encode(), layout))
 
 
 def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:

@@ -6,18 +6,28 @@ import shutil
 import sqlite3
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Self
 
 import msgspec
 
+from gateway.cli.text import counted
 from ml.store import durable
+from ml.store.later import opened_us
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
+from server_gui.core.recording.receipts import LOST, RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import Segment
-from server_gui.core.recording.spool_files import Files, Kept, has_log, take, writing
+from server_gui.core.recording.spool_files import (
+    Files,
+    Kept,
+    has_log,
+    identity,
+    is_identity,
+    take,
+    writing,
+)
 
 log = logging.getLogger(__name__)
 
@@ -42,8 +52,9 @@ def _free_bytes(folder: Path) -> int:
 class Spool:
     """One server's spool; use it as a context manager.
 
-    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, and what no other
-    opening has, because no opening can know that nobody has changed the files since the one before.
+    `writer` is what this opening of it is called at the store: the spool's `id`, a slash, when it was, and
+    what no other opening has, because no opening can know that nobody has changed the files since the one
+    before. Where the clock was set back, the time is just after the newest opening's that is known.
 
     `append` and `freeze` belong to one thread, the recorder's. Everything else may be called from others.
 
@@ -64,20 +75,20 @@ class Spool:
         self._reserve_bytes = reserve_bytes
         self._keep_bytes = keep_bytes
         self._free_bytes = free_bytes
-        self.anew: list[str] = []  # in words, where a store is another one than batches went to
+        self.notices: list[str] = []  # in words: a store that is another one, a damaged id, doubts
         self.missing: str | None = None  # in words, where files that were there are not any more
         self._lock = take(folder)
         try:
             with writing(folder):
-                self.id = self._files.identify()
-                durable.synchronise([folder / "id"])  # with the names of the folders above it
-                self.writer = f"{self.id}/{uuid.uuid4().hex[:12]}"
                 self.receipts = Receipts(folder / RECEIPTS)
-                self._writers = {self.id}
-                self._settled: set[int] = set()  # numbers of which nothing is to be told any more
                 self._files.finish_names()
                 self._files.keep_damaged_logs()
+                self.id = self._identify()
+                durable.synchronise([folder / "id"])  # with the names of the folders above it
+                self._writers = {self.id}
+                self._settled: set[int] = set()  # numbers of which nothing is to be told any more
                 self._heads = self._known_heads()
+                self.writer = self._name()
                 self._began_ns: int | None = None
                 self._current = self._resume()
                 self.first = self._current.number  # of what this opening writes
@@ -197,14 +208,15 @@ class Spool:
         Numbers are given one after another, and uploaded segments go oldest first: one that is skipped was
         a batch, unless its receipt says that it was uploaded.
         """
+        written = self._current.number  # first: one that is begun now is no gap
         files = self._files.own()
         receipt = self.receipts.newest()
         kept = [number for number, kept in files if kept is not Kept.DAMAGED]
         first = min([*kept, *([receipt.batch + 1] if receipt else [])], default=0)
         aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
-        gone = set(range(first, self._current.number)) - {number for number, _ in files}
+        gone = set(range(first, written)) - {number for number, _ in files}
         if found := (aside | gone) - self._settled:
-            self._settled |= found & {each.batch for each in self.receipts.all() if isinstance(each, Receipt)}
+            self._settle(found, gone)
         return {
             number: f"batch {number} of the spool {self.folder} cannot be read, and what it held is lost: "
             f"its file is kept as {self._files.path(number, Kept.DAMAGED).name}"
@@ -214,9 +226,32 @@ class Spool:
             for number in sorted(found - self._settled)
         }
 
+    def _settle(self, found: set[int], gone: set[int]) -> None:
+        """Tell nothing of those that have a receipt, nor where a receipt that is damaged may be of them."""
+        lines = list(self.receipts.all())
+        known = {each.batch for each in lines if isinstance(each, Receipt) and each.is_of_batch}
+        altered = [each.line for each in lines if isinstance(each, Altered)]
+        if altered and (doubtful := sorted((found & gone) - known)):
+            self._notice(
+                f"the files of {counted(len(doubtful), 'batch', 'batches')} of the spool {self.folder} (from "
+                f"batch {doubtful[0]} on) are not there, and line {altered[0]} of its {RECEIPTS} is damaged: "
+                "nobody can say whether they were uploaded. Bring that file back from a copy, and start again"
+            )
+            known.update(doubtful)
+        self._settled |= found & known
+
     def is_aside(self, number: int) -> bool:
         """Whether the segment was set aside, and is still there."""
         return self._files.path(number, Kept.DAMAGED).exists()
+
+    def loss_name(self, number: int) -> str:
+        """What the loss of this batch is called at the store: the same whoever tells it how often.
+
+        Where an older copy of the spool takes its place, and a batch is lost under the number again, it is
+        another. Raises `SpoolUnusable`.
+        """
+        with writing(self.folder):
+            return self._files.name_loss(number, f"{self.writer}/{LOST}")
 
     def told(self, number: int) -> None:
         """The store knows that this batch is lost."""
@@ -264,6 +299,42 @@ class Spool:
 
     def _roomy(self) -> bool:
         return self._free_bytes(self.folder) >= self._reserve_bytes
+
+    def _identify(self) -> str:
+        """The name of this spool at the store, given once; of one that is damaged, as its batches have it."""
+        if known := identity(self.folder):
+            return known
+        file = self.folder / "id"
+        damaged, found = file.exists(), next(filter(is_identity, self._called()), None)
+        named = found or str(uuid.uuid4())
+        self._files.identify(named)
+        if damaged or found:
+            source = "what its batches call it" if found else "a new name: nothing here knows the former one"
+            self._notice(f"the spool's {file} was {'damaged' if damaged else 'gone'}; it has {source} now")
+        return named
+
+    def _called(self) -> Iterator[str]:
+        """What receipts and segments call this spool, the newest first."""
+        receipt = self.receipts.newest()
+        if receipt:
+            yield receipt.spool
+        for number, kept in reversed(self._files.own()):
+            with (
+                contextlib.suppress(SpoolUnusable),
+                contextlib.closing(Segment(self._files.path(number, kept), number, written=True)) as segment,
+            ):
+                if segment.writer:
+                    yield segment.writer.partition("/")[0]
+
+    def _notice(self, text: str) -> None:
+        log.error("%s", text)
+        self.notices.append(text)
+
+    def _name(self) -> str:
+        """See `writer`, and ml/store/later.py."""
+        newest = self.receipts.newest()
+        known = max(map(opened_us, [*self._writers, *([newest.writer] if newest else [])]))
+        return f"{self.id}/{max(time.time_ns() // 1000, known + 1):016}-{uuid.uuid4().hex[:12]}"
 
     def _known_heads(self) -> dict[str, JournalHead]:
         heads: dict[str, JournalHead] = {}

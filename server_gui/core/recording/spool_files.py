@@ -6,6 +6,7 @@ is needed. `00000005.damaged.db` cannot be read, or runs of it cannot: these are
 stays for somebody to look at. The highest number is never removed, so that no number is given twice; should
 somebody have removed files, what is written from then on goes to the store under another `writer` anyway.
 `00000004.cut.db` is a copy of a segment whose log was damaged, as it was found: commits at its end are lost.
+`00000003.lost` is what the loss of a whole batch is called at the store, by whichever opening it is told.
 `receipts.jsonl` says what of each segment is in the store (receipts.py).
 """
 
@@ -16,7 +17,6 @@ import os
 import re
 import shutil
 import sqlite3
-import uuid
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
@@ -30,6 +30,8 @@ from server_gui.core.recording.wal import lost_commits
 
 log = logging.getLogger(__name__)
 
+_ID: Final = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
+_LOSS: Final = re.compile(rf"{_ID.pattern}/[0-9]{{16}}-[0-9a-f]{{12}}/lost")
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
@@ -87,18 +89,28 @@ class Files:
         """The numbers of those of which this has become."""
         return [number for number, kept in self.segments() if kept is wanted]
 
-    def identify(self) -> str:
-        """The name of this spool at the store, given once."""
-        file = self.folder / "id"
-        if not file.exists():
-            draft = file.with_name("id.draft")
-            with open(draft, "w", opener=opener) as out:
-                out.write(f"{uuid.uuid4()}\n")
-                out.flush()
-                os.fsync(out.fileno())
-            draft.rename(file)
-            durable.sync(self.folder)
-        return file.read_text().strip()
+    def identify(self, name: str) -> None:
+        """Write down what this spool is called at the store."""
+        self._write("id", name)
+
+    def name_loss(self, number: int, name: str) -> str:
+        """What the loss of this batch is called at the store; `name` where it has no name yet."""
+        file = self.folder / f"{number:08}.lost"
+        known = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
+        if not _LOSS.fullmatch(known):
+            self._write(file.name, name)
+            return name
+        return known
+
+    def _write(self, name: str, text: str) -> None:
+        file = self.folder / name
+        draft = file.with_name(f"{name}.draft")
+        with open(draft, "w", opener=opener) as out:
+            out.write(f"{text}\n")
+            out.flush()
+            os.fsync(out.fileno())
+        draft.rename(file)
+        durable.sync(self.folder)
 
     def keep_damaged_logs(self) -> None:
         """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
@@ -138,6 +150,29 @@ class Files:
                     "the log of batch %d was damaged: up to %d commits are lost; %s is a copy of both",
                     number, lost, copy,
                 )  # fmt: skip
+
+
+def identity(folder: Path) -> str:
+    """What the spool in this folder is called; nothing where there is none, or its `id` is damaged.
+
+    Raises:
+        SpoolUnusable: it may not be read.
+
+    """
+    file = folder / "id"
+    try:
+        told = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
+    except OSError as error:
+        raise SpoolUnusable(
+            f"the spool's name {file} cannot be read: {error.strerror or error}; run this as whom the spool "
+            "belongs to"
+        ) from error
+    return told if is_identity(told) else ""
+
+
+def is_identity(name: str) -> bool:
+    """Whether a spool may be called so."""
+    return _ID.fullmatch(name) is not None
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import uuid
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any, Final
 
 import msgspec
 import pyarrow as pa
+import pyarrow.dataset
 
 from gateway.cli.text import counted
 from ml.store.errors import NoSuchTable, translated
@@ -20,7 +22,7 @@ from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.losses import told_time
-from server_gui.core.recording.receipts import Part, Receipt
+from server_gui.core.recording.receipts import ANEW, Part, Receipt, went_to
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
 from server_gui.core.recording.spool import Spool
@@ -67,6 +69,7 @@ def lost_batches(spool: Spool, store: Store) -> list[str]:
 
     Raises:
         StoreError: it is not known whether that is in the store.
+        SpoolUnusable: the spool's disk refuses what is noted of it.
 
     """
     return [text for number, text in spool.untold().items() if _tell(spool, number, text, store)]
@@ -78,7 +81,7 @@ def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
     One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
     """
     lost = _Lost(_WHOLE, text, tuple(sorted(spool.robots_beside(number))), None, None, {"batch": number})
-    new = _append(store, lost, f"{spool.id}/lost", number, number)
+    new = _append(spool, store, lost, spool.loss_name(number), number, number)
     if spool.is_aside(number):
         spool.receipts.add(Receipt(spool.id, number, store.url, (), (text,)))
     spool.told(number)
@@ -90,7 +93,7 @@ def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -
     gone = sorted(spool.receipts.begun_anew(store.url, parts).items())
     if not gone:
         return
-    sent = [each for each in spool.receipts.whole() if each.url == store.url]
+    sent = went_to(spool.receipts.whole(), store.url)
     count = len({(each.writer, each.batch) for each in sent})
     robots = {part.stream.robot for each in sent for part in each.parts if part.stream}
     text = (
@@ -100,17 +103,35 @@ def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -
         "end the collector and run gwrms cloud mend, which brings again what the spool still has"
     )
     lost = _Lost(_WHOLE, text, tuple(sorted(robots)), None, None, {"batches": count})
-    _append(store, lost, f"{spool.id}/anew", number, gone[0][1])
-    spool.anew.append(text)
+    _append(spool, store, lost, f"{spool.id}/{ANEW}", number, gone[0][1])
+    spool.notices.append(text)
 
 
-def _append(store: Store, lost: "_Lost", writer: str, number: int, named: object) -> bool:
-    """The events that tell a loss, once; False where the store has them already."""
+def _append(spool: Spool, store: Store, lost: "_Lost", writer: str, number: int, named: object) -> bool:
+    """The events that tell a loss, once, and their receipt; False where the store has them already."""
     origin = {"spool": writer, "batch": number}
     now_ns = Moment.now().utc_ns
     rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
-    again = functools.partial(rows.to_reader, None)
-    return store.append(EVENTS, EVENTS.name, rows.schema, again, f"{writer}.{named}", 1)
+    new = _bring(store, rows, f"{writer}.{named}")
+    if not new and (gone := missing_rows.of_rows(store, EVENTS, rows)).num_rows:
+        new = _bring(store, gone, f"{writer}.{named}.{uuid.uuid4().hex[:12]}")
+    if new:
+        spool.receipts.add(Receipt(writer, number, store.url, (_told(store, writer, number),), (lost.text,)))
+    return new
+
+
+def _bring(store: Store, rows: pa.Table, named: str) -> bool:
+    return store.append(EVENTS, EVENTS.name, rows.schema, functools.partial(rows.to_reader, None), named, 1)
+
+
+def _told(store: Store, writer: str, number: int) -> Part:
+    """What the store has of such events."""
+    column = pyarrow.dataset.field
+    mine = (column("spool") == writer) & (column("batch") == number)
+    with translated(f"{store.url}/{EVENTS.name} cannot be read"):
+        found = store.dataset(EVENTS.name).to_table(filter=mine)
+    units = _units(store, EVENTS.name, found.schema)
+    return tallied(found, EVENTS.name, store.identity(EVENTS.name), units)
 
 
 def upload(segment: Segment, spool: str, store: Store) -> Sent:
@@ -179,7 +200,7 @@ def _telemetry(
     segment: Segment, writer: str, store: Store, location: str, robots: set[str]
 ) -> Iterable[Part]:
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
-    columns = Columns(layouts, store.units(location))
+    columns = Columns(layouts, store.columns(location))
     tally = Tally()
 
     def batches() -> Iterator[pa.RecordBatch]:
@@ -193,7 +214,7 @@ def _telemetry(
     if not store.append(TELEMETRY, location, columns.schema, batches, writer, segment.number):
         look = functools.partial(missing_rows.of_telemetry, store, location)
         _complete(store, TELEMETRY, location, writer, segment.number, lambda: look(batches()))
-    return tally.parts(location, store.identity(location))
+    return tally.parts(location, store.identity(location), _units(store, location, columns.schema))
 
 
 def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -> Part:
@@ -201,7 +222,14 @@ def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -
     if not store.append(table, table.name, data.schema, again, writer, batch):
         look = functools.partial(missing_rows.of_rows, store, table, data)
         _complete(store, table, table.name, writer, batch, lambda: look().to_batches())
-    return tallied(data, table.name, store.identity(table.name))
+    units = _units(store, table.name, data.schema)
+    return tallied(data, table.name, store.identity(table.name), units)
+
+
+def _units(store: Store, location: str, schema: pa.Schema) -> dict[str, str | None]:
+    """Of these columns, as the table has them."""
+    found = store.units(location)
+    return {name: found[name] for name in schema.names if name in found}
 
 
 def _complete(

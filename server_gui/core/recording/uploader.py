@@ -37,7 +37,7 @@ class UploaderState:
     upload_s: float = 0.0  # how long the newest one took
     problem: str | None = None
     damaged: tuple[str, ...] = ()  # files that were set aside: their rows are not in the store
-    lost: tuple[str, ...] = ()  # batches that are lost as a whole, or a store that is no more, in words
+    lost: tuple[str, ...] = ()  # in words: batches that are lost as a whole, a store that is no more, damage
     ahead: tuple[str, ...] = ()  # where the store has what this spool has lost, in words
 
 
@@ -106,15 +106,17 @@ class Uploader:
         backoff = Backoff(LOOK_S, LONGEST_S)
         asked = False
         while not self._ending.is_set():
-            asked = asked or self._asked.is_set()
-            self._asked.clear()
+            if self._asked.is_set():  # what is asked from here on stays for the next time
+                self._asked.clear()
+                asked = True
             if self._empty(asked):
                 asked = False
                 backoff.reset()
                 self._compact()
             self._turned.set()
             self.worker.beat()
-            self._asked.wait(backoff.next_s())
+            if not self._ending.is_set():  # set before `_asked`, which may have been cleared since
+                self._asked.wait(backoff.next_s())
         if self._compacting is not None:
             self._compacting.close()
 
@@ -153,9 +155,11 @@ class Uploader:
             yield
         except (StoreUnreachable, StoreRefused):
             raise
-        except StoreError as error:  # as where a file of the table is gone that this one is in
+        except (RecordingError, sqlite3.Error):
+            raise
+        except Exception as error:  # noqa: BLE001 - as where a file of the table is gone that this one is in
             self._store = None
-            self._left.append(f"{what}: {error}")
+            self._left.append(f"{what}: {_told(error)}")
             self.state = replace(self.state, problem=self._problem)
 
     @property
@@ -169,7 +173,7 @@ class Uploader:
     def _look(self, *, told: bool) -> None:
         """Alarm for batches that are lost as a whole, and have them `told` in the store."""
         lost = self._spool.untold()
-        self._alarm(lost.values())
+        self._alarm((*lost.values(), *self._spool.notices))
         if lost and told:
             self._store = self._store or self._reach()
             lost_batches(self._spool, self._store)
@@ -183,7 +187,7 @@ class Uploader:
 
     def _failed(self, what: str, error: Exception) -> bool:
         self._store = None
-        problem = str(error) if isinstance(error, KNOWN) else _unknown(error)
+        problem = _told(error)
         log.warning("%s: %s", what, problem)
         self.state = replace(self.state, problem=problem)
         return False
@@ -196,7 +200,7 @@ class Uploader:
             log.error("batch %d is not uploaded as a whole: %s", number, error)
             return
         finally:
-            self._alarm(self._spool.anew)
+            self._alarm(self._spool.notices)
         took_s, uploaded = time.monotonic() - began_s, self.state.uploaded + 1
         self.state = replace(self.state, uploaded=uploaded, upload_s=took_s, problem=self._problem)
         log.info("batch %d is in the store after %.1f s", number, took_s)
@@ -225,5 +229,7 @@ class Uploader:
         return waiting
 
 
-def _unknown(error: Exception) -> str:
+def _told(error: Exception) -> str:
+    if isinstance(error, KNOWN):
+        return str(error)
     return f"internal error, {type(error).__name__}"  # its text may quote keys

@@ -3,8 +3,10 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import sqlite3
+import zlib
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -19,6 +21,7 @@ from gateway.main import main
 from ml.store import Store
 from ml.store.tables import RESOURCES, TABLES, TELEMETRY
 from ml.store.upkeep import compact, pin, retain, vacuum
+from server_gui.core.cloud import spooled, verify
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.recorder import Recorder
@@ -57,6 +60,12 @@ class Place:
         found: dict[str, Any] = json.loads(self._capsys.readouterr().out)
         return found
 
+    def status(self, *words: str) -> int:
+        """The exit status of any command."""
+        status = main(["cloud", *words, "--config", str(self._config)])
+        self._capsys.readouterr()
+        return status
+
     def told(self, *words: str) -> str:
         main(["cloud", *(words or ("verify",)), "--config", str(self._config)])
         said = self._capsys.readouterr()
@@ -94,6 +103,10 @@ def rewrite(file: Path, change: Callable[[pa.Table], pa.Table]) -> None:
 
 def replaced(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:
     return rows.set_column(rows.column_names.index(name), rows.schema.field(name), values)
+
+
+def retyped(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:
+    return rows.set_column(rows.column_names.index(name), name, values)
 
 
 def altered(rows: pa.Table) -> pa.Table:
@@ -144,6 +157,51 @@ def row_removed(place: Place) -> None:
 
 def event_altered(place: Place) -> None:
     rewrite(place.files("events")[0], lambda rows: replaced(rows, "kind", pa.array(["marker"] * len(rows))))
+
+
+def in_the_log(change: Callable[[str], str]) -> Callable[[Place], None]:
+    """Other text in the entries of the telemetry's log."""
+
+    def damage(place: Place) -> None:
+        before = [entry.read_text() for entry in place.log()]
+        for entry, text in zip(place.log(), before, strict=True):
+            entry.write_text(change(text))
+        assert before != [entry.read_text() for entry in place.log()]
+
+    return damage
+
+
+def unit_altered(text: str) -> str:
+    return text.replace(r"\"unit\":\"rad\"", r"\"unit\":\"deg\"")
+
+
+def column_removed(text: str) -> str:
+    lines = [json.loads(line) for line in text.splitlines()]
+    for line in lines:
+        if "metaData" in line:
+            schema = json.loads(line["metaData"]["schemaString"])
+            schema["fields"] = [each for each in schema["fields"] if each["name"] != KNEE]
+            line["metaData"]["schemaString"] = json.dumps(schema)
+    return "".join(f"{json.dumps(line)}\n" for line in lines)
+
+
+def last_time_altered(text: str) -> str:
+    return re.sub(r'(\\"maxValues\\": ?\{[^}]*?\\"utc\\": ?\\")2', r"\g<1>1", text)
+
+
+def first_stamp_altered(text: str) -> str:
+    return re.sub(r'(\\"minValues\\": ?\{[^}]*?\\"stamp_ns\\": ?)5', r"\g<1>4", text)
+
+
+def time_in_the_footer_altered(place: Place) -> None:
+    """Of the file's own statistics, by which readers leave out rows."""
+    file = place.files()[0]
+    last = pq.read_table(file, partitioning=None)["utc"].cast(pa.int64()).to_pylist()[-1]
+    content = file.read_bytes()
+    begin = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    footer = content[begin:].replace(last.to_bytes(8, "little"), (last - 50_000).to_bytes(8, "little"))
+    assert footer != content[begin:]
+    file.write_bytes(content[:begin] + footer)
 
 
 def log_rolled_back(place: Place) -> None:
@@ -201,6 +259,35 @@ def pin_damaged(place: Place) -> None:
     file.write_text("{")
 
 
+def retention_note_damaged(place: Place) -> None:
+    file_deleted(place)
+    retain(Store(place.url), [TELEMETRY], datetime(1970, 1, 2, tzinfo=UTC))
+    [note] = (place.store / "retained").rglob("*.json")
+    note.rename(note.with_name("x.json"))
+
+
+def mended_note_damaged(place: Place) -> None:
+    file_deleted(place)
+    (place.store / "mended").mkdir()
+    (place.store / "mended" / "x.json").write_bytes(b"\xff")
+
+
+def without(name: str) -> Callable[[pa.Table], pa.Table]:
+    return lambda rows: rows.drop_columns([name])
+
+
+def numbers_as_text(rows: pa.Table) -> pa.Table:
+    return retyped(rows, "seq", rows["seq"].cast(pa.string()))
+
+
+def event_without_its_batch(place: Place) -> None:
+    rewrite(place.files("events")[0], without("batch"))
+
+
+def event_of_lists(place: Place) -> None:
+    rewrite(place.files("events")[0], lambda rows: retyped(rows, "spool", pa.array([["a"]] * len(rows))))
+
+
 def pinned_version_gone(place: Place) -> None:
     (place.store / "pins").mkdir()
     named = {"location": "telemetry/000", "version": 77, "by": "walking-1"}
@@ -249,6 +336,32 @@ def segment_removed(place: Place) -> None:
     (place.spool / "00000004.db").unlink()
 
 
+def receipts_of_another_spool(place: Place) -> None:
+    other = place.spool.with_name("other")
+    for _ in range(3):
+        record((place.spool.with_name("another")).as_uri(), other, "exo-09")
+    (place.spool / RECEIPTS).write_bytes((other / RECEIPTS).read_bytes())
+
+
+def id_of_another_spool(place: Place) -> None:
+    (place.spool / "id").write_text("00000000-0000-4000-8000-000000000000\n")
+
+
+def id_emptied(place: Place) -> None:
+    (place.spool / "id").write_bytes(b"")
+
+
+def id_garbled(place: Place) -> None:
+    (place.spool / "id").write_bytes(b"\xff\n")
+
+
+def loss_untold(place: Place) -> None:
+    """The event goes that says what was lost."""
+    segment_removed(place)
+    assert "batch 4 of the spool" in place.told("upload")
+    Store(place.url).table("events").delete("kind = 'lost'")
+
+
 DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (file_deleted, "is not there, with 100 rows"),
     (file_cut_off, "bytes instead of"),
@@ -259,6 +372,11 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (of_file(misplaced), "altered (batch"),
     (of_file(nulled), "altered (batch"),
     (event_altered, "/events: the 2 rows are not as they were sent: altered (batch"),
+    (in_the_log(unit_altered), f"{KNEE} is in deg there, and its values were sent in rad"),
+    (in_the_log(column_removed), f"/telemetry/000 has no column {KNEE} any more"),
+    (in_the_log(last_time_altered), "the table's log says that utc goes from "),
+    (in_the_log(first_stamp_altered), "the table's log says that stamp_ns goes from 4"),
+    (time_in_the_footer_altered, "its own statistics say that utc goes from "),
     (log_rolled_back, "/telemetry/000: 100 of 100 rows are missing (batch 3 of "),
     (log_entry_missing, "/telemetry/000"),
     (
@@ -274,6 +392,13 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (pinned_file_deleted, "is not there, with 2 rows (needed by version 3, which walking-1 names)"),
     (pinned_version_gone, "(needed by version 77, which walking-1 names)"),
     (pin_damaged, "is damaged: bring it back from a copy of the store"),
+    (retention_note_damaged, "retained/telemetry-000 has no time for a name"),
+    (mended_note_damaged, "mended/x.json is damaged"),
+    (of_file(without("seq")), "is not as it was written"),
+    (of_file(without("connection")), "is not as it was written"),
+    (of_file(numbers_as_text), "is not as it was written"),
+    (event_without_its_batch, "is not as it was written"),
+    (event_of_lists, "is not as it was written"),
     (receipts_cut_off, f"{RECEIPTS} has no receipt of the batches 2 to 3, which went to a store"),
     (receipts_deleted, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
     (receipts_and_second_copies_deleted, f"{RECEIPTS} is not there, though the spool had the batches 1 to 3"),
@@ -281,6 +406,12 @@ DAMAGES: list[tuple[Callable[[Place], None], str]] = [
     (segment_damaged, "00000004.damaged.db was set aside: 5 rows of exo-01, stream 1 from notification 7 on"),
     (segment_unreadable, "00000004.damaged.db was set aside: what batch 4 held is not in the store"),
     (segment_removed, "batch 4 of the spool"),
+    (receipts_of_another_spool, f"{RECEIPTS} are of another spool"),
+    (receipts_of_another_spool, f"{RECEIPTS} has no receipt of the batches 1 to 3, which went to a store"),
+    (id_of_another_spool, "3 receipts in "),
+    (id_emptied, "id is damaged: bring it back from a copy"),
+    (id_garbled, "id is damaged: bring it back from a copy"),
+    (loss_untold, "/events: 2 of 2 rows are missing (batch 4 of "),
 ]
 
 
@@ -304,6 +435,28 @@ def test_a_missing_file_is_named_once(place: Place) -> None:
     file_deleted(place)
     name = place.verify()[1].partition(" is not there")[0].rpartition("/")[2]
     assert place.verify()[1].count(name) == 1
+
+
+@pytest.mark.parametrize("damage", [retention_note_damaged, mended_note_damaged])
+def test_a_damaged_note_hides_no_other_damage(place: Place, damage: Callable[[Place], None]) -> None:
+    damage(place)
+    assert "is not there, with 100 rows" in place.verify()[1]
+
+
+def test_what_lies_about_in_the_store_and_is_no_note_is_not_read(place: Place) -> None:
+    for folder in ("retained/telemetry-000", "mended"):
+        (place.store / folder).mkdir(parents=True)
+        (place.store / folder / "notes.txt").write_text("junk")
+    assert place.verify() == (0, "")
+
+
+def test_a_spool_whose_name_cannot_be_read_is_refused_in_words(place: Place) -> None:
+    (place.spool / "id").unlink()
+    (place.spool / "id").mkdir()
+    assert place.status("mend") == 2
+    status, problems = place.verify()
+    assert status == 2
+    assert "the spool's name" in problems
 
 
 def test_there_is_no_batch_0(place: Place) -> None:
@@ -342,6 +495,72 @@ def test_counting_alone_finds_what_is_missing_and_not_what_is_altered(place: Pla
     assert "1 of 100 rows are missing" in place.verify("--quick")[1]
 
 
+def test_counting_alone_finds_a_row_that_is_there_twice_in_the_place_of_another(place: Place) -> None:
+    of_file(lambda rows: rows.take(pa.array([0, 0, *range(2, len(rows))])))(place)
+    assert "of the 100 rows some are missing and as many others doubled" in place.verify("--quick")[1]
+    rewrite(
+        place.files("events")[0], lambda rows: replaced(rows, "number", pa.array([7] * len(rows), pa.int64()))
+    )
+    assert "/events: of the 2 rows some are missing" in place.verify("--quick")[1]
+
+
+def test_what_is_younger_than_retention_is_missed_also_of_a_batch_that_is_partly_older(place: Place) -> None:
+    store = Store(place.url)
+    rows = store.dataset("telemetry/000").to_table(columns=["robot", "utc"]).to_pylist()
+    before = sorted(row["utc"] for row in rows if row["robot"] == "exo-02")[1]
+    retain(store, [TELEMETRY], before)
+    assert place.verify() == place.verify("--quick") == (0, "")
+    Store(place.url).table("telemetry/000").delete("robot = 'exo-02' AND seq = 15 AND row = 1")
+    assert "1 of " in place.verify()[1]
+    assert "rows are missing (batch 3 of " in place.verify("--quick")[1]
+
+
+def test_an_altered_value_is_found_in_what_retention_has_left_of_a_batch(place: Place) -> None:
+    store = Store(place.url)
+    rows = store.dataset("telemetry/000").to_table(columns=["robot", "utc"]).to_pylist()
+    retain(store, [TELEMETRY], sorted(row["utc"] for row in rows if row["robot"] == "exo-02")[1])
+    where = "robot = 'exo-02' AND seq = 15 AND row = 1"
+    Store(place.url).table("telemetry/000").update(updates={f'"{KNEE}"': "7.0"}, predicate=where)
+    assert "rows are not as they were sent: altered (batch 3 of " in place.verify()[1]
+
+
+def without_what_is_new(place: Place) -> None:
+    """Receipts as they were written before they had names, marks and units."""
+    file, lines = place.spool / RECEIPTS, b""
+    crc = 0
+    for line in file.read_bytes().splitlines():
+        told = json.loads(line)
+        parts = [
+            {name: value for name, value in part.items() if name not in ("names", "marks", "units")}
+            for part in told["parts"]
+        ]
+        assert parts != told["parts"]
+        body = json.dumps(
+            {name: told[name] for name in ("writer", "batch", "url")} | {"parts": parts, "lost": []}
+        )
+        crc = zlib.crc32(body[1:].encode(), crc)
+        lines += b'{"crc":"%08x",' % crc + body[1:].encode() + b"\n"
+    file.write_bytes(lines)
+
+
+def test_receipts_from_before_are_believed_and_prove_what_they_tell(place: Place) -> None:
+    without_what_is_new(place)
+    assert place.verify() == place.verify("--quick") == place.verify("--deep") == (0, "")
+    record(place.url, place.spool)
+    assert place.verify() == place.verify("--quick") == (0, "")
+    of_file(altered)(place)
+    row_removed(place)
+    assert "altered (batch" in place.verify()[1]
+    assert "1 of 100 rows are missing (batch 3 of " in place.verify()[1]
+
+
+def test_a_unit_that_was_accepted_is_told_no_more(place: Place) -> None:
+    in_the_log(unit_altered)(place)
+    assert place.verify("--quick")[0] == 1
+    place.told("mend", "--accept-loss", "--yes")
+    assert place.verify() == (0, "")
+
+
 def test_what_went_because_it_was_old_is_not_missed(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
     store = Store(place.url)
     [middle] = pc.quantile(store.dataset("telemetry/000").to_table()["utc"].cast(pa.int64()), 0.5).to_pylist()
@@ -373,6 +592,72 @@ def test_what_went_to_another_store_is_not_missed_here(place: Place, tmp_path: P
     record((tmp_path / "other").as_uri(), place.spool)
     assert place.verify() == (0, "")
     assert place.verify((tmp_path / "other").as_uri()) == (0, "")
+
+
+def test_a_store_that_was_moved_and_then_lost_is_missed(place: Place) -> None:
+    old, moved = place.url, place.store.with_name("moved")
+    assert "files copied" in place.told("upload", moved.as_uri(), "--from", old)
+    assert place.verify(moved.as_uri()) == (0, "")
+    shutil.rmtree(moved)
+    assert "there is no store" in place.verify(moved.as_uri())[1]
+    assert "3 batches of the spool" in place.verify(f"{moved.as_uri()}/")[1]
+    record(moved.as_uri(), place.spool, "exo-07")
+    assert "/telemetry/000: 100 of 100 rows are missing (batch 1 of " in place.verify(moved.as_uri())[1]
+    assert place.verify(old)[1].count("rows are missing") == 0
+
+
+@pytest.mark.parametrize("spelled", ["{}/", "{}/.", "%73tore"])
+def test_a_store_is_the_same_however_its_url_is_spelled(place: Place, spelled: str) -> None:
+    url = spelled.format(place.url) if "{" in spelled else place.url.removesuffix("store") + spelled
+    shutil.rmtree(place.store)
+    assert "3 batches of the spool" in place.verify(url)[1]
+
+
+def test_a_loss_whose_event_has_gone_is_told_again(place: Place) -> None:
+    loss_untold(place)
+    place.told("upload")
+    assert "rows are missing" not in place.verify()[1]
+    events = Store(place.url).dataset("events").to_table()
+    assert events["kind"].to_pylist().count("lost") == 2
+
+
+def test_where_the_spool_is_gone_nobody_can_judge_and_files_alone_are_looked_at_by_url(place: Place) -> None:
+    shutil.rmtree(place.spool)
+    status, problems = place.verify()
+    assert status == 2
+    assert "there is no spool at" in problems
+    assert place.verify(place.url) == (0, "")
+
+
+def test_a_batch_that_goes_to_the_store_while_somebody_looks_is_no_problem(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record(place.url, place.spool, sent=False)
+    listed = verify.receipts_of
+
+    def late(spool: Path) -> Any:
+        found = listed(spool)
+        with Spool(place.spool, reserve_bytes=0) as opened:
+            for number in opened.waiting():
+                send(opened, number, Store(place.url))
+        return found
+
+    monkeypatch.setattr(verify, "receipts_of", late)
+    assert list(verify.batches_missing(Store(place.url), place.spool)) == []
+
+
+def test_a_second_copy_that_goes_while_somebody_looks_is_no_problem(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = spooled.uploaded
+
+    def late(spool: Path) -> list[int]:
+        found = listed(spool)
+        (spool / "00000001.uploaded.db").unlink(missing_ok=True)
+        return found
+
+    monkeypatch.setattr(spooled, "uploaded", late)
+    assert place.verify() == (0, "")
 
 
 def test_where_nobody_can_look_the_exit_status_says_so(place: Place, tmp_path: Path) -> None:

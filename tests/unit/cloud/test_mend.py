@@ -3,6 +3,7 @@
 import contextlib
 import shutil
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -12,17 +13,21 @@ from ml.store.errors import StoreError
 from ml.store.tables import TELEMETRY
 from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import mend, verify
-from server_gui.core.recording.receipts import RECEIPTS
+from server_gui.core.cloud.again import Again
+from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.recording.spool import Spool
 from tests.unit.cloud.recordings import record
 from tests.unit.cloud.test_damages import (
     Place,
     altered,
+    event_without_its_batch,
     file_doubled,
+    numbers_as_text,
     of_file,
     receipt_altered,
     receipt_removed,
     row_removed,
+    without,
 )
 
 KEYS = ("robot", "session", "connection", "stream", "seq", "row")
@@ -90,6 +95,9 @@ def receipts_cut_off(place: Place) -> None:
         about_gone,
         receipts_gone,
         receipts_cut_off,
+        of_file(without("seq")),
+        of_file(numbers_as_text),
+        event_without_its_batch,
     ],
 )
 def test_what_was_damaged_is_whole_again(place: Place, damage: Callable[[Place], None]) -> None:
@@ -116,14 +124,32 @@ def test_the_same_loss_twice_is_mended_twice(place: Place) -> None:
         assert rows(place.url) == before
 
 
-def test_what_retention_has_removed_is_not_brought_again(place: Place) -> None:
-    store = Store(place.url)
-    times = sorted(store.dataset("telemetry/000").to_table()["utc"].to_pylist())
-    retain(store, [TELEMETRY], times[len(times) // 2])
-    before = rows(place.url)
+def telemetry_gone(place: Place) -> None:
     for file in place.store.glob("telemetry/000/robot=*/**/*.parquet"):
         file.unlink()
+
+
+def test_of_a_batch_that_retention_has_cut_in_two_the_rest_is_brought_again(place: Place) -> None:
+    receipts = Receipts(place.spool / RECEIPTS).whole()
+    _, middle, *_ = (part for each in receipts for part in each.parts if part.stream)
+    [mark, *_] = middle.marks
+    retain(
+        Store(place.url), [TELEMETRY], datetime.fromtimestamp(0, UTC) + timedelta(microseconds=mark.from_us)
+    )
+    before = rows(place.url)
+    telemetry_gone(place)
     place.told("mend")
+    assert rows(place.url) == before
+    assert place.verify() == (0, "")
+
+
+def test_what_retention_has_removed_is_not_brought_again_where_nobody_can_count_it(place: Place) -> None:
+    times = sorted(Store(place.url).dataset("telemetry/000").to_table()["utc"].to_pylist())
+    retain(Store(place.url), [TELEMETRY], times[len(times) // 2])
+    before = rows(place.url)
+    telemetry_gone(place)
+    assert "stays in its table" in place.told("mend")
+    place.told("mend", "--accept-loss", "--yes")
     assert rows(place.url) == before
     assert place.verify() == (0, "")
 
@@ -135,7 +161,7 @@ def test_what_is_still_there_of_a_damaged_file_is_kept_and_noted(place: Place) -
     place.told("mend")
     [kept] = (place.store / "mended").rglob("*.parquet")
     assert (kept.name, kept.read_bytes()) == (damaged.name, content)
-    [note] = mending.taken_out(Store(place.url))
+    [note], _ = mending.taken_out(Store(place.url))
     assert (note.rows, note.robot) == (100, "exo-01")
     assert "100 rows in 1 file were taken out" in place.told()
 
@@ -158,7 +184,7 @@ def _steps(count: int) -> Iterator[Callable[[int], object]]:
     yield lambda _: None
 
 
-def _ends(*_: object) -> None:
+def _ends(*_: object, **__: object) -> None:
     raise StoreError("cut off here")
 
 
@@ -186,14 +212,14 @@ def test_after_it_a_table_in_a_bucket_is_whole(store_url: str, tmp_path: Path) -
     [path] = [file.path for file in recorded.store.objects.listing("telemetry") if "session=" in file.path]
     recorded.store.objects.remove(path)
     with Spool(recorded.spool, reserve_bytes=0) as spool:
-        store = mend.Again.existing(store_url)
+        store = Again.existing(store_url)
         found = mend.plan(store, spool, _steps)
-        assert mend.mend(store, spool, found, lambda _: None) == []
+        assert not mend.mend(store, spool, found, lambda _: None).problems
     assert rows(store_url) == before
 
 
 def test_while_a_listing_is_late_nothing_is_taken_out(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    store = mend.Again.existing(place.url)
+    store = Again.existing(place.url)
     [file, *_] = place.files()
     monkeypatch.setattr(mending, "_move", lambda *_: None)
     [wanted] = [each for each in verify.files(store) if each.path.endswith(file.name)]

@@ -4,7 +4,6 @@ import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
-import msgspec
 import pyarrow as pa
 import pytest
 
@@ -20,7 +19,7 @@ from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send, upload
 from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, record
-from tests.unit.recording.robots import CHANNELS, batch, description, value
+from tests.unit.recording.robots import CHANNELS, batch, described, description, value
 
 ALL = sorted(value(seq, row, 0) for seq in range(21) if seq != 10 for row in range(ROWS))
 NOWHERE = "s3://nowhere/lab"
@@ -130,12 +129,8 @@ def test_what_was_removed_while_somebody_reads_is_not_left_out_silently(
 def test_columns_of_the_spool_are_those_that_the_store_will_have(folder_url: str, tmp_path: Path) -> None:
     """A unit that another robot has by the same name, and a channel that no other has."""
     record(folder_url, tmp_path / "other", "exo-02")
-    described = description("exo-01")
-    knee = described.channels[0]
-    new = msgspec.structs.replace(knee, name="new", unit="N")
-    described.channels[:] = [msgspec.structs.replace(knee, unit="deg"), new]
     with Spool(tmp_path / "spool", reserve_bytes=0) as spool, Recorder(spool) as recorder:
-        recorder.describe("exo-01", described)
+        recorder.describe("exo-01", described("exo-01", {"left_knee.position": "deg", "new": "N"}))
         recorder.begin("exo-01", Facts())
         recorder.record("exo-01", 1, batch(0, ROWS, channels=("left_knee.position", "new")))
     known = Recordings(folder_url, tmp_path / "spool")
@@ -148,6 +143,55 @@ def test_columns_of_the_spool_are_those_that_the_store_will_have(folder_url: str
             send(spool, number, Store(folder_url))
     stored = Recordings(folder_url, tmp_path / "spool").open(session)
     assert [each.name for each in stored.channels] == ["left_knee.position@deg", "new"]
+
+
+@pytest.mark.parametrize("sent", [0, 1])
+def test_a_channel_without_a_dimension_is_one_channel_in_whatever_batches_it_waits(
+    folder_url: str, tmp_path: Path, sent: int
+) -> None:
+    store = Store(folder_url)
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        recorder.describe("exo-01", described("exo-01", {"state": "", "knee": "rad"}))
+        for seq in range(3):
+            recorder.record("exo-01", 1, batch(seq, channels=("state", "knee")))
+            recorder.cut(lambda: None)
+            assert recorder.flush(30.0)
+        for number in spool.waiting()[:sent]:
+            send(spool, number, store)
+        whole = sole(Recordings(folder_url, spool.folder))
+        assert [(each.name, each.unit, each.samples) for each in whole.channels] == [
+            ("knee", "rad", 3),
+            ("state", "", 3),
+        ]
+        assert values(whole, "state") == [value(seq, 0, 0) for seq in range(3)]
+
+
+def test_what_waits_is_read_under_the_names_that_it_has_where_it_arrives(
+    folder_url: str, tmp_path: Path
+) -> None:
+    """Another robot in the same batch, and a unit that was not known at first."""
+    store = Store(folder_url)
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool:
+        with Recorder(spool) as recorder:
+            recorder.describe("exo-02", described("exo-02", {"knee": "rad"}))
+            recorder.record("exo-02", 1, batch(0, channels=("knee",)))
+            recorder.flush(30.0)
+            recorder.describe("exo-01", described("exo-01", {"knee": "deg"}))
+            recorder.record("exo-01", 1, batch(0, channels=("knee", "hip")))
+            recorder.cut(lambda: None)
+            assert recorder.flush(30.0)
+            recorder.describe("exo-01", described("exo-01", {"knee": "deg", "hip": "rad"}))
+            recorder.record("exo-01", 1, batch(1, channels=("knee", "hip")))
+        found = []
+        for _ in range(2):
+            known = Recordings(folder_url, spool.folder)
+            whole = known.open(next(each for each in known.sessions() if each.robot == "exo-01"))
+            names = [each.name for each in whole.channels]
+            found.append((whole.channels, [each.to_pylist() for each in whole.telemetry(names)]))
+            for number in spool.waiting():
+                send(spool, number, store)
+        assert found[0] == found[1]
+        assert [each.name for each in found[0][0]] == ["hip", "hip@rad", "knee@deg"]
 
 
 def test_where_the_store_is_away_what_this_computer_has_is_found(

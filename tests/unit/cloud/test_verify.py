@@ -1,6 +1,8 @@
 """What is lost, damaged or was never sent is found and named, on a folder and on an S3 server."""
 
+import contextlib
 import dataclasses
+import sqlite3
 from pathlib import Path
 
 from ml.store import Store
@@ -37,6 +39,14 @@ def test_a_second_copy_that_is_damaged_is_named_and_the_others_are_looked_into(
     (recorded.spool / "00000003.uploaded.db").write_bytes(b"")
     [problem] = verify.batches_missing(recorded.store, recorded.spool)
     assert problem.endswith("is damaged: file is not a database; it is a second copy: remove it")
+
+
+def test_a_second_copy_whose_tables_have_lost_their_names_is_damaged(folder_url: str, tmp_path: Path) -> None:
+    recorded = record(folder_url, tmp_path / "spool")
+    with contextlib.closing(sqlite3.connect(recorded.spool / "00000001.uploaded.db")) as copy:
+        copy.execute("ALTER TABLE run RENAME TO rum")
+    [problem] = verify.batches_missing(recorded.store, recorded.spool)
+    assert "00000001.uploaded.db is damaged: no such table: run" in problem
 
 
 def test_a_file_that_has_gone_is_named(store_url: str, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.cloud.recordings import UNITS
-from tests.unit.recording.robots import CHANNELS, batch, description
+from tests.unit.recording.robots import CHANNELS, batch, described, description
 
 BATCHES, ROWS = 100, 5
 
@@ -91,7 +91,7 @@ def test_a_session_half_in_the_store_and_half_in_the_spool_is_whole_and_nothing_
             recorder.record("exo-01", 1, batch(seq, ROWS), 0)
         recorder.cut(lambda: None)
         assert recorder.flush(30.0)
-        with_copy = Tape.open(settings, spooled.sessions(settings.recorder.spool)[0])  # before the upload
+        before = Tape.open(settings, spooled.sessions(settings.recorder.spool)[0])
         send(spool, spool.waiting()[0], Store(settings.store.url))
         for seq in range(10, 20):
             recorder.record("exo-01", 1, batch(seq, ROWS), 0)
@@ -101,9 +101,37 @@ def test_a_session_half_in_the_store_and_half_in_the_spool_is_whole_and_nothing_
         assert rows.columns[CHANNELS[0]].tolist() == [
             seq + row / 1000 for seq in range(20) for row in range(ROWS)
         ]
-        stored = tape.read(tape.first_ns, tape.last_ns + 1)
-        both = Rows.joined([with_copy.waiting, stored])
-        assert len(both) == 20 * ROWS
+        assert len(before.read(tape.first_ns, tape.last_ns)) == 10 * ROWS
+        for file in settings.recorder.spool.glob("*.uploaded.db*"):  # as where room was needed
+            file.unlink()
+        assert len(before.read(before.first_ns, before.last_ns)) == 10 * ROWS
+
+
+def test_values_in_two_units_are_two_channels_and_each_is_one_wherever_its_rows_are(
+    settings: ServerSettings,
+) -> None:
+    store = Store(settings.store.url)
+    with Spool(settings.recorder.spool, reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        recorder.describe("exo-02", described("exo-02", {"knee": "rad"}))
+        recorder.record("exo-02", 1, batch(0, channels=("knee",)), 0)
+        recorder.begin("exo-01", Facts())
+        for seq, unit in enumerate(("deg", "deg", "rad")):
+            recorder.describe("exo-01", described("exo-01", {"knee": unit}))
+            recorder.record("exo-01", 1, batch(seq, channels=("knee",)), 0)
+            recorder.cut(lambda: None)
+            assert recorder.flush(30.0)
+        found = []
+        for sent in (0, 1, 2):
+            for number in spool.waiting()[:1] if sent else ():
+                send(spool, number, store)
+            known = Recordings(settings.store.url, settings.recorder.spool).sessions()
+            tape = Tape.open(settings, next(each for each in known if each.robot == "exo-01"))
+            rows = tape.read(tape.first_ns, tape.last_ns)
+            found.append(
+                (tape.units, {name: np.nan_to_num(each).tolist() for name, each in rows.columns.items()})
+            )
+        expected = {"knee": [0.0, 0.0, 2.0], "knee@deg": [0.0, 1.0, 0.0]}
+        assert found == 3 * [({"knee": "rad", "knee@deg": "deg"}, expected)]
 
 
 def test_a_session_without_telemetry_is_refused_with_a_sentence(settings: ServerSettings) -> None:

@@ -38,14 +38,23 @@ def stamp_ns(seq: int, row: int) -> int:
 
 
 def description(name: str) -> Description:
-    units = {"left_knee.position": "rad", "left_knee.velocity": "rad/s", "trunk.tilt_forward": "rad"}
+    return described(name, dict(zip(CHANNELS, ("rad", "rad/s", "rad"), strict=True)))
+
+
+def described(name: str, units: dict[str, str]) -> Description:
+    """A robot with these channels, and their units."""
     found = {
         "robot": name,
         "boot_id": "boot-1",
         "role": "observer",
         "components": [],
         "channels": [
-            {"name": key, "unit": unit, "component": key.split(".")[0], "quantity": key.split(".")[1]}
+            {
+                "name": key,
+                "unit": unit,
+                "component": key.partition(".")[0],
+                "quantity": key.partition(".")[2],
+            }
             for key, unit in units.items()
         ],
         "parameters": [],

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from datetime import datetime
@@ -245,6 +246,41 @@ def test_between_two_spools_the_time_says_what_came_later_and_in_one_the_batch()
     assert holding([given, taken]) == holding([taken, given]) == []
     assert holding([given, taken, row("b", 1, 7, removed=False)]) != []
     assert holding([given, taken, row("b", 1, 4, removed=False)]) == []
+
+
+@pytest.mark.parametrize("says", ["removed last", "given last"])
+@pytest.mark.parametrize("how", ["older copy", "clock set back"])
+def test_the_later_opening_of_a_spool_says_what_holds(
+    tmp_path: Path, folder_url: str, wall: Wall, how: str, says: str
+) -> None:
+    folder, store, removed = tmp_path / "spool", Store(folder_url), says == "removed last"
+    walk = Label(ROBOT, "s", S, 2 * S, "walk", "ada")
+
+    def say(batches: int, *, removed: bool) -> None:
+        with Spool(folder, reserve_bytes=0) as spool:
+            with Recorder(spool) as recorder:
+                for _ in range(batches):
+                    recorder.mark(ROBOT, "another batch")
+                    recorder.cut(lambda: None)
+                    assert recorder.flush(WAIT_S)
+                recorder.add(label(walk, removed=removed))
+            for number in spool.waiting():
+                send(spool, number, store)
+
+    say(0, removed=removed)
+    if how == "older copy":
+        shutil.copytree(folder, tmp_path / "copy")
+    say(3, removed=not removed)
+    if how == "older copy":
+        shutil.rmtree(folder)
+        (tmp_path / "copy").rename(folder)
+    else:
+        wall.set_by_ns -= 3_600 * S
+    say(0, removed=removed)
+    expected = [] if removed else ["walk"]
+    assert [row["label"] for row in holding(store.dataset("labels").to_table().to_pylist())] == expected
+    with query(store, "SELECT label FROM labels") as found:
+        assert [row["label"] for rows in found.batches for row in rows.to_pylist()] == expected
 
 
 def test_rows_whose_utc_went_back_come_in_the_order_of_the_robots_clock(

@@ -1,7 +1,9 @@
 """Compaction by a collector: when it is time, beside it, and never in its way."""
 
+import errno
 import logging
 import os
+import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -89,3 +91,22 @@ def test_a_compaction_that_fails_is_said_and_not_tried_again_at_once(
     assert "the store was not compacted: gwrms cloud: 'ftp://nowhere' is no store" in caplog.text
     compacting.look()
     assert compacting._process is None
+
+
+@pytest.mark.parametrize("fails", ["process", "note"])
+def test_a_compaction_that_cannot_be_begun_is_said_once_and_ends_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, fails: str
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOMEM, "no memory")
+
+    (tmp_path / "compacted").touch()
+    long_ago(tmp_path)
+    owner, name = {"process": (subprocess, "Popen"), "note": (Path, "touch")}[fails]
+    monkeypatch.setattr(owner, name, fail)
+    compacting = Compacting("file:///nowhere", tmp_path, 0.0)
+    for _ in range(3):
+        compacting.look()
+        compacting.close()
+    said = [record.getMessage() for record in caplog.records]
+    assert said == ["the store was not compacted: [Errno 12] no memory"]

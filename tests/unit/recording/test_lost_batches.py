@@ -1,6 +1,7 @@
 """Batches that are lost as a whole, before anybody has uploaded them, are never taken for empty ones."""
 
 import itertools
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from gateway.main import main
 from ml.store import Store
 from ml.store.tables import TELEMETRY
 from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.spool_files import Files, Kept
 from server_gui.core.recording.uploader import Uploader
 from tests.unit.recording.robots import batch
 
@@ -116,6 +119,55 @@ def test_the_oldest_batch_that_waits_is_missed_where_others_were_uploaded(
         assert uploader._empty(asked=True)
         assert "batch 5 of the spool" in "".join(uploader.state.lost)
     assert told(Store(folder_url)) == [("exo-01", 5)]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_loss_under_a_number_whose_loss_was_told_before_a_roll_back_is_told_too(
+    tmp_path: Path, folder_url: str, damage: Callable[[Path], object]
+) -> None:
+    spool, copy, store = tmp_path / "spool", tmp_path / "copy", Store(folder_url)
+
+    def lose() -> None:
+        recorded(spool)
+        for _ in range(2):  # the second opening has nothing new to tell
+            damage(spool / "00000005.db") if (spool / "00000005.db").exists() else None
+            with Spool(spool, reserve_bytes=0) as opened:
+                Uploader(opened, lambda: store)._empty(asked=True)
+
+    recorded(spool)
+    with Spool(spool, reserve_bytes=0) as opened:
+        assert Uploader(opened, lambda: store)._empty(asked=True)
+    shutil.copytree(spool, copy)
+    lose()
+    assert told(store) == [("exo-01", 5)]
+    shutil.rmtree(spool)
+    copy.rename(spool)
+    lose()
+    assert told(store) == [("exo-01", 5), ("exo-01", 5)]
+
+
+def test_a_batch_that_is_closed_while_somebody_looks_is_not_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+
+        def another() -> None:
+            spool.append([], [Record("events", {"robot": "exo-01"})])
+            spool.freeze()
+
+        own = Files.own
+
+        def meanwhile(files: Files) -> list[tuple[int, Kept]]:
+            found = own(files)
+            monkeypatch.setattr(Files, "own", own)
+            another()
+            another()
+            return found
+
+        another()
+        monkeypatch.setattr(Files, "own", meanwhile)
+        assert spool.untold() == {}
+        assert spool.waiting() == [1, 2, 3]
 
 
 def test_a_closed_batch_without_rows_is_damaged(tmp_path: Path, folder_url: str) -> None:

@@ -152,6 +152,23 @@ def test_a_name_that_differs_or_repeats_is_an_event(spool: Spool) -> None:
     ]
 
 
+def test_a_name_that_a_robot_has_given_up_is_free(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for robot, name in (("exo-01", "exo-02"), ("exo-01", "exo-01"), ("exo-02", "exo-02")):
+            recorder.describe(robot, description(name))
+    assert [event["text"] for event in events(spool, "name")] == [
+        "exo-01 in the server's file calls itself exo-02"
+    ]
+
+
+def test_a_reboot_is_no_clock_that_was_set(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        for link, offset_ns in ((1, 10**15), (2, -(10**12))):
+            recorder.record("exo-01", 1, batch(0, link=link), offset_ns)
+    assert len(events(spool, "gap")) == 1
+    assert events(spool, "clock_step") == []
+
+
 def test_journal_entries_are_kept_once(spool: Spool) -> None:
     entries = [{"n": n, "hash": f"h{n}", "utc_ns": n, "who": "ada", "what": "write"} for n in range(1, 8)]
     with Recorder(spool) as recorder:
@@ -174,6 +191,14 @@ def test_markers_and_labels_are_kept(spool: Spool) -> None:
     (marker,) = events(spool, "marker")
     assert (marker["text"], json.loads(str(marker["data"]))) == ("stumbled", {"foot": "left"})
     assert [record.fields["label"] for record in kept(spool)[1] if record.table == "labels"] == ["walking"]
+
+
+@pytest.mark.parametrize("table", ["telemetry", "robots"])
+def test_a_row_that_no_upload_would_take_is_refused(spool: Spool, table: str) -> None:
+    fields = {"robot": "exo-01", "session": "s", "utc": 1, "stamp_ns": 1}
+    with Recorder(spool) as recorder, pytest.raises(ValueError, match=f"no table {table} that takes single"):
+        recorder.add(Record(table, fields))
+    assert spool.waiting() == []
 
 
 class StuckSpool(Spool):
@@ -354,6 +379,35 @@ def _refuses(*_: object) -> None:
     raise SpoolUnusable("the disk refuses")
 
 
+def test_who_cuts_a_batch_is_called_when_it_waits_also_where_the_disk_refused_at_first(
+    spool: Spool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused: list[str] = []
+    freeze = spool.freeze
+
+    def refuse_once() -> None:
+        if not refused:
+            refused.append("")
+            raise SpoolUnusable("the disk is full")
+        freeze()
+
+    monkeypatch.setattr(spool, "freeze", refuse_once)
+    called = threading.Event()
+    waiting: list[list[int]] = []
+
+    def then() -> None:
+        waiting.append(spool.waiting())
+        called.set()
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+        recorder.cut(then)
+        assert called.wait(WAIT_S)
+        assert (refused, waiting) == ([""], [[1]])
+        assert recorder.flush(WAIT_S)
+        assert recorder.state.alarms == ()
+
+
 def test_a_batch_is_frozen_when_it_is_long_enough(spool: Spool) -> None:
     with Recorder(spool, settings=RecorderSettings(batch_rows=10)) as recorder:
         recorder.record("exo-01", 1, batch(0, rows=12))
@@ -520,6 +574,67 @@ def test_a_mistake_of_ours_is_an_alarm_and_the_recorder_goes_on(
         assert recorder.flush(WAIT_S)
     assert [alarm.kind for alarm in alarms] == [AlarmKind.BROKEN]
     assert rows(kept(spool)[0])[-1][3] == 1
+
+
+def test_what_is_lost_of_a_robot_of_which_nothing_was_kept_yet_is_told_in_its_recording(
+    tmp_path: Path,
+) -> None:
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+        with Recorder(spool, settings=RecorderSettings(capacity=4)) as recorder:
+            recorder.record("exo-01", 1, batch(0, rows=5))
+            assert recorder.flush(WAIT_S)
+        (event,) = events(spool, "lost")
+        assert (event["robot"], json.loads(str(event["data"]))["rows"]) == ("exo-01", 5)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [math.inf, -math.inf, math.nan, "1", [1.0], 10**400],
+    ids=["inf", "-inf", "nan", "text", "list", "large"],
+)
+@pytest.mark.parametrize("missing", [(), CHANNELS[:1]])
+def test_a_value_that_is_no_finite_number_is_refused_and_disturbs_no_other_robot(
+    spool: Spool, value: Any, missing: tuple[str, ...]
+) -> None:
+    unfit = batch(0, rows=2, missing=missing)
+    unfit.columns[CHANNELS[0]][1] = value
+    with Recorder(spool) as recorder:
+        recorder.record("good", 1, batch(0))
+        recorder.record("bad", 1, unfit)
+        recorder.record("bad", 1, batch(1, missing=missing))
+    assert sorted((row[0], row[3]) for row in rows(kept(spool)[0])) == [("bad", 1), ("good", 0)]
+    [event] = events(spool, "refused")
+    assert f"bad sent what cannot be kept: a value of '{CHANNELS[0]}' is no number" in str(event["text"])
+
+
+def test_a_first_notification_that_is_unfit_begins_no_session_that_nobody_is_told_of(spool: Spool) -> None:
+    unfit = batch(0)
+    unfit.columns[CHANNELS[0]].append(1.0)
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, unfit)
+        assert recorder.flush(WAIT_S)
+        recorder.record("exo-01", 1, batch(1))
+        recorder.cut(lambda: None)
+        assert recorder.flush(WAIT_S)
+        runs, records = kept(spool)  # before its end, which is told again
+    told = {record.fields["session"] for record in records if record.table == "sessions"}
+    assert told == {run.session for run in runs}
+
+
+def test_a_prediction_has_the_utc_of_the_rows_of_its_own_session(spool: Spool) -> None:
+    """One that comes late, when the robot's computer has started anew."""
+    with Recorder(spool) as recorder:
+        sessions = []
+        for link, offset_ns in ((1, 0), (2, -(10**15))):
+            sessions.append(recorder.begin("exo-01", Facts()))
+            recorder.record("exo-01", 1, batch(0, link=link), offset_ns)
+        for session in (*sessions, "another"):
+            fields = {"robot": "exo-01", "session": session, "utc": 7, "stamp_ns": stamp_ns(0, 0)}
+            recorder.add(Record("predictions", fields))
+    runs, records = kept(spool)
+    rows_ns = {run.session: int(run.stamps_ns[0] + run.utc_offset_ns[0]) for run in runs}
+    said_ns = {each.fields["session"]: each.fields["utc"] for each in records if each.table == "predictions"}
+    assert said_ns == {**rows_ns, "another": 7}
 
 
 def test_the_flood_of_one_robot_takes_no_room_from_another_and_is_told_in_its_own_recording(

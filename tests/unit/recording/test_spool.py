@@ -1,5 +1,6 @@
 """The spool: what was kept stays, in order, under numbers that are given once."""
 
+import contextlib
 import os
 import sqlite3
 from collections.abc import Callable
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from ml.store import durable
+from server_gui.core.recording import records
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import JournalHead, Layout, Record, Run
 from server_gui.core.recording.segment import SCHEMA, Segment
@@ -149,6 +151,33 @@ def test_journal_heads_outlive_segments_and_crashes(tmp_path: Path) -> None:
         spool.uploaded(1)
         spool.make_room()
     Segment(tmp_path / "00000003.db", 3).close()  # a crash in the middle of making it
+    with Spool(tmp_path) as spool:
+        assert spool.heads == {"exo-01": JournalHead(7, "abc")}
+
+
+@pytest.mark.parametrize("column", ["n", "hash", "robot"])
+@pytest.mark.parametrize("how", ["closed", "killed"])
+def test_a_bit_that_flips_in_a_journals_head_neither_hides_an_entry_nor_brings_one_twice(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, how: str, column: str
+) -> None:
+    entries = [records.journal("exo-01", {"n": n, "hash": f"h{n}"}) for n in range(1, 7)]
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+        spool.append([], entries, {"exo-01": JournalHead(6, "h6"), "exo-02": JournalHead(2, "g2")})
+        if how == "closed":  # then the newest file has a head, and no entry
+            spool.freeze()
+    with contextlib.closing(sqlite3.connect(max(tmp_path.glob("0*.db")))) as database, database:
+        flipped = "n + 4" if column == "n" else f"'x' || substr({column}, 2)"
+        database.execute(f"UPDATE journal_head SET {column} = {flipped} WHERE robot = 'exo-01'")
+    with Spool(tmp_path, reserve_bytes=0) as spool:
+        assert spool.heads == {"exo-01": JournalHead(6, "h6"), "exo-02": JournalHead(2, "g2")}
+    assert "is damaged: up to where a journal is recorded is looked for" in caplog.text
+
+
+def test_journal_heads_from_before_they_had_checksums_are_read(tmp_path: Path) -> None:
+    with Spool(tmp_path) as spool:
+        spool.append([], [Record("journal", {"n": 7})], {"exo-01": JournalHead(7, "abc")})
+    with contextlib.closing(sqlite3.connect(max(tmp_path.glob("0*.db")))) as database, database:
+        database.execute("ALTER TABLE journal_head DROP COLUMN crc")
     with Spool(tmp_path) as spool:
         assert spool.heads == {"exo-01": JournalHead(7, "abc")}
 

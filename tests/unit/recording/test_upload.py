@@ -17,7 +17,7 @@ import pytest
 from gateway.wire.resource import ResourceSnapshot
 from ml.store import Store, StoreError, StoreUnreachable, durable
 from ml.store.labels import Label
-from ml.store.tables import TELEMETRY
+from ml.store.tables import TELEMETRY, Known
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
@@ -130,14 +130,14 @@ def test_values_in_different_units_never_share_a_column(spool: Spool, folder_url
         recorder.describe("exo-01", description("exo-01"))
         recorder.record("exo-01", 1, batch(0))
     upload_all(spool, store)
-    columns = Columns([Layout(("left_knee.position", "left_knee.torque"), ("°", "N·m"))], store.units(HERE))
+    columns = Columns([Layout(("left_knee.position", "left_knee.torque"), ("°", "N·m"))], store.columns(HERE))
     assert {"left_knee.position@°", "left_knee.torque"} <= set(columns.schema.names)
     assert "left_knee.position" not in columns.schema.names
 
 
 def test_a_column_that_was_written_without_a_unit_takes_none_later() -> None:
     layouts = [Layout(("knee",), (unit,)) for unit in ("rad", "°", None)]
-    assert Columns(layouts, {"knee": None}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
+    assert Columns(layouts, {"knee": Known()}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
     assert Columns([Layout(("knee",), (unit,)) for unit in (None, "rad")], {}).schema.names[-1] == "knee"
 
 
@@ -332,14 +332,17 @@ def test_what_a_library_raises_is_no_end_and_quotes_nothing(spool: Spool, folder
         until(lambda: uploader.state.uploaded == 1)
 
 
+@pytest.mark.parametrize(
+    ("kind", "words"), [(StoreError, "a file is gone"), (ValueError, "internal error, ValueError")]
+)
 def test_a_batch_that_cannot_be_completed_keeps_no_other_from_the_store(
-    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch
+    spool: Spool, folder_url: str, monkeypatch: pytest.MonkeyPatch, kind: type[Exception], words: str
 ) -> None:
     failing = {1, 2}
 
     def fails(spool: Spool, number: int, store: Store) -> None:
         if number in failing:
-            raise StoreError(f"a file of the table is gone that batch {number} is in")
+            raise kind("a file is gone")
         send(spool, number, store)
 
     monkeypatch.setattr("server_gui.core.recording.uploader.send", fails)
@@ -353,10 +356,8 @@ def test_a_batch_that_cannot_be_completed_keeps_no_other_from_the_store(
     assert not uploader._empty(asked=True)
     assert spool.waiting() == [1, 2]
     assert (uploader.state.uploaded, uploader.state.waiting) == (last - 2, 2)
-    assert uploader.state.problem == (
-        "batch 1 is not in the store yet: a file of the table is gone that batch 1 is in "
-        "(and 1 other likewise)"
-    )
+    problem = f"batch 1 is not in the store yet: {words} (and 1 other likewise)"
+    assert uploader.state.problem == problem
     failing.clear()
     assert uploader._empty(asked=True)
     assert uploader.state == replace(uploader.state, problem=None, waiting=0)

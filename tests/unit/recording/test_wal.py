@@ -112,6 +112,21 @@ def test_a_damaged_header_is_told_with_all_that_it_hides(spool: Path, folder_url
     assert lost_commits(spool / LOG, PAGE_BYTES) == commits
 
 
+def test_a_file_that_calls_itself_read_only_beside_a_damaged_log_keeps_no_spool_closed(
+    spool: Path, folder_url: str
+) -> None:
+    """One flipped bit of the database's format (sqlite.org/fileformat, 1.3.3), and one of its log."""
+    database = spool / "00000001.db"
+    content = bytearray(database.read_bytes())
+    content[18] = 0x42  # in the log there is no first page, so this one counts
+    database.write_bytes(content)
+    flip(spool / LOG, frames(spool / LOG)[0][0] + FRAME.size)
+    assert {file.name for file in sent(spool, Store(folder_url))} == {
+        "00000001.damaged.db",
+        "00000001.cut.db",
+    }
+
+
 def test_what_was_being_written_when_the_power_went_is_no_alarm(spool: Path) -> None:
     known = frames(spool / LOG)
     content = (spool / LOG).read_bytes()

@@ -1,21 +1,25 @@
 """Compaction, retention and vacuum: fewer files, the same rows; what a model names stays readable."""
 
+import contextlib
 import threading
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import pytest
 from deltalake import DeltaTable
 
 from ml.store import NoSuchTable, Store, StoreError, durable
-from ml.store.alone import COUNTS, PLACE, Claim
+from ml.store.alone import COUNTS, PLACE, Claim, alone
+from ml.store.objects import Object
 from ml.store.tables import TELEMETRY
-from ml.store.upkeep import Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
+from ml.store.upkeep import GRACE, Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
 from tests.unit.store.test_store import HERE, numbers, telemetry
 
 NOW = timedelta(0)
+LONG_AGO = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 def filled(url: str, commits: int = 6, rows: int = 3) -> Store:
@@ -50,10 +54,24 @@ def test_vacuum_keeps_what_is_pinned_until_it_is_unpinned(store_url: str) -> Non
     assert numbers(store) == list(range(18))
 
 
-def test_vacuum_leaves_files_that_somebody_may_still_read(store_url: str) -> None:
+def test_of_several_pinned_versions_each_stays_readable(folder_url: str) -> None:
+    store = filled(folder_url)
+    versions = [store.table(HERE).version()]
+    compact(store)
+    store.append(TELEMETRY, HERE, *telemetry(3, 100), "spool-b", 1)
+    versions.append(store.table(HERE).version())
+    for version in versions:
+        pin(store, HERE, version, "gait-3")
+    compact(store)
+    vacuum(store, grace=NOW)
+    assert [store.dataset(HERE, version).to_table().num_rows for version in versions] == [18, 21]
+
+
+@pytest.mark.parametrize("grace", [GRACE, timedelta(minutes=10)])
+def test_vacuum_leaves_files_that_somebody_may_still_read(store_url: str, grace: timedelta) -> None:
     store = filled(store_url)
     compact(store)
-    assert vacuum(store) == []
+    assert vacuum(store, grace=grace) == []
 
 
 def test_old_rows_go_and_new_ones_stay(folder_url: str) -> None:
@@ -167,6 +185,59 @@ def test_what_a_killed_compaction_has_left_is_in_nobodys_way_for_ever(store_url:
         store.objects.remove(path)
         store.objects.create(path, msgspec.json.encode(Claim("somebody", left.until - COUNTS)))
     assert compact(store) == [Compacted(HERE, 6, 1)]
+
+
+class Elsewhere:
+    """Objects of a store that is in no folder; `before` happens once, before the first create or remove."""
+
+    def __init__(self) -> None:
+        self.url, self.folder, self.objects = "s3://lab", None, self
+        self.held: dict[str, bytes] = {}
+        self.before: Callable[[], object] = lambda: None
+
+    def read(self, path: str) -> bytes | None:
+        return self.held.get(path)
+
+    def find(self, path: str) -> Object | None:
+        return Object(path, len(self.held[path]), LONG_AGO, "") if path in self.held else None
+
+    def create(self, path: str, data: bytes) -> bool:
+        self._happen()
+        return self.held.setdefault(path, data) is data
+
+    def remove(self, path: str) -> None:
+        self._happen()
+        self.held.pop(path, None)
+
+    def _happen(self) -> None:
+        happens, self.before = self.before, lambda: None
+        happens()
+
+
+@pytest.mark.parametrize("left", [b"", b"no claim", b'{"who":"a/b","until":"2026-01-01T00:00:00Z"}'])
+@pytest.mark.parametrize("goes", [False, True])
+def test_of_two_that_find_a_dead_compaction_one_goes_on(left: bytes, goes: bool) -> None:
+    """The other begins, or begins and ends, between the look and the claim of the first."""
+    objects = Elsewhere()
+    store = cast("Store", objects)
+    objects.held[f"{PLACE}/t.json"] = left
+    with contextlib.ExitStack() as others:
+
+        def other() -> None:
+            if goes:
+                with alone(store, "t"):
+                    pass
+            others.enter_context(alone(store, "t"))
+
+        objects.before = other
+        with pytest.raises(StoreError, match="is being compacted by another"), alone(store, "t"):
+            pytest.fail("two are in the table")
+        with pytest.raises(StoreError, match="is being compacted by another"), alone(store, "t"):
+            pytest.fail("two are in the table")
+    assert objects.held == {}
+    with alone(store, "t"):
+        assert len(objects.held) == 1
+    assert objects.held == {}
 
 
 def test_two_that_remove_old_rows_at_once_double_no_row(folder_url: str) -> None:
