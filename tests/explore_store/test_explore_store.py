@@ -21,7 +21,6 @@ def _explore(*options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.timeout(180)
 def test_no_play_loses_doubles_or_misnames_what_was_acknowledged() -> None:
     done = _explore("--seconds", str(SECONDS))
     assert done.returncode == 0, done.stdout + done.stderr
@@ -30,7 +29,6 @@ def test_no_play_loses_doubles_or_misnames_what_was_acknowledged() -> None:
     assert int(plays[1]) >= FEWEST_PLAYS
 
 
-@pytest.mark.timeout(180)
 def test_a_defect_put_back_is_found_and_its_play_can_be_played_again() -> None:
     words = ("--words", "rows", "turn", "unit")
     found = _explore("--with-defect", "units-mixed", *words, "--saying", "another unit")

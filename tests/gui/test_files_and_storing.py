@@ -1,6 +1,5 @@
 """Parameters beside a file, pinned ones, defaults, and storing: none of it writes by itself."""
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from server_gui.views.parameters.store_page import SETTLE_MS
 from server_gui.views.parameters.tree import DEFAULT, FILE, NAME, NEW, STORED, TITLES
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
+from tests.gui.running import wait
 from tests.support.desk import HELD, described, looked, walking
 
 FILE_TEXT = """
@@ -217,9 +217,7 @@ def test_a_narrow_table_keeps_what_matters_and_the_card_has_the_rest(panel: Para
 def begin(panel: ParametersPanel) -> None:
     panel.tree.select_name("left_knee.max_torque")
     panel.store_button.click()
-    deadline = time.monotonic() + 20 * SETTLE_MS / 1000
-    while panel.storing._settled.isActive() and time.monotonic() < deadline:
-        QTest.qWait(20)
+    wait(lambda: not panel.storing._settled.isActive(), "was settled")
     panel.refresh()
 
 

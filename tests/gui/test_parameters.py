@@ -17,6 +17,7 @@ from server_gui.views.parameters.review import SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
+from tests.gui.running import wait
 from tests.support.desk import HELD, described, looked
 
 
@@ -42,10 +43,7 @@ def row(panel: ParametersPanel, name: str) -> list[str]:
 
 def settle(panel: ParametersPanel) -> None:
     """Wait until the review lets itself be written."""
-    deadline = time.monotonic() + 20 * SETTLE_MS / 1000
-    while not panel.review.write_it.isEnabled() and time.monotonic() < deadline:
-        QTest.qWait(20)
-    assert panel.review.write_it.isEnabled()
+    wait(panel.review.write_it.isEnabled, "let itself be written")
 
 
 def test_values_are_shown_in_degrees_and_millimetres(panel: ParametersPanel) -> None:

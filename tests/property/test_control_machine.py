@@ -18,6 +18,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from drivers.errors import DeviceAbort
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
+from tests.support.waiting import until
 from tests.unit.gateway.harness import (
     DISABLED,
     ENABLED,
@@ -29,7 +30,6 @@ from tests.unit.gateway.harness import (
     FakeDrive,
     config,
     serving,
-    until,
 )
 
 STEP, CYCLE, TOE = "gait.step_length", "gait.cycle_time", "gait.toe_height"

@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 from tests.scenario.collecting import Collecting, Kept
-from tests.scenario.processes import DEADLINE_S, Bench, gwrms, until
+from tests.scenario.processes import Bench, gwrms
+from tests.support.waiting import WAIT_S, until
 
 FAST_S = int(os.environ.get("GWRMS_SIMULATED_S", "60"))
 SIMULATED_S = int(os.environ.get("GWRMS_SIMULATED_S", "10"))
@@ -69,7 +70,6 @@ def robots(tmp_path: Path) -> Iterator[dict[str, Robot]]:
         yield {name: Robot(tmp_path / name, processes) for name in ROBOTS}
 
 
-@pytest.mark.timeout(300)
 def test_a_killed_collector_loses_nothing_that_it_had_and_goes_on(
     robots: dict[str, Robot], start: Start
 ) -> None:
@@ -100,7 +100,7 @@ def test_as_long_as_robots_walk_there_is_no_gap(robots: dict[str, Robot], start:
     until(
         lambda: all(robot.simulated_s() >= begun_s[name] + SIMULATED_S for name, robot in robots.items()),
         collecting.log,
-        within_s=DEADLINE_S + 10 * SIMULATED_S,
+        within_s=WAIT_S + 10 * SIMULATED_S,
     )
     report = collecting.report()
     assert {link.links for link in report.robots.values()} == {1}
@@ -135,7 +135,7 @@ def fast_robots() -> Iterator[dict[str, str]]:
         served.kill()
 
 
-@pytest.mark.timeout(120 + FAST_S)
+@pytest.mark.timeout(300 + FAST_S)
 def test_however_much_comes_at_once_there_is_no_gap(fast_robots: dict[str, str], start: Start) -> None:
     collecting = start(fast_robots)
     expected = dict.fromkeys(fast_robots, 100 * FAST_S)

@@ -3,12 +3,9 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from gateway.client import Address, LinkSettings, Robot
-from tests.scenario.processes import Bench, gwrms, until
-
-pytestmark = pytest.mark.timeout(300)
+from tests.scenario.processes import Bench, gwrms
+from tests.support.waiting import until
 
 FORCES = ("left_insole.force", "right_insole.force")
 STRIDES = 200  # rows at 50 Hz: more than two strides of the slowest gait that is set here

@@ -37,7 +37,7 @@ def lives(spool: Path, url: str, count: int) -> set[int]:
     return {number for last in told for number in range(last // PER_LIFE * PER_LIFE, last + 1)}
 
 
-@pytest.mark.timeout(60 + 10 * KILLS)
+@pytest.mark.timeout(300 + 10 * KILLS)
 def test_every_acknowledged_sample_is_in_the_store_exactly_once(store_url: str, tmp_path: Path) -> None:
     acknowledged = lives(tmp_path / "spool", store_url, KILLS)
     store = Store(store_url)

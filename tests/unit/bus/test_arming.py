@@ -15,9 +15,9 @@ from drivers.bus.node import Node, shared_node
 from drivers.bus.settings import CanSettings, NodeTimes
 from drivers.errors import DriverError, Mismatch
 from eds import Description
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.conftest import IDENTITY
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 
 Describe = Callable[[int], Description]
 Values = dict[int, int]

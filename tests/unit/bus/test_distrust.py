@@ -12,9 +12,9 @@ from drivers.bus.sdo_channel import OUT_OF_SYNC
 from drivers.bus.settings import DeviceSettings
 from drivers.errors import DeviceTimeout, NotPermitted
 from eds import Description
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.conftest import IDENTITY
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 
 Describe = Callable[[int], Description]
 

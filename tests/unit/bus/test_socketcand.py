@@ -13,7 +13,7 @@ from drivers.bus.frames import EXTENDED, REMOTE, Frame
 from drivers.bus.sender import Sender
 from drivers.bus.socketcand import MAX_PENDING, SocketcandParser, SocketcandTransport, frame_of, send_message
 from drivers.errors import Unavailable
-from tests.unit.bus.waiting import until
+from tests.support.waiting import until
 
 STREAM = (
     "< frame 181 1234.5 0102030405060708 >< frame 1FFFFFFF 0.0 AA >< error 20000004 1.0 >< frame 702 1.0 05 >"

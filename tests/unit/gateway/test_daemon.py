@@ -25,8 +25,9 @@ from gateway.connections import session
 from gateway.connections.limits import BAD_LINES, LINE_LIMIT
 from gateway.connections.listeners import listen
 from gateway.wire import framing
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
+from tests.unit.gateway.harness import ROBOT, Answered, Bench, Client, config, serving
 
 Connect = Callable[[], Client]
 CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
@@ -260,7 +261,7 @@ class TestProcess:
             client.call("resource.snapshot")
             process.send_signal(number)
             assert client.line() is None
-            assert process.wait(DEADLINE_S) == 0
+            assert process.wait(WAIT_S) == 0
         assert process.stderr is not None
         assert process.stderr.read() == ""
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from gateway.modules.stop.authority import Address
 from gateway.records.undo import UndoFile
-from tests.unit.gateway.harness import Bench, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench
 from tests.unit.gateway.test_left_behind import change, entry, write_undo
 from tests.unit.gateway.tuned import (
     CYCLE,

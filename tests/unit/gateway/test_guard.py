@@ -21,7 +21,8 @@ from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.guard import alarms
 from gateway.guard.armings import Armings
-from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving
 
 LIMIT = """
 [guard.rule.knees]

@@ -17,7 +17,8 @@ from gateway.config import ParameterSettings
 from gateway.modules.control.catalogue import described
 from gateway.modules.control.parameters import Parameter
 from gateway.wire.framing import RpcError
-from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving
 
 STEP, CYCLE, TOE, TORQUE = 0x2001, 0x2002, 0x2003, 0x6072
 

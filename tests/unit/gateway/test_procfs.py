@@ -19,7 +19,8 @@ from gateway.modules.resource.host import Meter
 from gateway.modules.resource.portable import Portable
 from gateway.modules.resource.procfs import SELECTABLE, Procfs
 from gateway.wire.messages import ResourceSnapshotParams
-from tests.unit.gateway.harness import Client, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Client
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="procfs is Linux's")
 

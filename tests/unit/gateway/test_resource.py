@@ -20,7 +20,8 @@ from gateway.modules.resource.redact import redact
 from gateway.process.loop import Loop
 from gateway.registry import Context
 from gateway.wire.messages import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
-from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config
+from tests.support.waiting import WAIT_S
+from tests.unit.gateway.harness import HEAD, Client, config
 
 MB = 1 << 20
 
@@ -321,13 +322,13 @@ def test_nobody_waits_while_somebody_s_table_is_made(
 
     def slow(meter: Meter, params: ResourceSnapshotParams) -> ResourceSnapshot:
         looking.set()
-        assert seen.wait(DEADLINE_S)
+        assert seen.wait(WAIT_S)
         return look(meter, params)
 
     monkeypatch.setattr(Meter, "snapshot", slow)
     for method in ("resource.snapshot", "status.snapshot"):
         asked = asker.request(method)
-        assert looking.wait(DEADLINE_S)
+        assert looking.wait(WAIT_S)
         assert other.call("clock.read")
         seen.set()
         assert asker.answer(asked)

@@ -21,7 +21,8 @@ from gateway.streaming.outlets import Batch, Outlet, encode_batch
 from gateway.streaming.sources import merge, narrow, whole
 from gateway.streaming.streams import SampleFeed, Streams, TickFeed, values_a_second
 from gateway.wire.framing import RpcError
-from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench, Client, FakeComponent
 
 MS = 1_000_000
 

@@ -18,8 +18,7 @@ from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
 from hil_sim.operator import Operator
 from hil_sim.robot import SimulatedRobot
-
-WAIT_S = 20.0
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from hil_sim.sensors.faults import InsoleFaults
 from hil_sim.sensors.sole import Sole
 from hil_sim.sensors.suite import FEET, IMUS, INSOLES, SERIAL_IMUS, TRUNK, SensorChoice
 from hil_sim.sensors.trunk_imu import quaternion, specific_force
-from tests.unit.bus.waiting import until
+from tests.support.waiting import until
 from tests.unit.hil_sim.driven import STEP_NS, Bench, Watched, driven, steps_until
 
 STEPS = 60

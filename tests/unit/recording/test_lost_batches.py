@@ -13,10 +13,10 @@ from ml.store.tables import TELEMETRY
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
-WAIT_S = 30.0
 
 
 def recorded(folder: Path, batches: int = 3) -> None:
