@@ -17,7 +17,7 @@ UNIT = "tests/unit"
         ("watcher", ["guard/test_watchers.py"]),
         ("inputs", ["guard/test_watchers.py", "guard/test_motion.py"]),
         ("buses", ["guard/test_buses.py"]),
-        ("making", ["guard/test_wiring.py", "guard/test_motion.py", "guard/test_buses.py"]),
+        ("watchers", ["guard/test_wiring.py", "guard/test_motion.py", "guard/test_buses.py"]),
         ("wiring", ["guard/test_wiring.py"]),
         ("rules", ["guard/test_wiring.py", "guard/test_buses.py", "gateway/test_guard_settings.py"]),
         ("checks", ["gateway/test_guard_settings.py"]),

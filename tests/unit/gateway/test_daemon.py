@@ -25,6 +25,7 @@ from gateway.connections import session
 from gateway.connections.limits import BAD_LINES, LINE_LIMIT
 from gateway.connections.listeners import listen
 from gateway.wire import framing
+from tests.support.examples import examples
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import ROBOT, Answered, Bench, Client, config, serving
@@ -217,7 +218,7 @@ GARBAGE = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(pieces=st.lists(GARBAGE, max_size=8), cuts=st.lists(st.integers(0, 2000), max_size=4))
 def test_garbage_in_any_pieces_hurts_neither_the_daemon_nor_another_session(
     garbage_gateway: tuple[str, int], pieces: list[bytes], cuts: list[int]
