@@ -7,4 +7,4 @@ ALL = 100  # what Hypothesis tries by itself
 
 def examples(by_night: int) -> int:
     """As many by night, and by day the share that the profile gives (see tests/conftest.py)."""
-    return max(1, by_night * settings.default.max_examples // ALL)
+    return max(1, by_night * settings().max_examples // ALL)
