@@ -145,7 +145,7 @@ def test_every_command_that_writes_makes_private_files() -> None:
         "import os, importlib, sys, contextlib\n"
         f"for name in {COMMANDS.split()!r}:\n"
         "    os.umask(0o022)\n"
-        "    main = importlib.import_module(f'server_gui.commands.{name}').main\n"
+        "    main = importlib.import_module(f'server_gui.cli.{name}').main\n"
         "    with contextlib.suppress(SystemExit), open(os.devnull, 'w') as out:\n"
         "        with contextlib.redirect_stdout(out): main(['--help'])\n"
         "    found = os.umask(0o022)\n"
