@@ -17,7 +17,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from server_gui.core.threads.background import Background
-from tests.gui.journals import RobotsJournal
+from tests.support.journals import RobotsJournal
 from tests.support.waiting import until
 
 
