@@ -27,11 +27,14 @@ class Later:
 
     def go_on(self) -> None:
         while self._waiting:
-            future, work = self._waiting.pop(0)
-            try:
-                future.set_result(work())
-            except Exception as error:  # noqa: BLE001 - as an executor does
-                future.set_exception(error)
+            self.one()
+
+    def one(self) -> None:
+        future, work = self._waiting.pop(0)
+        try:
+            future.set_result(work())
+        except Exception as error:  # noqa: BLE001 - as an executor does
+            future.set_exception(error)
 
 
 @pytest.fixture
@@ -120,7 +123,7 @@ def test_what_comes_late_of_another_session_is_not_shown(settings: ServerSetting
     first = Labelling(settings).session(SESSION)
     labels.open(first)  # reading its labels takes until another one is looked at
     labels.open(msgspec.structs.replace(first, session="another"))
-    later.go_on()
+    later.one()
     assert found(labels) == []
 
 

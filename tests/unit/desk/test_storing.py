@@ -6,7 +6,7 @@ from gateway.client import LinkLost, RemoteError
 from gateway.wire.messages import ComponentInfo, Stored, Written
 from server_gui.core.follow.events import Described
 from server_gui.core.processing.units import Units
-from server_gui.core.tuning.storing import objection, storable
+from server_gui.core.tuning.storing import Storable, objection, storable
 from server_gui.core.tuning.writing import WriteState
 from tests.support.desk import Bench, described, walking
 
@@ -55,6 +55,12 @@ def test_another_axis_of_the_device_under_power_speaks_against_it_too(bench: Ben
     bench.station.take([two_axes(), walking(2)])
     bench.station.robot.values["left_knee.state"] = 7.0
     assert "left_hip under power" in (objection(both, bench.station.robot, None) or "")
+
+
+def test_a_device_that_is_no_drive_waits_for_every_drive(bench: Bench) -> None:
+    bench.station.take([walking(2)])
+    gait = Storable(("gait",), (STEP,))
+    assert "left_hip, left_knee" in (objection(gait, bench.station.robot, None) or "")
 
 
 def test_what_was_stored_is_told_as_the_robot_says_it(bench: Bench) -> None:
