@@ -31,7 +31,7 @@ def bench_bus(channel: str, role: Role) -> CanBus:
 @contextmanager
 def running(channel: str, role: Role, description: Description, **more: float) -> Iterator[CanDevice]:
     """A device that has come up; it is stopped whatever happens."""
-    settings = DeviceSettings(bus="bench", node_id=5, eds="small.eds", sdo_timeout_s=0.2, **more)  # type: ignore[arg-type]
+    settings = DeviceSettings(bus="bench", node_id=5, eds="small.eds", sdo_timeout_s=2.0, **more)  # type: ignore[arg-type]
     gait = CanDevice("gait", settings, bench_bus(channel, role), description)
     gait.start()
     try:
