@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.fake_robot import FakeRobot
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 
 PROGRAM = Path(__file__).with_name("busy_window.py")
 
@@ -37,7 +37,7 @@ class Shown:
 
     def xdotool(self, *words: str) -> None:
         subprocess.run(
-            ["xdotool", *words], env={**os.environ, "DISPLAY": self.display}, check=True, timeout=20
+            ["xdotool", *words], env={**os.environ, "DISPLAY": self.display}, check=True, timeout=WAIT_S
         )
 
     def touch(self, name: str) -> None:
@@ -69,7 +69,7 @@ def x_server() -> Iterator[str]:
             yield f":{said.readline().strip()}"
     finally:
         server.terminate()
-        server.wait(20)
+        server.wait(WAIT_S)
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
             for name in ("free", "end"):
                 (tmp_path / name).touch()
             try:
-                window.wait(20)
+                window.wait(WAIT_S)
             finally:
                 window.kill()
                 window.wait()

@@ -15,7 +15,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
 from tests.slow_network import SlowNetwork
 from tests.stores import BUCKET, SeaweedFS
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.recording.robots import batch
 
 WRITERS, COMMITS = 4, 10
@@ -59,7 +59,7 @@ def test_a_store_that_dies_in_the_middle_of_an_upload_gets_everything_once_it_is
             return store
 
         with Uploader(spool, connect) as uploader:
-            assert connected.wait(60)
+            assert connected.wait(WAIT_S)
             server.kill()  # while it writes the first segments
             until(lambda: uploader.state.problem is not None or uploader.state.uploaded == 4)
             server.start()

@@ -238,5 +238,5 @@ def test_a_node_that_answers_once_again_is_trusted_though_nobody_asks_it(
             gait.node.upload(*STEP).result(WAIT_S)
         until(lambda: gait.node.distrust == TWO)
         fake.repeat_replies = 1
-        until(lambda: gait.node.distrust is None, within_s=30)
+        until(lambda: gait.node.distrust is None)
         gait.stop()

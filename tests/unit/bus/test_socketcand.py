@@ -13,7 +13,7 @@ from drivers.bus.frames import EXTENDED, REMOTE, Frame
 from drivers.bus.sender import Sender
 from drivers.bus.socketcand import MAX_PENDING, SocketcandParser, SocketcandTransport, frame_of, send_message
 from drivers.errors import Unavailable
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 
 STREAM = (
     "< frame 181 1234.5 0102030405060708 >< frame 1FFFFFFF 0.0 AA >< error 20000004 1.0 >< frame 702 1.0 05 >"
@@ -91,7 +91,7 @@ def server(*answers: bytes, then: bytes = b"", keep_open: bool = False) -> Itera
                     connection.sendall(answer)
                 connection.sendall(then)
                 if keep_open:
-                    done.wait(30)
+                    done.wait(WAIT_S)
 
         thread = threading.Thread(target=serve)
         thread.start()

@@ -282,7 +282,7 @@ def test_what_a_resource_only_gateway_imports() -> None:
         "print([m for m in ('can', 'canopen', 'serial', 'asyncio', 'numpy', 'rich') if m in sys.modules])"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout == "[]\n"
 
@@ -294,7 +294,7 @@ def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards
         "print('ssl' in sys.modules); import ssl; print(ssl.OPENSSL_VERSION_INFO[0] > 0)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout == "False\nTrue\n"
 
@@ -307,7 +307,7 @@ def test_an_eds_is_read_without_python_can_which_can_be_imported_afterwards() ->
         "import can; print(can.Bus.__module__)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout.splitlines() == ["GWRMS joint drive False", "can.interface"]
 

@@ -156,7 +156,7 @@ def test_a_disk_that_hangs_delays_neither_the_stop_nor_its_answer(
 
     def hang(path: Path, data: bytes) -> None:
         if path.name == "stop.json":
-            go_on.result(20)
+            go_on.result(WAIT_S)
         write(path, data)
 
     monkeypatch.setattr("gateway.records.durable.write", hang)

@@ -21,6 +21,7 @@ from server_gui.core.prediction.news import Serves
 from server_gui.core.prediction.service import Predicting
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import TrackRecord
+from tests.support.waiting import WAIT_S
 from tests.unit.ml.serving.small import MS, STEP_MS, Floats, hips, learned
 from tests.unit.prediction.lab import Lab
 from tests.unit.prediction.robots import (
@@ -193,7 +194,7 @@ def test_who_falls_behind_decides_about_the_newest_and_counts_what_was_skipped(
         try:
             served(one, told)
             send(one, rows[:300])
-            assert busy.wait(60)
+            assert busy.wait(WAIT_S)
             send(one, rows[300:], begin_ns=3_000 * MS)
         finally:
             go_on.set()
