@@ -1,6 +1,7 @@
 """Rules for every test: a leaked thread, child process, socket or terminal fails the test that leaked it."""
 
 import os
+import re
 import threading
 import time
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from hypothesis import settings
 
 from tests.stores import (  # noqa: F401  # fixtures, for every test
     backend,
@@ -16,6 +18,36 @@ from tests.stores import (  # noqa: F401  # fixtures, for every test
     store_libraries,
     store_url,
 )
+
+README = Path(__file__).with_name("README.md")
+SMOKE = "tests/unit/store/test_store.py"  # of all that is tried on an S3 server too, this always is
+
+
+settings.register_profile("quick", max_examples=40)  # a share of what Hypothesis gives by itself
+settings.register_profile("nightly", settings.get_profile("default"))
+if settings.get_current_profile_name() == "default":
+    settings.load_profile("quick")
+
+
+def table_of_marks() -> list[tuple[str, str]]:
+    """What begins with which name gets which mark, as the table in README.md has it."""
+    return re.findall(r"^\| `(tests/[^`]+)` \| (\w+) \|", README.read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def _marks_of(item: pytest.Item, marks: list[tuple[str, str]]) -> Iterator[str]:
+    yield from (mark for name, mark in marks if item.nodeid.startswith(name))
+    callspec = getattr(item, "callspec", None)
+    if callspec is not None and callspec.params.get("backend") == "s3" and not item.nodeid.startswith(SMOKE):
+        yield "s3"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what waits for the night, before `-m` chooses."""
+    marks = table_of_marks()
+    for item in items:
+        for mark in _marks_of(item, marks):
+            item.add_marker(mark)
 
 
 def _descriptors() -> set[str]:

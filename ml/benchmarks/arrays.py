@@ -9,9 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.errors import UnusableData
+from ml.parsing import parsing
 
 Array = npt.NDArray[Any]
 GRAVITY_RANGE: Final = (8.5, 11.5)  # m/s²: the median length of what an accelerometer on a person measures
+
+
+def _arrays(path: Path) -> dict[str, Array]:
+    with np.load(path, allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
 
 
 class Arrays:
@@ -26,8 +32,7 @@ class Arrays:
         """
         self.path = path
         try:
-            with np.load(path, allow_pickle=False) as file:
-                self._arrays = {name: file[name] for name in file.files}
+            self._arrays = parsing(lambda: _arrays(path))
         except FileNotFoundError:
             raise
         except (ValueError, OSError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:

@@ -20,6 +20,7 @@ from skops.io._protocol import PROTOCOL
 from skops.io.exceptions import UntrustedTypesFoundException
 
 from ml.errors import UnusableModel
+from ml.parsing import parsing
 from ml.registry.sound import check_trees
 
 MAX_BYTES: Final = 64 << 20
@@ -106,7 +107,8 @@ def load(data: bytes) -> dict[str, Any]:
 
     """
     try:
-        state = skops.io.loads(_written_anew(data), trusted=_TYPES)
+        harmless = _written_anew(data)
+        state = parsing(lambda: skops.io.loads(harmless, trusted=_TYPES))
         check_trees(state)
     except UnusableModel:
         raise
@@ -126,8 +128,7 @@ def _written_anew(data: bytes) -> bytes:
     if data[:1] == b"\x80":
         raise UnusableModel("it is a pickle, which could run any program; it was not opened")
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return _Rewriting(archive, len(data)).content()
+        return parsing(lambda: _rewritten(data))
     except UnusableModel:
         raise
     except zipfile.BadZipFile as error:
@@ -219,6 +220,11 @@ class _Rewriting:
         "LossNode": _loss,
         "ObjectNode": _object,
     }
+
+
+def _rewritten(data: bytes) -> bytes:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return _Rewriting(archive, len(data)).content()
 
 
 def _check_array(data: bytes) -> None:

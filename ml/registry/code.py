@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import Any, Final
 
 from ml.features.recipe import Recipe
+from ml.parsing import parsing
 
 PACKAGES: Final = ("ml.features.", "ml.robot.")
 _LIBRARIES: Final = ("scikit-learn", "numpy", "skops")
@@ -55,7 +56,8 @@ def _digest(name: str) -> bytes:
 
 
 def _tree(name: str) -> ast.Module:
-    return ast.parse(inspect.getsource(importlib.import_module(name)))
+    source = inspect.getsource(importlib.import_module(name))
+    return parsing(lambda: ast.parse(source))
 
 
 def _said(node: Any) -> Iterator[str]:

@@ -19,7 +19,8 @@ from hil_sim.sensors.suite import SensorChoice
 from tests.attack import robot_file
 from tests.attack._bus import Drive
 from tests.bench._daemons import Cost
-from tests.unit.gateway.harness import Client, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Client
 
 RATE = 2000.0  # TPDOs a second
 QUICK_STOP = 0x0002

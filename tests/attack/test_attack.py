@@ -21,9 +21,8 @@ from tests.attack.calls import NAMES
 from tests.attack.robot import Robot, robot
 from tests.attack.robot_attack import Phase, Stopping
 from tests.attack.table import ATTACKS, MODULES
-from tests.unit.gateway.harness import Client, until
-
-pytestmark = pytest.mark.timeout(120)
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Client
 
 RATE = 400.0  # TPDOs a second, for slow machines
 SECONDS = 0.5

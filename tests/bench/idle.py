@@ -20,8 +20,9 @@ from typing import Any
 
 from tests.bench._daemons import Cost
 from tests.bench._sim import EXTRA
+from tests.support.waiting import until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import Client, until
+from tests.unit.gateway.harness import Client
 
 QUICK = "--quick" in sys.argv
 REST_S = 10.0 if QUICK else 60.0

@@ -33,7 +33,8 @@ from tests.bench._blocked_bus import blocked_bus
 from tests.bench._bus import Drive
 from tests.bench._crowd import crowd
 from tests.bench._drives import DRIVES
-from tests.unit.gateway.harness import Client, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Client
 from tests.unit.joint.conftest import drive_eds
 
 RATE = 8457.0

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SECONDS = 100
-FEWEST_ORDERS, FEWEST_STATES = 100, 300  # also on a computer that does much else
+NIGHT_S = 100
+FEWEST_ORDERS, FEWEST_STATES = 100, 300  # in a night, also on a computer that does much else
 
 
 def _explore(*options: str, timeout_s: float = 50.0) -> subprocess.CompletedProcess[str]:
@@ -27,12 +27,13 @@ def _number(what: str, said: str) -> int:
     return int(found[1])
 
 
-@pytest.mark.timeout(200)
-def test_no_order_of_events_violates_an_invariant() -> None:
-    done = _explore("--seconds", str(SECONDS), timeout_s=190.0)
+@pytest.mark.parametrize("seconds", [20, NIGHT_S])
+def test_no_order_of_events_violates_an_invariant(seconds: int) -> None:
+    done = _explore("--seconds", str(seconds), timeout_s=250.0)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert _number("orders tried", done.stdout) >= FEWEST_ORDERS
-    assert _number("distinct states", done.stdout) >= FEWEST_STATES
+    if seconds == NIGHT_S:
+        assert _number("orders tried", done.stdout) >= FEWEST_ORDERS
+        assert _number("distinct states", done.stdout) >= FEWEST_STATES
 
 
 def test_a_defect_put_back_is_found_and_its_order_can_be_played_again() -> None:

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SECONDS = 25
-FEWEST_PLAYS = 5  # also on a computer that does much else
+NIGHT_S, FEWEST_PLAYS = 25, 5  # also on a computer that does much else
 
 
 def _explore(*options: str) -> subprocess.CompletedProcess[str]:
@@ -21,16 +20,15 @@ def _explore(*options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.timeout(180)
-def test_no_play_loses_doubles_or_misnames_what_was_acknowledged() -> None:
-    done = _explore("--seconds", str(SECONDS))
+@pytest.mark.parametrize("seconds", [6, NIGHT_S])
+def test_no_play_loses_doubles_or_misnames_what_was_acknowledged(seconds: int) -> None:
+    done = _explore("--seconds", str(seconds))
     assert done.returncode == 0, done.stdout + done.stderr
     plays = re.search(r"(\d+) plays", done.stdout)
     assert plays is not None, done.stdout
-    assert int(plays[1]) >= FEWEST_PLAYS
+    assert int(plays[1]) >= FEWEST_PLAYS or seconds < NIGHT_S
 
 
-@pytest.mark.timeout(180)
 def test_a_defect_put_back_is_found_and_its_play_can_be_played_again() -> None:
     words = ("--words", "rows", "turn", "unit")
     found = _explore("--with-defect", "units-mixed", *words, "--saying", "another unit")

@@ -1,7 +1,6 @@
 """The whole window at work on robots that answer over TCP, and taken apart at its end."""
 
 import contextlib
-import time
 from collections.abc import Callable, Iterator
 
 from PySide6.QtCore import QSettings
@@ -12,8 +11,7 @@ from server_gui.app import FOLLOWING, App
 from server_gui.core.desk.feeds import Record
 from server_gui.core.settings.server_file import ServerSettings
 from tests.gui.fakes import destroy
-
-WITHIN_S = 50.0
+from tests.support.waiting import until
 
 
 @contextlib.contextmanager
@@ -30,7 +28,4 @@ def running(
 
 def wait(so: Callable[[], bool], what: str) -> None:
     """Until it is so, while the window draws."""
-    deadline = time.monotonic() + WITHIN_S
-    while not so():
-        assert time.monotonic() < deadline, f"never {what}"
-        QTest.qWait(10)
+    until(so, what, step=lambda: QTest.qWait(10))

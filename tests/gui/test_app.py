@@ -93,7 +93,6 @@ def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> N
         assert app.desk.stations[0].is_linked
 
 
-@pytest.mark.timeout(120)
 def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplication, tmp_path: Path) -> None:
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     with running(qt, ServerSettings(), kept) as app:

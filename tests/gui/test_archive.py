@@ -40,10 +40,10 @@ from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
-from tests.gui.journals import RobotsJournal
 from tests.gui.running import wait
 from tests.gui.test_recording import FakeKeeper, report
 from tests.support.desk import walking
+from tests.support.journals import RobotsJournal
 
 SECONDS = 12
 RATE_HZ = 50

@@ -27,8 +27,8 @@ from server_gui.views.acts_model import (
 from server_gui.views.audit import Audit
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
-from tests.gui.journals import RobotsJournal
 from tests.support.desk import described
+from tests.support.journals import RobotsJournal
 
 STEP, ANGLE = "gait.step_length", "gait.trunk_angle"
 

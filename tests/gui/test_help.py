@@ -6,7 +6,6 @@ import sys
 import zipfile
 from pathlib import Path
 
-import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDockWidget
@@ -61,7 +60,6 @@ def test_a_reset_layout_has_no_help(window: MainWindow) -> None:
     assert all(dock.isVisible() for dock in window.findChildren(QDockWidget) if dock.windowTitle() != "Help")
 
 
-@pytest.mark.timeout(180)
 def test_the_manual_is_in_what_is_installed(tmp_path: Path) -> None:
     built = subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],

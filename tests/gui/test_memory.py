@@ -66,7 +66,7 @@ def held() -> tuple[int, int]:
     return psutil.Process().memory_info().rss, len(gc.get_objects())
 
 
-@pytest.mark.timeout(240 + 12 * RATE_HZ)
+@pytest.mark.timeout(300 + 12 * RATE_HZ)
 def test_eight_hours_leave_nothing_behind(window: MainWindow, bench: Bench) -> None:
     source, settled = walked(RATE_HZ), (0, 0)
     for second in range(0, HOURS * HOUR_S, BATCH_S):

@@ -100,7 +100,7 @@ class Day:
                 station.take([described(cells=self._random.choice((0, 7, 16))), walking(ROWS, cells=7)])
 
 
-@pytest.mark.timeout(60 + 12 * SECONDS)
+@pytest.mark.timeout(300 + 12 * SECONDS)
 def test_a_monkey_at_the_window_breaks_nothing_and_stop_stays_in_reach(
     qt: QApplication,
     window: MainWindow,

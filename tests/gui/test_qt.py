@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+from tests.support.waiting import WAIT_S
+
 DRAW = """
 from PySide6.QtWidgets import QApplication, QLabel
 application = QApplication([])
@@ -20,7 +22,7 @@ def test_a_widget_is_drawn_offscreen_by_the_pinned_qt() -> None:
         env={"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=WAIT_S,
         check=False,
     )
     assert drawn.returncode == 0, drawn.stderr

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,15 +13,14 @@ from pathlib import Path
 import pytest
 
 from tests.fake_robot import FakeRobot
+from tests.support.waiting import WAIT_S, until
 
 PROGRAM = Path(__file__).with_name("busy_window.py")
-WITHIN_S = 40.0
 
 pytestmark = [
     pytest.mark.skipif(
         not all(map(shutil.which, ("Xvfb", "xdotool"))), reason="needs apt-get install xvfb xauth xdotool"
     ),
-    pytest.mark.timeout(150),
 ]
 
 
@@ -38,7 +37,7 @@ class Shown:
 
     def xdotool(self, *words: str) -> None:
         subprocess.run(
-            ["xdotool", *words], env={**os.environ, "DISPLAY": self.display}, check=True, timeout=20
+            ["xdotool", *words], env={**os.environ, "DISPLAY": self.display}, check=True, timeout=WAIT_S
         )
 
     def touch(self, name: str) -> None:
@@ -47,20 +46,13 @@ class Shown:
     def click(self, name: str, *, times: int = 1) -> None:
         """Click what busy_window.py calls so, once it can be."""
         self.touch(f"{name}.where")
-        wait((self.folder / f"{name}.at").exists, f"could click {name}")
+        until((self.folder / f"{name}.at").exists, f"could click {name}")
         x, y = (self.folder / f"{name}.at").read_text(encoding="utf-8").split()
         self.xdotool("mousemove", x, y, "click", "--repeat", str(times), "--delay", "60", "1")
 
     @property
     def stops(self) -> int:
         return len(self.robot.called("robot.stop"))
-
-
-def wait(so: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + WITHIN_S
-    while not so():
-        assert time.monotonic() < deadline, f"never {what}"
-        time.sleep(0.01)
 
 
 @contextmanager
@@ -77,7 +69,7 @@ def x_server() -> Iterator[str]:
             yield f":{said.readline().strip()}"
     finally:
         server.terminate()
-        server.wait(20)
+        server.wait(WAIT_S)
 
 
 @pytest.fixture
@@ -94,14 +86,14 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
             assert window.stdout is not None
             _, keys, number, x, y = window.stdout.readline().split()
             made = Shown(robot, tmp_path, display, number, keys, (x, y))
-            wait(lambda: len(robot.called("stream.start")) > 0, "followed the robot")
+            until(lambda: len(robot.called("stream.start")) > 0, "followed the robot")
             made.xdotool("windowfocus", "--sync", number)
             yield made
         finally:
             for name in ("free", "end"):
                 (tmp_path / name).touch()
             try:
-                window.wait(20)
+                window.wait(WAIT_S)
             finally:
                 window.kill()
                 window.wait()
@@ -112,27 +104,27 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
 def test_keys_and_click_stop_also_while_the_window_is_held_up(shown: Shown) -> None:
     assert shown.keys == "x11"
     shown.xdotool("key", "F12")
-    wait(lambda: shown.stops == 1, "stopped by F12")
+    until(lambda: shown.stops == 1, "stopped by F12")
     shown.xdotool("key", "ctrl+space")
-    wait(lambda: shown.stops == 2, "stopped by Ctrl+Space")
+    until(lambda: shown.stops == 2, "stopped by Ctrl+Space")
     shown.xdotool("mousemove", *shown.stop_at, "click", "1")
-    wait(lambda: shown.stops == 3, "stopped by a click")
+    until(lambda: shown.stops == 3, "stopped by a click")
     time.sleep(0.3)  # a second press within 0.2 s is taken for a key that is held down
     shown.touch("hold")
-    wait(lambda: (shown.folder / "held").exists(), "held up")
+    until(lambda: (shown.folder / "held").exists(), "held up")
     shown.xdotool("key", "F12")
-    wait(lambda: shown.stops == 4, "stopped while the window was held up")
+    until(lambda: shown.stops == 4, "stopped while the window was held up")
     assert not (shown.folder / "free").exists(), "the window was not held up any more"
 
 
 def test_a_value_is_edited_reviewed_and_written_with_mouse_and_keys(shown: Shown) -> None:
-    wait(lambda: len(shown.robot.called("parameter.read")) > 1, "read the parameters")
+    until(lambda: len(shown.robot.called("parameter.read")) > 1, "read the parameters")
     shown.click("field", times=2)
     shown.xdotool("type", "430")
     shown.xdotool("key", "Return")
     shown.click("review")
     assert shown.robot.called("parameter.write") == [], "nothing is written before it was reviewed"
     shown.click("write")
-    wait(lambda: len(shown.robot.called("parameter.write")) == 1, "wrote it")
+    until(lambda: len(shown.robot.called("parameter.write")) == 1, "wrote it")
     assert shown.robot.called("parameter.write")[0]["changes"] == {"gait.step_length": 0.43}
     assert shown.robot.parameters["gait.step_length"] == 0.43

@@ -18,6 +18,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from drivers.errors import DeviceAbort
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
+from tests.support.examples import examples
+from tests.support.waiting import until
 from tests.unit.gateway.harness import (
     DISABLED,
     ENABLED,
@@ -29,7 +31,6 @@ from tests.unit.gateway.harness import (
     FakeDrive,
     config,
     serving,
-    until,
 )
 
 STEP, CYCLE, TOE = "gait.step_length", "gait.cycle_time", "gait.toe_height"
@@ -419,7 +420,7 @@ class ControlMachine(RuleBasedStateMachine):
 
 
 ControlMachine.TestCase.settings = settings(
-    max_examples=40,
+    max_examples=examples(40),
     stateful_step_count=50,
     deadline=None,
     suppress_health_check=list(HealthCheck),

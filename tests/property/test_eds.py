@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 import eds
 from eds.numbers import parse_integer
+from tests.support.examples import examples
 
 SOUND = b"""\
 [DeviceInfo]
@@ -89,7 +90,7 @@ def usable_or_refused(content: bytes) -> None:
 
 
 @given(edits)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_a_damaged_file_is_refused_or_usable(damage: list[tuple[int, int, bytes]]) -> None:
     content = SOUND
     for position, length, replacement in damage:
@@ -98,7 +99,7 @@ def test_a_damaged_file_is_refused_or_usable(damage: list[tuple[int, int, bytes]
 
 
 @given(st.permutations(SOUND.splitlines(keepends=True)))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_lines_in_any_order_are_refused_or_usable(lines: list[bytes]) -> None:
     usable_or_refused(b"".join(lines))
 

@@ -17,7 +17,7 @@ from ml.store.errors import NoSuchTable
 from ml.store.tables import TELEMETRY
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.control_socket import NobodyCollects, ask
-from tests.scenario.processes import DEADLINE_S, until
+from tests.support.waiting import WAIT_S, until
 
 KEYS = ("session", "connection", "stream", "seq", "row", "stamp_ns")
 GONE = {
@@ -92,7 +92,7 @@ class Collecting:
     def _end(self, number: signal.Signals) -> int:
         assert self._process is not None
         os.kill(self._process.pid, number)
-        status = self._process.wait(DEADLINE_S)
+        status = self._process.wait(WAIT_S)
         self._process = None
         return status
 

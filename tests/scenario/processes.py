@@ -7,37 +7,22 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from server_gui.processes.children import Child, ChildFailed
-
-DEADLINE_S = 120.0
+from tests.support.waiting import WAIT_S, until
 
 
 def nothing() -> None:
     pass
 
 
-def until(
-    condition: Callable[[], object],
-    found: Callable[[], object] = lambda: None,
-    within_s: float = DEADLINE_S,
-) -> None:
-    """Wait for a condition; `found` tells what there was instead."""
-    deadline = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < deadline, f"not met in time: {found()}"
-        time.sleep(0.05)
-
-
 def gwrms(*arguments: str) -> subprocess.CompletedProcess[str]:
     """One command, as a person types it."""
     command = [sys.executable, "-P", "-m", "gateway.main", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S, check=False)
 
 
 class Bench:
@@ -55,14 +40,14 @@ class Bench:
     def start_simulator(self) -> None:
         arguments = ["sim", "--dir", str(self.folder), *self.simulator_options]
         self.simulator = self._processes.enter_context(Child("simulator", arguments))
-        ready = self.simulator.wait_ready(_json, DEADLINE_S, nothing)
+        ready = self.simulator.wait_ready(_json, WAIT_S, nothing)
         assert ready["ready"] is True
         self.config = Path(ready["config"])
 
     def start_gateway(self) -> None:
         arguments = ["gateway", str(self.config), "--port", str(self.port)]
         self.gateway = self._processes.enter_context(Child("gateway", arguments))
-        host, port = self.gateway.wait_ready(listening, DEADLINE_S, nothing)
+        host, port = self.gateway.wait_ready(listening, WAIT_S, nothing)
         assert host == "127.0.0.1"
         self.port = port
 
@@ -77,7 +62,7 @@ class Bench:
 
     def ask(self, method: str, **params: Any) -> dict[str, Any]:
         """One request as `nc` sends it: a line, then the sending half is closed; the answer until the end."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=DEADLINE_S) as link:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=WAIT_S) as link:
             request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
             link.sendall(json.dumps(request).encode() + b"\n")
             link.shutdown(socket.SHUT_WR)

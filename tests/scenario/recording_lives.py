@@ -15,6 +15,7 @@ from ml.store import Store
 from server_gui.core.recording.recorder import Recorder, RecorderSettings
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
 
 ROBOT = "exo-01"
@@ -34,7 +35,7 @@ def live(spool: Path, url: str, first: int, told: int) -> None:
     ):
         for number in range(first, first + PER_LIFE):
             recorder.record(ROBOT, 1, batch(number, channels=("counter.number",)))
-            if number % 5 == 4 and recorder.flush(10):
+            if number % 5 == 4 and recorder.flush(WAIT_S):
                 os.write(told, f"{number}\n".encode())  # this and every one before it in this life
                 uploader.now()
             if uploader.state.uploaded:

@@ -24,7 +24,7 @@ from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
 from hil_sim.loop import Loop
 from hil_sim.node.node import Node
-from tests.unit.bus.waiting import WAIT_S, until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.hil_sim.device_file import DOMAIN, UNSIGNED16, UNSIGNED64, VISIBLE_STRING, communication
 
 DEVICE, DRIVE = 5, 6

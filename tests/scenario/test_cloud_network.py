@@ -29,7 +29,7 @@ READING = (
     ("cloud", "upload", "--from", "{folder}", "{url}"),
 )
 Run = Callable[..., str]
-pytestmark = [pytest.mark.parametrize("backend", ["s3"], indirect=True), pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.parametrize("backend", ["s3"], indirect=True)]
 
 
 @pytest.fixture

@@ -9,13 +9,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 
 from tests.scenario.collecting import Collecting, Kept
-from tests.scenario.processes import DEADLINE_S, Bench, gwrms, until
+from tests.scenario.processes import Bench, gwrms
+from tests.support.waiting import WAIT_S, until
 
 FAST_S = int(os.environ.get("GWRMS_SIMULATED_S", "60"))
 SIMULATED_S = int(os.environ.get("GWRMS_SIMULATED_S", "10"))
@@ -69,11 +70,27 @@ def robots(tmp_path: Path) -> Iterator[dict[str, Robot]]:
         yield {name: Robot(tmp_path / name, processes) for name in ROBOTS}
 
 
-@pytest.mark.timeout(300)
+@contextmanager
+def served(*options: str) -> Iterator[dict[str, str]]:
+    """Three robots that cost next to nothing, by name."""
+    command = [sys.executable, "-m", "tests.wire_robots", "3", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        ports = json.loads(process.stdout.readline())
+        yield {f"exo-{number:02}": f"127.0.0.1:{port}" for number, port in enumerate(ports)}
+        process.kill()
+
+
+@pytest.fixture
+def steady_robots() -> Iterator[dict[str, str]]:
+    with served("--seconds", "3600") as robots:
+        yield robots
+
+
 def test_a_killed_collector_loses_nothing_that_it_had_and_goes_on(
-    robots: dict[str, Robot], start: Start
+    steady_robots: dict[str, str], start: Start
 ) -> None:
-    collecting = start({name: robot.address for name, robot in robots.items()})
+    collecting = start(steady_robots)
     collecting.until_more(150)
     acknowledged = collecting.rows()
     # It commits in the order in which things come; records of other tables are fewer than a hundred.
@@ -83,9 +100,9 @@ def test_a_killed_collector_loses_nothing_that_it_had_and_goes_on(
     collecting.until_more(150)
     later = collecting.rows()
     shown = gwrms("collect", "--status", "--config", str(collecting.config))
-    assert all(name in shown.stdout for name in ROBOTS), shown.stderr
+    assert all(name in shown.stdout for name in steady_robots), shown.stderr
     assert collecting.end() == 0
-    for name in ROBOTS:
+    for name in steady_robots:
         kept = collecting.kept(name)
         assert len(kept.rows) >= acknowledged[name] + later[name]
         assert len(kept.sessions) == 2  # one a life of the collector
@@ -100,7 +117,7 @@ def test_as_long_as_robots_walk_there_is_no_gap(robots: dict[str, Robot], start:
     until(
         lambda: all(robot.simulated_s() >= begun_s[name] + SIMULATED_S for name, robot in robots.items()),
         collecting.log,
-        within_s=DEADLINE_S + 10 * SIMULATED_S,
+        within_s=WAIT_S + 10 * SIMULATED_S,
     )
     report = collecting.report()
     assert {link.links for link in report.robots.values()} == {1}
@@ -127,15 +144,11 @@ def check_whole(kept: Kept) -> None:
 @pytest.fixture
 def fast_robots() -> Iterator[dict[str, str]]:
     """Three robots whose time passes as fast as they are followed."""
-    command = [sys.executable, "-m", "tests.wire_robots", "3", "--fast", "--seconds", str(FAST_S)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as served:
-        assert served.stdout is not None
-        ports = json.loads(served.stdout.readline())
-        yield {f"exo-{number:02}": f"127.0.0.1:{port}" for number, port in enumerate(ports)}
-        served.kill()
+    with served("--fast", "--seconds", str(FAST_S)) as robots:
+        yield robots
 
 
-@pytest.mark.timeout(120 + FAST_S)
+@pytest.mark.timeout(300 + FAST_S)
 def test_however_much_comes_at_once_there_is_no_gap(fast_robots: dict[str, str], start: Start) -> None:
     collecting = start(fast_robots)
     expected = dict.fromkeys(fast_robots, 100 * FAST_S)

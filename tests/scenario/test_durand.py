@@ -24,7 +24,7 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
 from drivers.samples import State
-from tests.unit.bus.waiting import WAIT_S, until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.joint.test_drive import quality, read
 
 DT = durand.DatatypeEnum

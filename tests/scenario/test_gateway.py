@@ -12,7 +12,8 @@ import pytest
 from gateway.config import load
 from hil_sim.exoskeleton import JOINTS
 from hil_sim.robot import SimulatedRobot
-from tests.unit.gateway.harness import Client, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Client, serving
 
 LINGER = ("linger_s = 5", "linger_s = 0.1")
 

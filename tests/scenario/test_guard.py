@@ -21,11 +21,9 @@ from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import JOINTS
 from hil_sim.robot import SimulatedRobot
 from server_gui.processes.children import Child, ChildFailed
-from tests.scenario.processes import DEADLINE_S, nothing
-from tests.scenario.processes import until as until_told
+from tests.scenario.processes import nothing
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import Client, serving
-
-pytestmark = pytest.mark.timeout(300)
 
 ENABLED = PowerState.OPERATION_ENABLED
 DOWNLOAD, UPLOAD = 1, 2  # client command specifiers (CiA 301 §7.2.4.3)
@@ -84,11 +82,6 @@ BUS = """
 watch = "bus"
 silent_s = 2.0
 """
-
-
-def until(condition: Callable[[], object], what: str) -> None:
-    """Wait until something is so; the simulator may be far slower than real time on a busy computer."""
-    until_told(condition, lambda: what)
 
 
 def configure(robot: SimulatedRobot, text: str) -> Path:
@@ -378,7 +371,7 @@ class Killed:
         self.robot = stack.enter_context(SimulatedRobot(folder))
         self.config = configure(self.robot, HEARTBEAT)
         self.gateway = stack.enter_context(Child("gateway", ["gateway", str(self.config), "--port", "0"]))
-        found = self.gateway.wait_ready(_listening, DEADLINE_S, nothing)
+        found = self.gateway.wait_ready(_listening, WAIT_S, nothing)
         self.client = stack.enter_context(Client((found[1], int(found[2]))))
         self.stopped_s: float | None = None
         self.robot.exoskeleton.measured.append(self._look)

@@ -17,7 +17,7 @@ from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
 from drivers.samples import State
 from hil_sim.robot import SimulatedRobot
-from tests.unit.bus.waiting import WAIT_S, until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.joint.test_drive import quality, read
 
 

@@ -27,7 +27,8 @@ from server_gui.core.archive.labelling import Labelling
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.settings.server_file import load
 from tests.scenario.collecting import Collecting
-from tests.scenario.processes import Bench, until
+from tests.scenario.processes import Bench
+from tests.support.waiting import until
 from tests.unit.training.walkers import BEGAN_UTC, Made, put
 
 S, MS = 10**9, 10**6
@@ -150,11 +151,11 @@ def test_what_is_labelled_is_learned_and_serves_and_can_be_taken_back(store_url:
                 now = predicting().robots.get(ROBOT, {}).get("activity")
                 return now is not None and now.model == model
 
-            until(serves, collecting.log, PATIENCE_S)
+            until(serves, collecting.log, within_s=PATIENCE_S)
 
         def until_it_has_said_enough() -> None:
             before = predicting().judged
-            until(lambda: predicting().judged > before + ENOUGH, collecting.log, PATIENCE_S)
+            until(lambda: predicting().judged > before + ENOUGH, collecting.log, within_s=PATIENCE_S)
 
         assert coming.wait() == 0
         later = put_practice(file, store_url)
@@ -167,11 +168,11 @@ def test_what_is_labelled_is_learned_and_serves_and_can_be_taken_back(store_url:
         for _, of_session in itertools.groupby(later, key=lambda label: label.session):
             labelling.add_all(list(of_session))
         until_it_has_said_enough()
-        until(lambda: session_of(store_url) is not None, collecting.log, PATIENCE_S)
+        until(lambda: session_of(store_url) is not None, collecting.log, within_s=PATIENCE_S)
         live = session_of(store_url)
         assert live is not None
         assert asked("label", live.session, "--truth", str(robot.truth), "--config", config)["new"] > 2
-        until(lambda: "sit" in stored_labels(store_url, live), collecting.log, PATIENCE_S)
+        until(lambda: "sit" in stored_labels(store_url, live), collecting.log, within_s=PATIENCE_S)
 
         trained = asked("train", "activity", "--config", config, "--held-out", "3", "--promote")
         second = trained["model"]

@@ -10,9 +10,8 @@ from eds import dcf
 from gateway.config import load
 from gateway.main import main
 from hil_sim.robot import SimulatedRobot
-from tests.unit.gateway.harness import Client, serving, until
-
-pytestmark = pytest.mark.timeout(300)
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Client, serving
 
 OFFER = '[joint.left_knee]\nparameters = "eds"\nrelease = ["position_control_*", "profile_*"]\n'
 GAIN = "left_knee.position_control_parameters_proportional_gain"

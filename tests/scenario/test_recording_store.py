@@ -13,16 +13,15 @@ from ml.store.tables import TELEMETRY
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
-from tests.scenario.processes import until
 from tests.slow_network import SlowNetwork
 from tests.stores import BUCKET, SeaweedFS
+from tests.support.waiting import WAIT_S, until
 from tests.unit.recording.robots import batch
 
 WRITERS, COMMITS = 4, 10
 HERE = TELEMETRY.location("exo-01", 1)
 
 
-@pytest.mark.timeout(180)
 def test_four_servers_that_write_at_once_lose_no_commit(store_url: str) -> None:
     module = "tests.scenario.recording_writer"
     writers = [
@@ -43,7 +42,6 @@ def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, store_libraries: Non
         yield started
 
 
-@pytest.mark.timeout(180)
 def test_a_store_that_dies_in_the_middle_of_an_upload_gets_everything_once_it_is_back(
     server: SeaweedFS, tmp_path: Path
 ) -> None:
@@ -61,7 +59,7 @@ def test_a_store_that_dies_in_the_middle_of_an_upload_gets_everything_once_it_is
             return store
 
         with Uploader(spool, connect) as uploader:
-            assert connected.wait(60)
+            assert connected.wait(WAIT_S)
             server.kill()  # while it writes the first segments
             until(lambda: uploader.state.problem is not None or uploader.state.uploaded == 4)
             server.start()
@@ -74,7 +72,6 @@ def test_a_store_that_dies_in_the_middle_of_an_upload_gets_everything_once_it_is
 
 
 @pytest.mark.parametrize("backend", ["s3"], indirect=True)
-@pytest.mark.timeout(180)
 def test_a_slow_network_that_is_cut_again_and_again_delays_an_upload_and_nothing_else(
     backend: SeaweedFS, store_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,13 +8,12 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import psutil
 import pytest
 
-pytestmark = pytest.mark.timeout(300)
+from tests.support.waiting import until
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 DEADLINE_S = 240.0
@@ -112,10 +111,7 @@ def test_a_wrong_file_keeps_the_others_from_running(tmp_path: Path) -> None:
 def test_a_run_that_is_terminated_leaves_no_gateway_behind(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "gateway.main", "sim", "run", str(FOLDER / "node_lost.toml")]
     with subprocess.Popen([*command, "--dir", str(tmp_path)]) as running:
-        deadline = time.monotonic() + DEADLINE_S
-        while not (gateways := psutil.Process(running.pid).children()):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        gateways = until(psutil.Process(running.pid).children)
         running.terminate()
         assert running.wait(DEADLINE_S) == 128 + signal.SIGTERM
     assert psutil.wait_procs(gateways, DEADLINE_S)[1] == []

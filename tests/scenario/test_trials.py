@@ -19,11 +19,9 @@ from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.node.dictionary import Value
 from hil_sim.robot import SimulatedRobot
 from server_gui.processes.children import Child
-from tests.scenario.processes import DEADLINE_S, Bench, is_dead, listening, nothing
-from tests.scenario.processes import until as until_processes
-from tests.unit.gateway.harness import Answered, Client, serving, until
-
-pytestmark = pytest.mark.timeout(300)
+from tests.scenario.processes import Bench, is_dead, listening, nothing
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import Answered, Client, serving
 
 KNEE_TORQUE = (0x6072, 0)
 SIX = {f"{joint}.max_torque": 60.0 for joint in ("left_hip", "left_knee", "left_ankle")} | {
@@ -267,8 +265,8 @@ def test_a_trial_reverts_when_its_terminal_is_killed(bench: Bench) -> None:
         assert value(bench, "gait.cycle_time") == 1.25
     finally:
         terminal.kill()
-    until_processes(lambda: value(bench, "gait.cycle_time") == before)
-    until_processes(lambda: bench.ask("robot.describe")["trials"] == [])
+    until(lambda: value(bench, "gait.cycle_time") == before)
+    until(lambda: bench.ask("robot.describe")["trials"] == [])
     last = bench.ask("journal.tail", n=1)["entries"][0]
     assert (last["what"], last["reason"]) == ("taken back", "lease lost with the connection")
 
@@ -281,7 +279,7 @@ def test_a_gateway_killed_during_a_trial_takes_it_back_when_it_starts_again(benc
     bench.start_gateway()
     # Client or not: nobody asks this gateway for anything before the value is back.
     folder = RecordsFolder(load(bench.config).records)
-    until_processes(lambda: not folder.undo.exists())
+    until(lambda: not folder.undo.exists())
     assert value(bench, "gait.cycle_time") == before
     assert [one["what"] for one in read_verified(folder.journal)][-1] == "taken back"
 
@@ -292,7 +290,7 @@ def test_a_gateway_killed_during_a_store_leaves_a_record_of_it_and_a_robot_that_
     with SimulatedRobot(tmp_path) as robot, ExitStack() as processes:
         config, folder = str(robot.config), RecordsFolder(load(robot.config).records)
         gateway = processes.enter_context(Child("gateway", ["gateway", config, "--port", "0"]))
-        port = gateway.wait_ready(listening, DEADLINE_S, nothing)[1]
+        port = gateway.wait_ready(listening, WAIT_S, nothing)[1]
         client = processes.enter_context(Client(("127.0.0.1", port)))
         until(lambda: None not in read(client).values(), "every parameter can be read")
         client.call("robot.stop", reason="to store")
@@ -308,12 +306,12 @@ def test_a_gateway_killed_during_a_store_leaves_a_record_of_it_and_a_robot_that_
 
         command.on_write = kill
         client.request("parameter.store", component="left_knee")
-        until_processes(lambda: is_dead(gateway))
+        until(lambda: is_dead(gateway))
         last = read_verified(folder.journal)[-1]
         assert (last["what"], last["component"]) == ("store", "left_knee")  # begun, and no end of it
         command.on_write = check
         again = processes.enter_context(Child("gateway again", ["gateway", config, "--port", "0"]))
-        port = again.wait_ready(listening, DEADLINE_S, nothing)[1]
+        port = again.wait_ready(listening, WAIT_S, nothing)[1]
         second = processes.enter_context(Client(("127.0.0.1", port)))
         second.call("control.acquire", ttl_s=300)
         until(lambda: None not in read(second).values(), "every parameter can be read")

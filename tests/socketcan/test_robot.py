@@ -13,8 +13,9 @@ from gateway.client import Address, LinkSettings, Robot
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import CONTROLLER, JOINTS
 from hil_sim.robot import SimulatedRobot
-from tests.scenario.processes import Bench, until
+from tests.scenario.processes import Bench
 from tests.socketcan.link import NAME, needs_vcan, set_up
+from tests.support.waiting import until
 
 DOWN = f"{NAME} is down; run: sudo ip link set {NAME} up"
 LEFT = [name for name in JOINTS if name.startswith("left")]

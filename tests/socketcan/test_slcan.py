@@ -21,8 +21,8 @@ from drivers.joint.settings import JointSettings
 from drivers.samples import State
 from tests.socketcan.link import NAME, needs_vcan
 from tests.socketcan.serial_adapter import SerialAdapter
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 from tests.unit.joint.conftest import drive_eds, drive_objects, tpdo
 from tests.unit.joint.test_drive import quality, read
 

@@ -15,9 +15,9 @@ from drivers.bus.node import Node, shared_node
 from drivers.bus.settings import CanSettings, NodeTimes
 from drivers.errors import DriverError, Mismatch
 from eds import Description
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.conftest import IDENTITY
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 
 Describe = Callable[[int], Description]
 Values = dict[int, int]
@@ -52,7 +52,7 @@ class Bench:
         self.fake = fake
         self.bus = CanBus("main", CanSettings(interface="virtual", channel=channel, node_id=100))
         self.heartbeat = Heartbeat(self.bus, 0.1)
-        self.node: Node = shared_node(self.bus, 5, description, NodeTimes(sdo_timeout_s=0.1))
+        self.node: Node = shared_node(self.bus, 5, description, NodeTimes(sdo_timeout_s=1.0))
         self.changes: list[tuple[bool, str]] = []
         self.arming = Arming(self.node, self.heartbeat, axes, self.changed)
 

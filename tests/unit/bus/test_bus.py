@@ -16,8 +16,8 @@ from drivers.bus.frames import ERROR, EXTENDED, wire_id
 from drivers.bus.interfaces.controller_state import BusState, bus_state
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.narrow import NarrowTransport
-from tests.unit.bus.waiting import WAIT_S, until
 
 
 class Recorder(BusUser):

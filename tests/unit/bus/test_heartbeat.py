@@ -12,7 +12,7 @@ from drivers.bus.cycles import next_due
 from drivers.bus.heartbeat import Heartbeat
 from drivers.bus.settings import CanSettings, Role
 from drivers.errors import SettingsError
-from tests.unit.bus.waiting import until
+from tests.support.waiting import until
 
 OURS = 0x700 + 100
 

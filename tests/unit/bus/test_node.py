@@ -15,9 +15,9 @@ from drivers.bus.settings import DeviceSettings
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
 from drivers.samples import State
 from eds import Description
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.conftest import IDENTITY
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 
 Describe = Callable[[int], Description]
 

@@ -10,9 +10,9 @@ import pytest
 from drivers.bus.sdo.channel import Interrupted, SdoChannel
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.errors import DeviceTimeout, DriverError, NotPermitted
+from tests.support.waiting import WAIT_S
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import VALUE, LateServer
-from tests.unit.bus.waiting import WAIT_S
 
 STOP = bytes.fromhex("2B 40 60 00 02 00 00 00")
 CONTROLWORD = 0x6040

@@ -9,8 +9,8 @@ import pytest
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.direct import Direct
-from tests.unit.bus.waiting import WAIT_S, until
 
 
 class Device:

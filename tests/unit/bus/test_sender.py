@@ -13,8 +13,8 @@ from drivers.bus.frames import Transport
 from drivers.bus.sender import Sender
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.narrow import NarrowTransport
-from tests.unit.bus.waiting import WAIT_S, until
 
 FOREVER = 1000.0  # longer than any test may take: who waits for it has failed
 REQUEST = 0x602

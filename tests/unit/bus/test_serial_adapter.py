@@ -6,7 +6,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from tests.bench._blocked_bus import blocked_bus
-from tests.unit.bus.waiting import until
+from tests.support.waiting import WAIT_S, until
 
 
 def test_a_bus_whose_adapter_takes_nothing_says_so_and_can_be_closed() -> None:
@@ -27,5 +27,5 @@ def test_a_bus_whose_adapter_takes_nothing_says_so_and_can_be_closed() -> None:
         assert "does not send" in told[0] or "takes" in told[0]
         ending = threading.Thread(target=bus.stop)
         ending.start()
-        ending.join(20)
+        ending.join(WAIT_S)
         assert not ending.is_alive()

@@ -19,7 +19,7 @@ from drivers.bus.interfaces.socketcand import (
 )
 from drivers.bus.sender import Sender
 from drivers.errors import Unavailable
-from tests.unit.bus.waiting import until
+from tests.support.waiting import WAIT_S, until
 
 STREAM = (
     "< frame 181 1234.5 0102030405060708 >< frame 1FFFFFFF 0.0 AA >< error 20000004 1.0 >< frame 702 1.0 05 >"
@@ -97,7 +97,7 @@ def server(*answers: bytes, then: bytes = b"", keep_open: bool = False) -> Itera
                     connection.sendall(answer)
                 connection.sendall(then)
                 if keep_open:
-                    done.wait(30)
+                    done.wait(WAIT_S)
 
         thread = threading.Thread(target=serve)
         thread.start()

@@ -15,6 +15,7 @@ from drivers.bus.sdo.answers import INBOX, Answers, SdoCounters
 from drivers.bus.sdo.channel import OUT_OF_SYNC, SdoChannel
 from drivers.bus.sdo.outstanding import Outstanding
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, Unavailable
+from tests.support.examples import examples
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import ABSENT, AT_ONCE, CLOCK, LONG, VALUE, Fate, LateServer
 
@@ -86,7 +87,7 @@ class Reader:
             assert known in (None, self.server.value)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.lists(fates, max_size=40), steps)
 def test_nothing_is_believed_that_is_older_than_its_question(drawn: list[Fate], names: list[str]) -> None:
     server = LateServer(iter(drawn))
@@ -95,7 +96,7 @@ def test_nothing_is_believed_that_is_older_than_its_question(drawn: list[Fate], 
         reader.step(name)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(st.lists(fates, max_size=40), steps)
 def test_once_its_answers_come_again_everything_can_be_asked(drawn: list[Fate], names: list[str]) -> None:
     server = LateServer(iter(drawn))

@@ -10,6 +10,7 @@ import pytest
 from gateway.main import main
 from gateway.records.journal import Journal, Sizes, read_verified
 from tests.fake_robot import FakeRobot, Refusal
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_a_journal_in_pieces_is_verified_and_what_was_removed_is_said(
     path = tmp_path / "journal.jsonl"
     journal = Journal(path, "boot", sizes=Sizes(piece=1000, kept=3000))
     for _ in range(40):
-        journal.append("tester", "note").result(10)
+        journal.append("tester", "note").result(WAIT_S)
     journal.close()
     removed = read_verified(path)[0]["n"] - 1
     assert main(["journal", "verify", str(tmp_path)]) == 0

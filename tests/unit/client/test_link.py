@@ -20,6 +20,7 @@ from gateway.client import (
 )
 from gateway.wire.stream import StreamStartParams
 from tests.fake_robot import FakeRobot, Refusal
+from tests.support.waiting import until_in_loop
 from tests.unit.client.in_loop import in_loop
 
 PATIENT = LinkSettings(silence_s=30.0)
@@ -30,12 +31,6 @@ ONCE = LinkSettings(silence_s=30.0, reconnect=False)
 def robot() -> Iterator[FakeRobot]:
     with FakeRobot() as robot:
         yield robot
-
-
-async def until(condition: Callable[[], object]) -> None:
-    async with asyncio.timeout(30):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 async def exhaust(stream: Subscription) -> None:
@@ -82,7 +77,7 @@ async def test_link_is_made_when_the_robot_comes_up_later(robot: FakeRobot) -> N
     states: list[ConnectionState] = []
     client = Client(robot.address, PATIENT, states.append)
     client.link.start()
-    await until(lambda: ConnectionState.WAITING in states)
+    await until_in_loop(lambda: ConnectionState.WAITING in states)
     assert isinstance(client.link.problem, Unreachable)
     await asyncio.to_thread(robot.listen)
     async with asyncio.timeout(30):
@@ -97,7 +92,7 @@ async def test_link_is_made_when_the_robot_comes_up_later(robot: FakeRobot) -> N
 async def test_call_without_a_link_is_not_sent_and_not_kept(robot: FakeRobot) -> None:
     async with Client(robot.address, PATIENT) as client:
         await asyncio.to_thread(robot.refuse)
-        await until(lambda: client.link.state is not ConnectionState.CONNECTED)
+        await until_in_loop(lambda: client.link.state is not ConnectionState.CONNECTED)
         with pytest.raises(NotConnected, match=r"robot\.stop was not sent"):
             await client.stop("test")
         await asyncio.to_thread(robot.listen)
@@ -172,7 +167,7 @@ async def test_holes_in_seq_are_counted(robot: FakeRobot) -> None:
 @in_loop
 async def test_slow_taker_loses_the_oldest_and_is_told(robot: FakeRobot) -> None:
     async with Client(robot.address, PATIENT) as client, client.subscribe(rate_hz=200, depth=2) as stream:
-        await until(lambda: stream.counters.overflowed >= 3)
+        await until_in_loop(lambda: stream.counters.overflowed >= 3)
         counters = stream.counters
         assert (await anext(stream)).seq == counters.notifications - 2
 
@@ -191,7 +186,7 @@ async def test_iteration_ends_when_the_client_is_closed(robot: FakeRobot) -> Non
 async def test_peer_that_vanished_without_closing_is_noticed(robot: FakeRobot) -> None:
     async with Client(robot.address, LinkSettings(silence_s=0.2)) as client:
         robot.mute = True
-        await until(lambda: client.link.state is not ConnectionState.CONNECTED)
+        await until_in_loop(lambda: client.link.state is not ConnectionState.CONNECTED)
         robot.mute = False
         async with asyncio.timeout(30):
             await client.link.connected()
@@ -213,7 +208,7 @@ async def test_clock_offset_is_known_and_begins_anew_with_another_boot(robot: Fa
         robot.boot_id = "boot-2"
         del robot.overrides["clock.read"]
         await asyncio.to_thread(robot.cut)
-        await until(lambda: client.link.connections == 2)
+        await until_in_loop(lambda: client.link.connections == 2)
         offset = client.link.clock.offset
         assert offset is not None
         assert abs(offset.offset_ns) <= offset.uncertainty_ns
@@ -228,7 +223,7 @@ async def test_bytes_add_up_over_connections(robot: FakeRobot) -> None:
         described = client.link.received_bytes
         assert described > greeted
         await asyncio.to_thread(robot.cut)
-        await until(lambda: client.link.connections == 2)
+        await until_in_loop(lambda: client.link.connections == 2)
         assert client.link.received_bytes >= described + greeted
 
 

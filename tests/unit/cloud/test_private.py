@@ -17,6 +17,7 @@ from server_gui.core.atomic_files import draft
 from server_gui.core.cloud import transfer
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
 
 KEYS = [
@@ -108,7 +109,7 @@ def test_a_spool_is_for_its_owner_alone_also_one_that_was_open(tmp_path: Path) -
     (tmp_path / "spool").mkdir(0o755)
     with Spool(tmp_path / "spool", reserve_bytes=0) as spool, Recorder(spool) as recorder:
         recorder.record("exo-01", 1, batch(0))
-        assert recorder.flush(20)
+        assert recorder.flush(WAIT_S)
         assert opened(tmp_path / "spool") == {}
     assert opened(tmp_path / "spool") == {}
 
@@ -145,7 +146,7 @@ def test_every_command_that_writes_makes_private_files() -> None:
         "import os, importlib, sys, contextlib\n"
         f"for name in {COMMANDS.split()!r}:\n"
         "    os.umask(0o022)\n"
-        "    main = importlib.import_module(f'server_gui.commands.{name}').main\n"
+        "    main = importlib.import_module(f'server_gui.cli.{name}').main\n"
         "    with contextlib.suppress(SystemExit), open(os.devnull, 'w') as out:\n"
         "        with contextlib.redirect_stdout(out): main(['--help'])\n"
         "    found = os.umask(0o022)\n"

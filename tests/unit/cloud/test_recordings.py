@@ -18,6 +18,7 @@ from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send, upload
+from tests.support.waiting import WAIT_S
 from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, record
 from tests.unit.recording.robots import CHANNELS, batch, described, description, value
 
@@ -49,7 +50,7 @@ def in_pieces(spool: Spool, url: str, after: Callable[[int, Store], object]) -> 
             if seq % 6 == 5:
                 recorder.mark("exo-01", f"{seq}")
                 recorder.cut(lambda: None)
-                assert recorder.flush(30.0)
+                assert recorder.flush(WAIT_S)
                 after(seq // 6, store)
 
 

@@ -23,9 +23,10 @@ from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import CHANNELS, batch, description
 
-ROWS, WAIT_S = 50, 30.0
+ROWS = 50
 
 
 def record(folder: Path) -> str:

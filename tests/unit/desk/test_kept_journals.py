@@ -17,8 +17,8 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from server_gui.core.threads.background import Background
-from tests.gui.journals import RobotsJournal
-from tests.unit.desk.test_library import until
+from tests.support.journals import RobotsJournal
+from tests.support.waiting import WAIT_S, until
 
 
 @pytest.fixture
@@ -92,8 +92,8 @@ def test_entries_of_several_pieces_hold_together(tmp_path: Path) -> None:
     (tmp_path / "pieces").mkdir()
     journal = Journal(tmp_path / "pieces" / "journal.jsonl", "boot", sizes=Sizes(piece=2000))
     for _ in range(40):
-        journal.append("tester", "note").result(10)
-    known = [entry for count in (40, 20, 5) for entry in journal.tail(count).result(10).entries]
+        journal.append("tester", "note").result(WAIT_S)
+    known = [entry for count in (40, 20, 5) for entry in journal.tail(count).result(WAIT_S).entries]
     journal.close()
     assert len(list((tmp_path / "pieces").glob("journal.jsonl.0*"))) > 3
     (stretch,) = chained(known)

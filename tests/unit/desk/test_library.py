@@ -1,8 +1,7 @@
 """What store and spool hold, and jobs on them: told, tried again, cancelled."""
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 
@@ -16,9 +15,8 @@ from server_gui.core.cloud import actions
 from server_gui.core.cloud.jobs import Cancelled, Job, Jobs, JobState
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from tests.support.waiting import WAIT_S, until
 from tests.unit.cloud.recordings import BATCHES, ROWS, Recorded, record
-
-WAIT_S = 30.0
 
 
 @pytest.fixture
@@ -36,13 +34,6 @@ def jobs() -> Iterator[Jobs]:
     made = Jobs()
     yield made
     assert made.close(WAIT_S)
-
-
-def until(so: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + WAIT_S
-    while not so():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.005)
 
 
 def over(job: Job) -> Job:

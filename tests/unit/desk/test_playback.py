@@ -20,6 +20,7 @@ from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from tests.support.waiting import WAIT_S
 from tests.unit.cloud.recordings import UNITS
 from tests.unit.recording.robots import CHANNELS, batch, described, description
 
@@ -90,12 +91,12 @@ def test_a_session_half_in_the_store_and_half_in_the_spool_is_whole_and_nothing_
         for seq in range(10):
             recorder.record("exo-01", 1, batch(seq, ROWS), 0)
         recorder.cut(lambda: None)
-        assert recorder.flush(30.0)
+        assert recorder.flush(WAIT_S)
         before = Tape.open(settings, spooled.sessions(settings.recorder.spool)[0])
         send(spool, spool.waiting()[0], Store(settings.store.url))
         for seq in range(10, 20):
             recorder.record("exo-01", 1, batch(seq, ROWS), 0)
-        assert recorder.flush(30.0)
+        assert recorder.flush(WAIT_S)
         tape = tape_of(settings)
         rows = tape.read(tape.first_ns, tape.last_ns)
         assert rows.columns[CHANNELS[0]].tolist() == [

@@ -17,6 +17,7 @@ from eds import EdsError, dcf
 from eds.datatypes import DATA_TYPES
 from eds.dcf import Commissioning, Key, Number
 from eds.shipped import SHIPPED, shipped
+from tests.support.examples import examples
 
 NOW = datetime(2026, 11, 21, 15, 7, tzinfo=UTC)
 KNEE = Commissioning(5, "left_knee", "main", 1_000_000)
@@ -218,7 +219,7 @@ def test_an_eds_is_no_dcf(tmp_path: Path) -> None:
         dcf.read(made(tmp_path, ODD, {}), 5)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_words(data: st.DataObject) -> None:
     text = bytearray(FOREIGN.replace("{speed}", "5").encode())

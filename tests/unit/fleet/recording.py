@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,8 +16,8 @@ from server_gui.core.follow.network import Network
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.rows import Record, Run
 from server_gui.core.recording.spool import Spool
+from tests.support.waiting import until
 
-WAIT_S = 30.0
 FOLLOWING = Following(
     "test",
     channels=("*",),
@@ -88,10 +87,7 @@ class Recording:
         return self.fleet.report()[robot].rows
 
     def until(self, condition: Callable[[], object]) -> None:
-        deadline_s = time.monotonic() + WAIT_S
-        while not condition():
-            assert time.monotonic() < deadline_s, self.fleet.report()
-            time.sleep(0.005)
+        until(condition, self.fleet.report)
 
     def until_more(self, *robots: str) -> None:
         """Wait until each has sent something that is not there yet."""

@@ -2,7 +2,6 @@
 
 import shutil
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,8 +26,8 @@ from server_gui.core.settings.server_file import (
     Upload,
 )
 from tests.fake_robot import FakeRobot
-
-WAIT_S = 30.0
+from tests.support import waiting
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture
@@ -55,10 +54,7 @@ def report(settings: ServerSettings) -> CollectorReport:
 
 
 def until(collector: Collector, condition: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline_s
-        collector.wait(0.01)
+    waiting.until(condition, collector.report, step=lambda: collector.wait(0.01))
 
 
 def answers(settings: ServerSettings) -> bool:

@@ -11,6 +11,7 @@ import pytest
 from server_gui.core.fleet import control_socket as module
 from server_gui.core.fleet.control_socket import NAME, Answers, NobodyCollects, ask, door
 from server_gui.core.follow.network import Network
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def opened(network: Network, folder: Path, answers: Answers) -> None:
             await asyncio.sleep(3600)
 
     network.run(stay())
-    assert ready.wait(20)
+    assert ready.wait(WAIT_S)
 
 
 def test_what_is_said_with_a_question_is_handed_on(network: Network, folder: Path) -> None:

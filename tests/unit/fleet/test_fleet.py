@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from gateway.client import Robot
 from server_gui.core.follow.events import Event, Journalled, Telemetry
 from tests.fake_robot import FakeRobot
+from tests.support.waiting import WAIT_S
 from tests.unit.fleet.recording import FOLLOWING, Kept, recording
 from tests.unit.gateway.harness import Bench, config, serving
 
@@ -98,7 +99,7 @@ def test_two_robots_are_recorded_whole_and_nobody_sees_what_is_not(start: Start,
     with recording(tmp_path, {"left": left.address, "right": right.address}) as fleet:
         fleet.until_more("left", "right")
         seen = [(robot, event.batch.seq) for robot, event in fleet.shown if isinstance(event, Telemetry)]
-        assert fleet.recorder.flush(20)
+        assert fleet.recorder.flush(WAIT_S)
     kept = Kept.of(tmp_path)
     for robot in ("left", "right"):
         assert kept.is_whole(robot)
@@ -215,7 +216,7 @@ def test_a_bad_robot_is_told_and_disturbs_no_other(
         if words is not None:
             fleet.until(lambda: any(words in record.getMessage() for record in caplog.records))
         fleet.until_more("good")
-        assert fleet.recorder.flush(20)
+        assert fleet.recorder.flush(WAIT_S)
     kept = Kept.of(tmp_path)
     assert kept.is_whole("good")
     assert {kind for kind, _ in kept.events("good")} <= {"name"}

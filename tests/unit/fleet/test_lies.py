@@ -9,6 +9,7 @@ import pytest
 
 from server_gui.core.processing.communication import Health
 from tests.fake_robot import FakeRobot
+from tests.support.waiting import WAIT_S
 from tests.unit.fleet.recording import Kept, recording
 
 Spoil = Callable[[FakeRobot], None]
@@ -160,7 +161,7 @@ def test_the_link_of_a_robot_that_lies_says_so_and_the_others_go_on(
         fleet.until_more("good")
         assert fleet.fleet.report()["bad"].quality.health is not Health.GOOD
         assert not any(words in reason for reason in fleet.fleet.report()["good"].quality.reasons)
-        assert fleet.recorder.flush(20)
+        assert fleet.recorder.flush(WAIT_S)
         assert (fleet.recorder.state.lost, fleet.recorder.state.alarms) == (0, ())
     kept = Kept.of(tmp_path)
     assert kept.is_whole("good")

@@ -4,7 +4,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -25,15 +25,7 @@ from server_gui.core.settings.server_file import (
 )
 from server_gui.core.threads.supervision import STILL_S, Trouble, Watch, Worker
 from tests.fake_robot import FakeRobot
-
-WAIT_S = 20.0
-
-
-def until(condition: Callable[[], object], within_s: float = WAIT_S) -> None:
-    deadline_s = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.01)
+from tests.support.waiting import WAIT_S, until
 
 
 def test_a_thread_that_dies_is_said_begun_anew_and_said_to_be_so(caplog: pytest.LogCaptureFixture) -> None:

@@ -32,8 +32,8 @@ from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.modules.component.assembly import Robot
 from gateway.process.futures import done, gather, then
+from tests.support.waiting import WAIT_S
 
-DEADLINE_S = 20.0
 Bytes = dict[tuple[int, int], bytes]
 
 
@@ -51,7 +51,7 @@ class Client:
     """One connection; notifications are kept apart from answers."""
 
     def __init__(self, address: tuple[str, int]) -> None:
-        self.socket = socket.create_connection(address, timeout=DEADLINE_S)
+        self.socket = socket.create_connection(address, timeout=WAIT_S)
         self.notifications: deque[dict[str, Any]] = deque()
         self._answers: dict[Any, dict[str, Any]] = {}
         self._reader = self.socket.makefile("rb")
@@ -130,20 +130,12 @@ def serving(config: RobotConfig, **options: Any) -> Iterator[tuple[str, int]]:
     address = daemon.address
     thread.start()
     try:
-        assert ready.wait(DEADLINE_S)
+        assert ready.wait(WAIT_S)
         yield address
     finally:
         daemon.end()
-        thread.join(DEADLINE_S)
+        thread.join(WAIT_S)
         assert not thread.is_alive(), "the daemon did not end"
-
-
-def until(condition: Callable[[], object], what: str = "") -> None:
-    """Wait until something is so, for as long as a slow machine may need."""
-    deadline = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < deadline, f"never: {what}"
-        time.sleep(0.005)
 
 
 class FakeNode:

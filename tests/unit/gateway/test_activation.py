@@ -12,8 +12,9 @@ import pytest
 
 from gateway.connections.listeners import HandoverError, inherited
 from gateway.process import notify
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import DEADLINE_S, Client, until
+from tests.unit.gateway.harness import Client
 
 # What systemd does for a socket unit: listens, starts the service for who comes, and again when it has ended.
 LAUNCHER = """
@@ -80,7 +81,7 @@ def test_who_came_first_is_served_and_when_all_have_gone_no_process_is_left(
 def test_the_paper_s_port_wakes_it_by_its_name(launched: "subprocess.Popen[str]", file: Path) -> None:
     file.write_text(processes.RESTS_SOON + "classic_port = 0\n", encoding="utf-8")
     _, classic = ports(launched)
-    with socket.create_connection(("127.0.0.1", classic), DEADLINE_S) as connection:
+    with socket.create_connection(("127.0.0.1", classic), WAIT_S) as connection:
         connection.sendall(b"x")
         assert int(connection.makefile().read()) > 0
 
@@ -139,7 +140,7 @@ def test_what_is_no_listening_socket_is_refused(
 def manager(tmp_path: Path) -> Iterator[socket.socket]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
-        manager.settimeout(DEADLINE_S)
+        manager.settimeout(WAIT_S)
         yield manager
 
 
@@ -157,7 +158,7 @@ def test_a_gateway_that_is_watched_says_that_it_is_ready_and_alive_and_does_not_
 def test_the_abstract_name_of_a_manager_is_met_and_none_is_no_trouble() -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(f"\0gwrms-test-{os.getpid()}")
-        manager.settimeout(DEADLINE_S)
+        manager.settimeout(WAIT_S)
         notify.tell("READY=1", {"NOTIFY_SOCKET": f"@gwrms-test-{os.getpid()}"})
         assert manager.recv(100) == b"READY=1"
     notify.tell("READY=1", {"NOTIFY_SOCKET": f"@gwrms-test-{os.getpid()}"})

@@ -15,6 +15,7 @@ from gateway.streaming.sources import Wanted
 from gateway.wire import limits
 from gateway.wire.framing import BadLine, RpcError, decode_request
 from gateway.wire.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway.harness import Answered, Client, config, serving
 
 HTTP = b"POST / HTTP/1.1\r\nHost: robot\r\nContent-Type: text/plain\r\nContent-Length: 200\r\n\r\n"
@@ -46,7 +47,7 @@ def test_another_protocol_is_not_answered_and_nothing_in_it_is_done(
 ) -> None:
     """A web page on an operator's computer may send all of this to the loopback."""
     with socket.create_connection(address) as stranger:
-        stranger.settimeout(30)
+        stranger.settimeout(WAIT_S)
         stranger.sendall(hello + STOP + CLOCK)
         assert everything(stranger) == b""
     with Client(address) as client:
@@ -55,7 +56,7 @@ def test_another_protocol_is_not_answered_and_nothing_in_it_is_done(
 
 def test_a_stop_in_an_odd_form_is_still_a_stop(address: tuple[str, int]) -> None:
     with socket.create_connection(address) as client:
-        client.settimeout(30)
+        client.settimeout(WAIT_S)
         client.sendall(b" [" + STOP[:-1] + b"]\n")
         assert json.loads(client.recv(65536))["result"]["held"] is True
 
@@ -78,7 +79,7 @@ def test_who_says_nothing_at_all_is_not_kept(
     with Client(address) as speaks, socket.create_connection(address) as silent, Client(address) as loris:
         loris.send(CLOCK[:10])
         assert speaks.call("clock.read")
-        silent.settimeout(30)
+        silent.settimeout(WAIT_S)
         assert b"nothing was asked for in 0.2 s" in everything(silent)
         assert "nothing was asked for" in (loris.line() or {})["error"]["message"]
         assert speaks.call("clock.read")

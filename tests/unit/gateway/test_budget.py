@@ -16,7 +16,8 @@ from gateway.streaming import budget
 from gateway.streaming.budget import MOST, OVER_LOOKS, UNDER_LOOKS, Budget
 from gateway.streaming.feeds import SampleFeed, TickFeed
 from gateway.streaming.sources import whole
-from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, FakeComponent, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, FakeComponent, config, serving
 from tests.unit.gateway.test_streams import outlet, rows, taken
 
 MS = 1_000_000

@@ -17,7 +17,8 @@ from gateway.connections import acceptor, classic
 from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.main import main
-from tests.unit.gateway.harness import DEADLINE_S, HEAD, config, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import HEAD, config
 
 Call = Callable[..., bytes]
 
@@ -30,11 +31,11 @@ def daemon(folder: Path) -> Iterator[Daemon]:
     thread = threading.Thread(target=made.run, args=(ready.set,), name="daemon")
     thread.start()
     try:
-        assert ready.wait(DEADLINE_S)
+        assert ready.wait(WAIT_S)
         yield made
     finally:
         made.end()
-        thread.join(DEADLINE_S)
+        thread.join(WAIT_S)
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def call(address: tuple[str, int]) -> Call:
     """One connection: what comes back for what was sent, from `source`."""
 
     def call(said: bytes = b"x", source: str = "127.0.0.1") -> bytes:
-        with socket.create_connection(address, DEADLINE_S, (source, 0)) as connection:
+        with socket.create_connection(address, WAIT_S, (source, 0)) as connection:
             connection.sendall(said)
             return b"".join(iter(lambda: connection.recv(65536), b""))
 
@@ -119,11 +120,11 @@ def test_a_client_that_says_nothing_is_let_go_and_takes_nothing(
     call: Call, address: tuple[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert int(call()) > 0
-    with socket.create_connection(address, DEADLINE_S) as connection:
+    with socket.create_connection(address, WAIT_S) as connection:
         connection.shutdown(socket.SHUT_WR)
         assert connection.recv(1) == b""
     monkeypatch.setattr(classic, "CALL_S", 0.05)
-    with socket.create_connection(address, DEADLINE_S) as connection:
+    with socket.create_connection(address, WAIT_S) as connection:
         assert connection.recv(1) == b""
     assert call().startswith(b"[{")
 
@@ -132,7 +133,7 @@ def test_a_client_that_keeps_its_connection_is_let_go(
     address: tuple[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(classic, "CALL_S", 0.2)
-    with socket.create_connection(address, DEADLINE_S) as connection:
+    with socket.create_connection(address, WAIT_S) as connection:
         connection.sendall(b"x")
         while connection.recv(64):
             pass
@@ -160,7 +161,7 @@ def test_too_many_connections_and_addresses_are_closed_at_once(
         return True
 
     until(lambda: closed("127.0.0.2"), "another address is one too many")
-    with socket.create_connection(address, DEADLINE_S) as silent:
+    with socket.create_connection(address, WAIT_S) as silent:
         until(lambda: closed("127.0.0.1"), "a second connection is one too many")
         silent.sendall(b"x")
         assert silent.recv(1) == b"["
@@ -200,8 +201,8 @@ def test_it_is_off_unless_configured_and_its_port_in_use_is_named(
 def test_the_gateway_ends_in_the_middle_of_an_exchange(tmp_path: Path) -> None:
     with daemon(tmp_path) as running:
         assert running.classic_port is not None
-        silent = socket.create_connection(("127.0.0.1", running.classic_port), DEADLINE_S)
-        with socket.create_connection(("127.0.0.1", running.classic_port), DEADLINE_S) as connection:
+        silent = socket.create_connection(("127.0.0.1", running.classic_port), WAIT_S)
+        with socket.create_connection(("127.0.0.1", running.classic_port), WAIT_S) as connection:
             connection.sendall(b"x")
             assert connection.recv(16).isdigit()
     with silent, contextlib.suppress(ConnectionResetError):

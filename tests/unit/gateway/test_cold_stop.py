@@ -11,7 +11,8 @@ from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from gateway.modules.stop.first_stop import FirstStop
 from gateway.registry import Context, Spec
-from tests.unit.gateway.harness import DEADLINE_S, Bench, Client, config, serving, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import Bench, Client, config, serving
 
 ROBOT = """
 [robot]
@@ -65,7 +66,7 @@ class Wires:
     def open(self, settings: CanSettings) -> "Wire":
         self.opened.append(settings.channel)
         if settings.channel == "can0":
-            assert self.blocked.wait(DEADLINE_S)
+            assert self.blocked.wait(WAIT_S)
         return Wire(self, settings.channel)
 
 
@@ -156,7 +157,7 @@ class Slow:
     may_start = threading.Event()
 
     def __init__(self, context: Context) -> None:
-        assert self.may_start.wait(DEADLINE_S)
+        assert self.may_start.wait(WAIT_S)
         raise OSError("enough")
 
 

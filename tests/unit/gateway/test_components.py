@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from drivers.component import Kind
-from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving
 
 
 def test_a_snapshot_has_value_stamp_and_quality_of_every_channel(client: Client, bench: Bench) -> None:

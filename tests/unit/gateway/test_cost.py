@@ -18,7 +18,8 @@ from gateway.streaming.budget import Budget
 from gateway.streaming.rates import Rates
 from gateway.streaming.streams import Streams
 from gateway.wire.cost import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
-from tests.unit.gateway.harness import Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench, Client, config, serving
 
 Connect = Callable[[], Client]
 

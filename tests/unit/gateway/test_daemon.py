@@ -27,8 +27,10 @@ from gateway.process.futures import done
 from gateway.service import Service
 from gateway.wire import framing
 from gateway.wire.limits import BAD_LINES, LINE_LIMIT
+from tests.support.examples import examples
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
+from tests.unit.gateway.harness import ROBOT, Answered, Bench, Client, config, serving
 
 Connect = Callable[[], Client]
 CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
@@ -245,7 +247,7 @@ GARBAGE = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(pieces=st.lists(GARBAGE, max_size=8), cuts=st.lists(st.integers(0, 2000), max_size=4))
 def test_garbage_in_any_pieces_hurts_neither_the_daemon_nor_another_session(
     garbage_gateway: tuple[str, int], pieces: list[bytes], cuts: list[int]
@@ -289,7 +291,7 @@ class TestProcess:
             client.call("resource.snapshot")
             process.send_signal(number)
             assert client.line() is None
-            assert process.wait(DEADLINE_S) == 0
+            assert process.wait(WAIT_S) == 0
         assert process.stderr is not None
         assert process.stderr.read() == ""
 
@@ -309,7 +311,7 @@ def test_what_a_resource_only_gateway_imports() -> None:
         "print([m for m in ('can', 'canopen', 'serial', 'asyncio', 'numpy', 'rich') if m in sys.modules])"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout == "[]\n"
 
@@ -321,7 +323,7 @@ def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards
         "print('ssl' in sys.modules); import ssl; print(ssl.OPENSSL_VERSION_INFO[0] > 0)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout == "False\nTrue\n"
 
@@ -334,7 +336,7 @@ def test_an_eds_is_read_without_python_can_which_can_be_imported_afterwards() ->
         "import can; print(can.Bus.__module__)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout.splitlines() == ["GWRMS joint drive False", "can.interface"]
 

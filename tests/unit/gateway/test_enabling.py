@@ -10,7 +10,8 @@ from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import Led
 from gateway.process.futures import done
-from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving
 
 S = DriveState
 MASTER = ROBOT.replace("linger_s", 'role = "master"\nlinger_s')

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from gateway.modules.stop.authority import Address
 from gateway.records.undo import UndoFile
-from tests.unit.gateway.harness import Bench, until
+from tests.support.examples import examples
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench
 from tests.unit.gateway.test_left_behind import change, entry, write_undo
 from tests.unit.gateway.tuned import (
     CYCLE,
@@ -114,7 +116,9 @@ def check(bench: Bench) -> None:
 
 
 @given(entries=forged, places=damage)
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 def test_nothing_is_written_that_the_robots_file_does_not_allow(
     calm: Bench, tmp_path: Path, entries: list[dict[str, Any]], places: list[Any]
 ) -> None:

@@ -21,7 +21,8 @@ from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.guard import alarms
 from gateway.guard.armings import Armings
-from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving
 
 LIMIT = """
 [guard.rule.knees]
@@ -170,11 +171,11 @@ class TestTrip:
 
         def hang() -> None:
             busy.set()
-            released.wait(20)
+            released.wait(WAIT_S)
 
         monkeypatch.setattr("gateway.service.Service._clock", lambda _self: hang())
         client.request("clock.read")
-        assert busy.wait(20)
+        assert busy.wait(WAIT_S)
         bend(bench, 2.5)
         until(lambda: min(bench.left.stops, bench.right.stops) >= 1, "stopped though the loop hangs")
         released.set()

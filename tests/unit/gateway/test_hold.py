@@ -15,18 +15,8 @@ from gateway.modules.stop.stop_control import Asked, _newest_of_each
 from gateway.records import durable
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
-from tests.unit.gateway.harness import (
-    DEADLINE_S,
-    DISABLED,
-    ENABLED,
-    HEAD,
-    ROBOT,
-    Bench,
-    Client,
-    config,
-    serving,
-    until,
-)
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import DISABLED, ENABLED, HEAD, ROBOT, Bench, Client, config, serving
 
 LINGER = ROBOT.replace("linger_s = 0.05", 'linger_s = 0\nrecords = "records"')
 
@@ -79,7 +69,7 @@ def test_nobodys_stop_is_lost_in_the_journal_among_anothers(tmp_path: Path) -> N
     written.set_result(None)
 
     def wrote(held: HeldStop, _problem: str | None) -> "Future[None]":
-        busy.wait(DEADLINE_S)
+        busy.wait(WAIT_S)
         told.append((held.who, held.reason))
         return written
 
@@ -166,7 +156,7 @@ def test_a_disk_that_hangs_delays_neither_the_stop_nor_its_answer(
 
     def hang(path: Path, data: bytes) -> None:
         if path.name == "stop.json":
-            go_on.result(20)
+            go_on.result(WAIT_S)
         write(path, data)
 
     monkeypatch.setattr("gateway.records.durable.write", hang)

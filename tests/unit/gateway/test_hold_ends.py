@@ -16,6 +16,7 @@ from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
 from gateway.modules.stop.target import Report
 from gateway.records.folder import RecordsFolder
+from tests.support.waiting import until
 from tests.unit.gateway.harness import (
     DISABLED,
     ENABLED,
@@ -27,7 +28,6 @@ from tests.unit.gateway.harness import (
     Client,
     config,
     serving,
-    until,
 )
 
 GAIT_COMMAND = (0x2000, 0)

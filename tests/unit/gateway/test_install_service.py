@@ -16,6 +16,7 @@ from gateway.cli.systemd_units import MARK, NotForUnits, Service, folder
 from gateway.config import load
 from gateway.connections.listeners import listen
 from gateway.main import main
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway import processes
 
 ON_DEMAND = """
@@ -68,7 +69,7 @@ def test_systemd_itself_finds_nothing_wrong(file: Path, tmp_path: Path, more: st
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=WAIT_S,
         env={**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)},
     )
     assert (checked.returncode, checked.stdout + checked.stderr) == (0, "")

@@ -24,8 +24,9 @@ from gateway.registry import Context, Spec
 from gateway.wire import framing
 from gateway.wire.limits import BAD_LINES, MOST_STOPS, QUEUED_BYTES, QUEUED_LINES
 from gateway.wire.stop import ROBOT_STOP, Stopped
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config, until
+from tests.unit.gateway.harness import HEAD, Client, config
 
 STOP = b'{"jsonrpc":"2.0","id":"stop","method":"robot.stop","params":{"reason":"%s"}}\n'
 CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
@@ -85,10 +86,10 @@ class Serving:
 
         def hang() -> None:
             there.set()
-            over.wait(DEADLINE_S)
+            over.wait(WAIT_S)
 
         self.daemon._loop.post(hang)
-        assert there.wait(DEADLINE_S)
+        assert there.wait(WAIT_S)
         try:
             yield
         finally:
@@ -118,7 +119,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
     yield made
     made.close()
     daemon.end()
-    thread.join(DEADLINE_S)
+    thread.join(WAIT_S)
     assert not thread.is_alive()
     assert stops._context.stops_by is not None
     assert daemon._service.registry.stop_now is None
@@ -300,7 +301,7 @@ def test_nobody_ever_gets_another_s_answer_however_connections_end(serving: Serv
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(DEADLINE_S)
+        thread.join(WAIT_S)
     assert wrong == []
     until(lambda: not serving.daemon._places.taken, "all have gone")
     until(lambda: not serving.daemon._intake._inlets, "their sockets are closed")
@@ -479,7 +480,7 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(turned: Tu
         watched_for.add(front._watched[turned.accepted.fileno()][0])
         return bool(turned.asked)
 
-    front.call_later(DEADLINE_S, lambda: None)
+    front.call_later(WAIT_S, lambda: None)
     until(paced, "the stop is read")
     assert watched_for == {READ, HANGUP}
     assert turned.turn_loop() is None

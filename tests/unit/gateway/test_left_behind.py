@@ -13,7 +13,8 @@ from gateway.modules.stop.authority import Address
 from gateway.records import durable
 from gateway.records.journal import Journal, Share
 from gateway.records.limits import ENTRIES_AT_ONCE
-from tests.unit.gateway.harness import Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench, Client, config, serving
 from tests.unit.gateway.tuned import (
     CYCLE,
     CYCLE_TIME,

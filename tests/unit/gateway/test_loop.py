@@ -10,7 +10,7 @@ import pytest
 
 from gateway.process import loop as loops
 from gateway.process.loop import HANGUP, READ, WRITE, Loop
-from tests.unit.gateway.harness import until
+from tests.support.waiting import until
 
 
 @pytest.fixture(params=["epoll", "poll"])

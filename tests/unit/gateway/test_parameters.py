@@ -19,7 +19,8 @@ from gateway.modules.control import unanswered
 from gateway.modules.control.catalogue import described
 from gateway.modules.control.parameters import Parameter
 from gateway.wire.framing import RpcError
-from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving
 
 STEP, CYCLE, TOE, TORQUE = 0x2001, 0x2002, 0x2003, 0x6072
 
@@ -378,11 +379,11 @@ def test_a_stop_interrupts_a_write_which_is_taken_back(standing: Client, bench: 
     def wait(index: int, data: bytes) -> None:
         if index == STEP and not began.done():
             began.set_result(None)
-            go_on.result(20)
+            go_on.result(WAIT_S)
 
     bench.gait.node.before_download = wait
     write = standing.request("parameter.write", changes=CHANGES)
-    began.result(20)
+    began.result(WAIT_S)
     assert standing.call("robot.stop", reason="test")["held"]
     go_on.set_result(None)
     with pytest.raises(Exception, match="the robot was stopped before this was written") as caught:

@@ -10,7 +10,8 @@ import pytest
 
 from gateway.connections import places, session
 from gateway.wire.limits import CLIENTS_OF_ONE_ADDRESS
-from tests.unit.gateway.harness import Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench, Client, config, serving
 
 Connect = Callable[[], Client]
 

@@ -19,7 +19,8 @@ from gateway.modules.resource.host import Meter
 from gateway.modules.resource.portable import Portable
 from gateway.modules.resource.procfs import SELECTABLE, Procfs
 from gateway.wire.resource import ResourceSnapshotParams
-from tests.unit.gateway.harness import Client, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import Client
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="procfs is Linux's")
 
@@ -378,7 +379,7 @@ def test_a_snapshot_needs_no_psutil() -> None:
         "host.meter().snapshot(P(include=['cmdline'])); host.close(); print('psutil' in sys.modules)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=WAIT_S
     )
     assert done.stdout == "False\n"
 

@@ -10,7 +10,8 @@ from drivers.component import Kind
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import Led
 from gateway.records.folder import RecordsFolder
-from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, config, serving
 
 S = DriveState
 

@@ -20,7 +20,8 @@ from gateway.modules.resource.redact import redact
 from gateway.process.loop import Loop
 from gateway.registry import Context
 from gateway.wire.resource import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
-from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import HEAD, Client, config
 
 MB = 1 << 20
 
@@ -253,21 +254,22 @@ def test_more_comes_only_when_it_is_named(client: Client) -> None:
 def test_every_connection_has_its_own_last_request(connect: Callable[[], Client]) -> None:
     first, second = connect(), connect()
     first.call("resource.snapshot")
-    time.sleep(0.1)
-    assert first.call("resource.snapshot")["gateway"]["cpu_percent"] is not None
+    until(lambda: first.call("resource.snapshot")["gateway"]["cpu_percent"] is not None)
     assert second.call("resource.snapshot")["gateway"]["cpu_percent"] is None
+
+
+def percent(client: Client, pid: int) -> float | None:
+    rows = client.call("resource.snapshot")["processes"]
+    found: float | None = next((row["cpu_percent"] for row in rows if row["pid"] == pid), None)
+    return found
 
 
 def test_a_busy_process_is_seen_busy(client: Client) -> None:
     with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
         try:
-            client.call("resource.snapshot")
-            time.sleep(1.0)
-            rows = client.call("resource.snapshot")["processes"]
+            until(lambda: (percent(client, busy.pid) or 0) > 0, "it is seen to compute")
         finally:
             busy.kill()
-    percent = next(row["cpu_percent"] for row in rows if row["pid"] == busy.pid)
-    assert percent > 0
 
 
 def test_unknown_words_are_refused(client: Client) -> None:
@@ -321,13 +323,13 @@ def test_nobody_waits_while_somebody_s_table_is_made(
 
     def slow(meter: Meter, params: ResourceSnapshotParams) -> ResourceSnapshot:
         looking.set()
-        assert seen.wait(DEADLINE_S)
+        assert seen.wait(WAIT_S)
         return look(meter, params)
 
     monkeypatch.setattr(Meter, "snapshot", slow)
     for method in ("resource.snapshot", "status.snapshot"):
         asked = asker.request(method)
-        assert looking.wait(DEADLINE_S)
+        assert looking.wait(WAIT_S)
         assert other.call("clock.read")
         seen.set()
         assert asker.answer(asked)

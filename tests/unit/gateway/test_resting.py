@@ -15,8 +15,9 @@ from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.process.loop import Loop
 from gateway.registry import Registry
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import DEADLINE_S, HEAD, ROBOT, Bench, Client, config, until
+from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config
 
 Running = subprocess.Popen[str]
 CLOCK = b'{"jsonrpc":"2.0","id":1,"method":"clock.read"}\n'
@@ -63,7 +64,7 @@ def test_nobody_is_lost_who_comes_while_it_goes_to_rest_or_comes_back(running: R
     address = processes.address(running)
     answered = 0
     for turn in range(8):  # at different moments of its way there and back
-        with socket.create_connection(address, DEADLINE_S) as one:
+        with socket.create_connection(address, WAIT_S) as one:
             one.sendall(CLOCK)
             answered += one.makefile().readline().startswith('{"id":1,"result"')
         time.sleep(0.05 + turn / 50)
@@ -75,7 +76,7 @@ def test_signals_end_it_at_rest(running: Running, number: signal.Signals) -> Non
     processes.address(running)
     until(lambda: processes.rests(running.pid), "it rests")
     running.send_signal(number)
-    assert running.wait(DEADLINE_S) == 0
+    assert running.wait(WAIT_S) == 0
 
 
 def test_a_signal_is_met_on_the_way_there_and_back(tmp_path: Path) -> None:
@@ -86,10 +87,10 @@ def test_a_signal_is_met_on_the_way_there_and_back(tmp_path: Path) -> None:
             address = processes.address(running)
             if turn % 2:
                 until(lambda: processes.rests(running.pid), "it rests")
-                socket.create_connection(address, DEADLINE_S).close()
+                socket.create_connection(address, WAIT_S).close()
             time.sleep(turn * 0.05)
             running.terminate()
-            assert running.wait(DEADLINE_S) == 0
+            assert running.wait(WAIT_S) == 0
 
 
 def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running, tmp_path: Path) -> None:
@@ -126,7 +127,7 @@ def serve(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., tuple[Daemon, 
     for daemon, thread in made:
         if thread.is_alive():
             daemon.end()
-        thread.join(DEADLINE_S)
+        thread.join(WAIT_S)
         daemon._listener.close()
 
 
@@ -134,7 +135,7 @@ def test_it_ends_idle_after_linger_s_and_was_not_told(serve: Callable[..., Any],
     daemon, thread = serve()
     with Client(daemon.address) as client:
         client.call("component.snapshot")
-    thread.join(DEADLINE_S)
+    thread.join(WAIT_S)
     assert not thread.is_alive()
     assert (daemon.told, bench.left.stopped) == (False, 1)
     assert daemon._listener.fileno() >= 0  # who comes now is not lost
@@ -149,7 +150,7 @@ def test_a_client_that_says_nothing_keeps_it(serve: Callable[..., Any]) -> None:
     daemon, thread = serve()
     with Client(daemon.address):
         assert _stays(thread)
-    thread.join(DEADLINE_S)
+    thread.join(WAIT_S)
     assert not thread.is_alive()
 
 
@@ -161,7 +162,7 @@ def test_a_held_stop_keeps_it_until_it_is_reset(serve: Callable[..., Any]) -> No
     with Client(daemon.address) as client:
         client.call("control.acquire", ttl_s=10)
         assert client.call("robot.reset")["held"] is False
-    thread.join(DEADLINE_S)
+    thread.join(WAIT_S)
     assert not thread.is_alive()
 
 
@@ -170,7 +171,7 @@ def test_a_trial_keeps_it_until_it_is_taken_back(serve: Callable[..., Any], benc
     with Client(daemon.address) as client:
         client.call("control.acquire", ttl_s=10)
         client.call("parameter.write", changes={"gait.step_length": 0.45}, trial_s=100)
-    thread.join(DEADLINE_S)  # the lease ends with its connection, and so does the trial
+    thread.join(WAIT_S)  # the lease ends with its connection, and so does the trial
     assert not thread.is_alive()
     assert bench.gait.node.objects[0x2001, 0] == (400).to_bytes(2, "little")
 
@@ -182,9 +183,9 @@ def test_a_guard_keeps_it(serve: Callable[..., Any]) -> None:
 
 def test_who_uses_the_paper_s_exchange_keeps_it(serve: Callable[..., Any]) -> None:
     daemon, thread = serve(HEAD, classic=listen("127.0.0.1", 0))
-    with socket.create_connection(("127.0.0.1", daemon.classic_port), DEADLINE_S):
+    with socket.create_connection(("127.0.0.1", daemon.classic_port), WAIT_S):
         assert _stays(thread)
-    thread.join(DEADLINE_S)
+    thread.join(WAIT_S)
     assert not thread.is_alive()
     daemon._classic._listener.close()
 

@@ -9,7 +9,8 @@ import pytest
 
 from gateway import always_on
 from gateway.registry import Context, Spec
-from tests.unit.gateway.harness import ROBOT, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import ROBOT, config, serving
 
 GUARDED = ROBOT + "[guard.rule.lost]\nwatch = 'node_lost'\nactions = ['alarm']\n"
 tried: dict[str, list[float]] = defaultdict(list)

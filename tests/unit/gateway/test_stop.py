@@ -14,17 +14,8 @@ from drivers.joint.reading import DriveReading
 from gateway.config import ConfigError
 from gateway.modules.stop.drive import is_enabled
 from gateway.modules.stop.target import Report
-from tests.unit.gateway.harness import (
-    DISABLED,
-    ENABLED,
-    ROBOT,
-    Bench,
-    Client,
-    FakeDrive,
-    config,
-    serving,
-    until,
-)
+from tests.support.waiting import until
+from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, FakeDrive, config, serving
 
 
 def test_a_stop_needs_no_lease_and_answers_per_drive(connect: Callable[[], Client], bench: Bench) -> None:

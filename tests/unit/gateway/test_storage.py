@@ -11,6 +11,7 @@ from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import RobotConfig
 from gateway.modules.control.storage import STORING
 from gateway.records.journal import Journal
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway.harness import (
     DISABLED,
     ENABLED,
@@ -191,11 +192,11 @@ def test_a_store_waits_for_the_write_before_it(resting: Bench, writer: Client) -
     def wait(index: int, data: bytes) -> None:
         if index == TORQUE:
             began.set()
-            assert go_on.wait(20)
+            assert go_on.wait(WAIT_S)
 
     resting.left.node.before_download = wait
     write = writer.request("parameter.write", changes={"left_knee.max_torque": 90})
-    assert began.wait(20)
+    assert began.wait(WAIT_S)
     store = writer.request("parameter.store", component="left_knee")
     assert resting.left.node.written() == [(TORQUE, (900).to_bytes(2, "little"))]
     go_on.set()
@@ -222,8 +223,8 @@ def test_what_was_asked_for_before_a_stop_is_not_stored_after_it(resting: Bench,
     stored: list[Any] = []
     with tuned(tmp_path) as robot:
         resting.gait.node.before_download = stop
-        robot.ask(robot.writing({"gait.cycle_time": 1.3})).exception(20)
-        error = stored[0].exception(20)
+        robot.ask(robot.writing({"gait.cycle_time": 1.3})).exception(WAIT_S)
+        error = stored[0].exception(WAIT_S)
     assert (error.kind, "nothing was sent" in str(error)) == ("stopped", True)
     assert resting.left.node.log == []
 

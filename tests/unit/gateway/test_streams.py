@@ -22,7 +22,8 @@ from gateway.streaming.sources import merge, narrow, whole
 from gateway.streaming.streams import Streams
 from gateway.wire import limits
 from gateway.wire.framing import RpcError
-from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench, Client, FakeComponent
 
 MS = 1_000_000
 

@@ -8,7 +8,8 @@ import pytest
 from drivers.errors import DeviceAbort, DeviceTimeout
 from gateway.modules.stop.machine import Input
 from gateway.records.undo import UndoFile
-from tests.unit.gateway.harness import DEADLINE_S, DISABLED, ENABLED, Bench, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import DISABLED, ENABLED, Bench
 from tests.unit.gateway.tuned import (
     CYCLE,
     CYCLE_TIME,
@@ -255,7 +256,7 @@ def test_drives_are_not_enabled_while_what_they_do_not_allow_is_written(robot: T
     said = robot.do(lambda: robot.tuning.enabling_objection(["left_knee"]))
     assert said == f"{TOE_HEIGHT}, which enabled drives do not allow, is being written"
     gate.open()
-    write.result(DEADLINE_S)
+    write.result(WAIT_S)
     assert robot.do(lambda: robot.tuning.enabling_objection(["left_knee"])) is None
 
 

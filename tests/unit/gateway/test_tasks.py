@@ -10,7 +10,8 @@ import pytest
 from gateway.config import ConfigError
 from gateway.modules.resource.scheduling import Scheduling
 from gateway.modules.resource.tasks import Schedule, Spent, Tasks
-from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config, serving
 from tests.unit.gateway.recorded import Process, Recorded, Thread, single
 
 MS = 1_000_000

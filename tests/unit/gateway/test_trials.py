@@ -9,7 +9,8 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from gateway.records.journal import read_verified
-from tests.unit.gateway.harness import Bench, Client, config, serving, until
+from tests.support.waiting import until
+from tests.unit.gateway.harness import Bench, Client, config, serving
 
 STEP, CYCLE = (0x2001, 0), (0x2002, 0)
 

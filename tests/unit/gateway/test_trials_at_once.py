@@ -10,7 +10,8 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from gateway.modules.control.ledger import WriteLedger
-from tests.unit.gateway.harness import DEADLINE_S, Bench, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import Bench
 from tests.unit.gateway.tuned import (
     CYCLE,
     CYCLE_TIME,
@@ -67,7 +68,7 @@ def test_a_trial_that_was_being_written_when_all_were_taken_back_is_too(robot: T
     gate.wait()
     robot.do(lambda: robot.tuning.trials.revert_all("guard rule tilt: too far"))
     gate.open()
-    error: Any = write.exception(DEADLINE_S)
+    error: Any = write.exception(WAIT_S)
     assert (error.kind, "its trial is over already: guard rule tilt: too far" in str(error)) == (
         "rolled_back",
         True,
@@ -97,7 +98,7 @@ def test_a_lease_that_ends_does_not_end_what_is_no_trial(robot: Tuned, bench: Be
     gate.wait()
     robot.do(lambda: robot.tuning.trials.revert_of(robot.session, "the lease has ended"))
     gate.open()
-    write.result(DEADLINE_S)
+    write.result(WAIT_S)
     assert held(bench, CYCLE) == 1300
 
 
@@ -109,8 +110,8 @@ def test_a_trial_ends_in_time_also_in_the_middle_of_a_long_write(robot: Tuned, b
     ended = robot.ask(lambda: robot.tuning.trials.revert(trial))
     robot.do(lambda: None)
     gate.open()
-    ended.result(DEADLINE_S)
-    write.result(DEADLINE_S)
+    ended.result(WAIT_S)
+    write.result(WAIT_S)
     order = [one["what"] for one in robot.told("taken back", "write done")]
     assert order == ["taken back", "write done"]
     assert (held(bench, TORQUE), held(bench, STEP)) == (1000, 420)
@@ -126,8 +127,8 @@ def test_a_trial_whose_time_ends_while_it_is_taken_over_is_that_of_the_new_one(
     revert = robot.ask(lambda: robot.tuning.trials.revert(first))
     robot.do(lambda: None)
     gate.open()
-    revert.exception(DEADLINE_S)
-    number = second.result(DEADLINE_S).write
+    revert.exception(WAIT_S)
+    number = second.result(WAIT_S).write
     until(lambda: [one.write for one in robot.trials()] == [number], "one trial is left")
     robot.revert(number)
     assert (held(bench, STEP), held(bench, CYCLE), held(bench, TORQUE)) == (400, 1200, 1000)
@@ -146,7 +147,7 @@ def test_what_ended_while_a_write_was_reading_is_read_anew(robot: Tuned, bench: 
 
     bench.gait.node.before_upload = end_the_trial
     second = robot.do(robot.writing({STEP_LENGTH: 0.45, CYCLE_TIME: 1.3}, LONG_S))
-    assert reverted[0].result(DEADLINE_S).outcome == {STEP_LENGTH: "taken back"}
+    assert reverted[0].result(WAIT_S).outcome == {STEP_LENGTH: "taken back"}
     assert second.before == {STEP_LENGTH: 0.4, CYCLE_TIME: 1.2}
 
 
@@ -179,8 +180,8 @@ def test_a_confirmation_that_was_asked_for_first_wins(robot: Tuned, bench: Bench
         return [robot.tuning.trials.confirm(write), robot.tuning.trials.revert(write)]
 
     confirmed, reverted = robot.do(both)
-    assert confirmed.result(DEADLINE_S).values == {CYCLE_TIME: 1.3}
-    assert "it was confirmed" in str(reverted.exception(DEADLINE_S))
+    assert confirmed.result(WAIT_S).values == {CYCLE_TIME: 1.3}
+    assert "it was confirmed" in str(reverted.exception(WAIT_S))
     assert held(bench, CYCLE) == 1300
 
 
@@ -200,8 +201,8 @@ def test_a_gateway_that_ends_takes_back_what_is_being_written_and_answers_who_wa
         ending.start()
         until(lambda: robot.tuning._ending, "it is ending")
         gate.open()
-        ending.join(DEADLINE_S)
-        kinds = [getattr(one.exception(DEADLINE_S), "kind", None) for one in (write, waiting, revert)]
+        ending.join(WAIT_S)
+        kinds = [getattr(one.exception(WAIT_S), "kind", None) for one in (write, waiting, revert)]
         assert kinds[:2] == ["rolled_back", "unavailable"]
         assert kinds[2] in ("unavailable", "rollback_failed")
         assert [list(one.values()) for one in robot.undos()] == [[MAX_TORQUE]]

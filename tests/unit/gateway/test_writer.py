@@ -7,7 +7,7 @@ import pytest
 
 from gateway.modules.control.writer import Turn, Writer
 from gateway.wire.framing import RpcError
-from tests.unit.gateway.harness import DEADLINE_S
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture
@@ -28,11 +28,11 @@ def busy(writer: Writer, then: Callable[[], object] = lambda: None) -> threading
 
     def work() -> None:
         begun.set()
-        assert go_on.wait(DEADLINE_S)
+        assert go_on.wait(WAIT_S)
         then()
 
     writer.submit(work, Turn.WRITE)
-    assert begun.wait(DEADLINE_S)
+    assert begun.wait(WAIT_S)
     return go_on
 
 
@@ -42,7 +42,7 @@ def test_a_claim_comes_before_a_trial_and_a_trial_before_a_write(writer: Writer,
     jobs = [writer.submit(lambda i=i, t=t: done.append(f"{t.name} {i}"), t) for i, t in enumerate(turns)]  # type: ignore[misc]
     go_on.set()
     for job in jobs:
-        job.result(DEADLINE_S)
+        job.result(WAIT_S)
     assert done == ["CLAIM 2", "TRIAL 1", "TRIAL 4", "WRITE 0", "WRITE 3"]
 
 
@@ -55,14 +55,14 @@ def test_a_long_write_lets_pass_what_is_more_urgent_and_nothing_else(writer: Wri
     jobs = [writer.submit(lambda t=t: done.append(t.name), t) for t in (Turn.WRITE, Turn.TRIAL, Turn.CLAIM)]  # type: ignore[misc]
     go_on.set()
     for job in jobs:
-        job.result(DEADLINE_S)
+        job.result(WAIT_S)
     assert done == ["CLAIM", "TRIAL", "the long write", "WRITE"]
 
 
 def test_a_job_that_fails_keeps_nothing_from_its_turn(writer: Writer) -> None:
     failing = writer.submit(lambda: 1 // 0, Turn.WRITE)
-    assert isinstance(failing.exception(DEADLINE_S), ZeroDivisionError)
-    assert writer.submit(lambda: 7, Turn.WRITE).result(DEADLINE_S) == 7
+    assert isinstance(failing.exception(WAIT_S), ZeroDivisionError)
+    assert writer.submit(lambda: 7, Turn.WRITE).result(WAIT_S) == 7
 
 
 def test_what_was_submitted_before_the_end_is_done_and_nothing_after_it(writer: Writer) -> None:
@@ -71,7 +71,7 @@ def test_what_was_submitted_before_the_end_is_done_and_nothing_after_it(writer: 
     ending = threading.Thread(target=writer.close)
     ending.start()
     go_on.set()
-    ending.join(DEADLINE_S)
+    ending.join(WAIT_S)
     assert last.result(0) == 7
     with pytest.raises(RpcError, match="the gateway is ending"):
         writer.submit(lambda: 7, Turn.CLAIM).result(0)

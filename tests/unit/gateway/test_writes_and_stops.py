@@ -3,7 +3,8 @@
 from typing import Any
 
 from drivers.errors import DeviceAbort, DeviceTimeout
-from tests.unit.gateway.harness import DEADLINE_S, Bench, until
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import Bench
 from tests.unit.gateway.tuned import (
     CYCLE,
     CYCLE_TIME,
@@ -27,7 +28,7 @@ def test_what_was_asked_for_before_a_stop_is_not_written_after_it(robot: Tuned, 
     robot.do(lambda: None)
     robot.stop()
     gate.open()
-    errors = [one.exception(DEADLINE_S) for one in (first, second)]
+    errors = [one.exception(WAIT_S) for one in (first, second)]
     assert [getattr(one, "kind", None) for one in errors] == ["rolled_back", "stopped"]
     assert [data for _, data in bench.gait.node.written()] == [u16(1100), u16(1200)]
 
@@ -133,7 +134,7 @@ def test_a_stop_with_nothing_to_claim_waits_for_no_write(controlled: Tuned, benc
     controlled.stop()
     assert controlled.tuning.claim().done()
     gate.open()
-    write.exception(DEADLINE_S)
+    write.exception(WAIT_S)
 
 
 def test_a_stop_that_comes_as_the_way_back_is_sent_wins(controlled: Tuned, bench: Bench) -> None:
@@ -155,7 +156,7 @@ def test_a_write_that_a_stop_ends_leaves_what_the_stop_sets(controlled: Tuned, b
     gate.wait()
     controlled.stop()
     gate.open()
-    error: Any = write.exception(DEADLINE_S)
+    error: Any = write.exception(WAIT_S)
     assert error.kind == "rolled_back"
     assert error.data.outcome == {STEP_LENGTH: "left as the stop set it", CYCLE_TIME: "taken back"}
     assert [data for index, data in bench.gait.node.written() if index == STEP[2]] == [u16(380)]

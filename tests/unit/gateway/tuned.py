@@ -24,7 +24,8 @@ from gateway.records.undo import Undo, UndoFile
 from gateway.registry import Context
 from gateway.wire.framing import RpcError
 from gateway.wire.parameter import TrialInfo
-from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Bench, FakeNode, config
+from tests.support.waiting import WAIT_S
+from tests.unit.gateway.harness import ROBOT, Bench, FakeNode, config
 
 LONG_S = 100.0  # a trial that does not end by itself in a test
 STEP_LENGTH, CYCLE_TIME, TOE_HEIGHT = "gait.step_length", "gait.cycle_time", "gait.toe_height"
@@ -73,7 +74,7 @@ class Tuned:
         self.tuning.close()
         self.records.close()
         self.loop.stop()
-        self._thread.join(DEADLINE_S)
+        self._thread.join(WAIT_S)
         self.loop.close()
 
     def ask(self, work: Callable[[], Any]) -> "Future[Any]":
@@ -96,7 +97,7 @@ class Tuned:
         return found
 
     def do(self, work: Callable[[], Any]) -> Any:
-        return self.ask(work).result(DEADLINE_S)
+        return self.ask(work).result(WAIT_S)
 
     def refused(self, work: Callable[[], Any]) -> RpcError:
         with pytest.raises(RpcError) as caught:
@@ -125,7 +126,7 @@ class Tuned:
 
     def told(self, *what: str) -> list[dict[str, Any]]:
         """The journal's entries of these kinds."""
-        self.records.journal.tail(1).result(DEADLINE_S)
+        self.records.journal.tail(1).result(WAIT_S)
         return [one for one in read_verified(self.records.folder.journal) if one["what"] in what]
 
     # The stop
@@ -135,7 +136,7 @@ class Tuned:
         self.authority.feed(Input.STOP, lambda _step: None)
 
     def claim(self) -> None:
-        self.tuning.claim().result(DEADLINE_S)
+        self.tuning.claim().result(WAIT_S)
         self.do(lambda: None)
 
     def reset(self) -> None:
@@ -193,10 +194,10 @@ class Gate:
     def _wait(self, index: int, _data: bytes) -> None:
         if index == self._index and not self.reached.is_set():
             self.reached.set()
-            assert self._open.wait(DEADLINE_S)
+            assert self._open.wait(WAIT_S)
 
     def wait(self) -> None:
-        assert self.reached.wait(DEADLINE_S)
+        assert self.reached.wait(WAIT_S)
 
     def open(self) -> None:
         self._open.set()

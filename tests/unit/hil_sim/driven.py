@@ -18,7 +18,7 @@ from hil_sim.gait.wearer import Foot, Trunk
 from hil_sim.sensors.serial_port import SerialPort
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 from hil_sim.sensors.tables import companions, tables
-from tests.unit.bus.waiting import until
+from tests.support.waiting import until
 
 STEP_NS = PERIOD_NS + MILLISECOND_NS  # what is sent each period has arrived by then
 
@@ -133,9 +133,4 @@ def driven(folder: Path, choice: SensorChoice) -> Iterator[tuple[Bench, dict[str
 
 def steps_until(bench: Bench, condition: Callable[[], bool]) -> None:
     """Step until `condition` holds."""
-
-    def stepped() -> bool:
-        bench.step()
-        return condition()
-
-    until(stepped)
+    until(condition, step=bench.step)

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from hil_sim.cli.sim import main
+from tests.support.waiting import WAIT_S
 
 
 @contextmanager
@@ -36,22 +37,22 @@ def test_it_says_ready_and_ends_cleanly_on_sigterm(tmp_path: Path) -> None:
     with sim(tmp_path / "robot") as (process, config):
         assert config == tmp_path / "robot" / "robot.toml"
         assert config.is_file()
-        socket.create_connection(("127.0.0.1", hub_port(config.parent)), timeout=20).close()
+        socket.create_connection(("127.0.0.1", hub_port(config.parent)), timeout=WAIT_S).close()
         process.send_signal(signal.SIGTERM)
-        assert process.wait(20) == 0
+        assert process.wait(WAIT_S) == 0
     assert not (config.parent / "trunk").is_symlink()
 
 
 def test_it_runs_as_long_as_it_is_told(tmp_path: Path) -> None:
     with sim(tmp_path, "--seconds", "0.5", "--scenario", "stand") as (process, _):
-        assert process.wait(20) == 0
+        assert process.wait(WAIT_S) == 0
 
 
 def test_as_fast_as_it_goes_simulates_more_than_it_computes(tmp_path: Path) -> None:
     """By the time it computes, not by the clock: a busy computer makes both later."""
     before_s = children_s()
     with sim(tmp_path, "--seconds", "15", "--scenario", "stand", "--speed", "max") as (process, _):
-        assert process.wait(50) == 0
+        assert process.wait(WAIT_S) == 0
     assert children_s() - before_s < 15
 
 
@@ -64,10 +65,10 @@ def children_s() -> float:
 def test_after_kill_9_the_same_folder_has_the_same_port_and_paths(tmp_path: Path) -> None:
     with sim(tmp_path) as (process, _):
         port = hub_port(tmp_path)
-        client = socket.create_connection(("127.0.0.1", port), timeout=20)
+        client = socket.create_connection(("127.0.0.1", port), timeout=WAIT_S)
         assert client.recv(6) == b"< hi >"
         process.send_signal(signal.SIGKILL)
-        process.wait(20)
+        process.wait(WAIT_S)
     assert (tmp_path / "trunk").is_symlink()
     with client, sim(tmp_path):
         assert hub_port(tmp_path) == port
@@ -77,7 +78,7 @@ def test_after_kill_9_the_same_folder_has_the_same_port_and_paths(tmp_path: Path
 def test_a_second_simulator_in_the_folder_is_refused_in_a_sentence(tmp_path: Path) -> None:
     with sim(tmp_path):
         command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(tmp_path)]
-        second = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        second = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S, check=False)
     assert second.returncode == 1
     assert second.stdout == ""
     assert second.stderr.strip() == (
@@ -112,6 +113,6 @@ def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="ascii")
     command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(tmp_path / "file" / "robot")]
-    failed = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    failed = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S, check=False)
     assert failed.returncode == 1
     assert str(tmp_path / "file" / "robot") in failed.stderr

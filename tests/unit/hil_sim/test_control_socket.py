@@ -18,8 +18,8 @@ from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
 from hil_sim.operator import Operator
 from hil_sim.robot import SimulatedRobot
-
-WAIT_S = 20.0
+from tests.support.examples import examples
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ _ANYTHING = st.recursive(
 _KEYS = st.sampled_from(["fault", "on", "for_s", "params", "clear", "activity", "controller", "list"])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(st.dictionaries(_KEYS, _ANYTHING, max_size=4) | _ANYTHING)
 def test_whatever_is_asked_is_done_or_refused(operator: Operator, request_: object) -> None:
     with suppress(SimulatorError):

@@ -3,8 +3,6 @@
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -13,8 +11,8 @@ import pytest
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.fault import FaultRefused
 from hil_sim.faults.injector import Faults
+from tests.support.waiting import until
 
-WAIT_S = 30.0
 MEGABYTE = 1 << 20
 
 
@@ -31,13 +29,6 @@ def faults(robot: Exoskeleton, tmp_path: Path) -> Faults:
 def hogs() -> list[psutil.Process]:
     found = psutil.Process().children(recursive=True)
     return [one for one in found if "hil_sim.faults.hog" in one.cmdline()]
-
-
-def until(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline, "never"
-        time.sleep(0.02)
 
 
 def the_hog() -> psutil.Process:

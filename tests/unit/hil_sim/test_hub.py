@@ -17,8 +17,7 @@ from hil_sim.bus.socketcand import Messages, frame_message, parse_send
 from hil_sim.clock import Clock
 from hil_sim.errors import SimulatorError
 from hil_sim.loop import Loop
-
-WAIT_S = 20.0
+from tests.support.waiting import WAIT_S
 
 
 class Running:

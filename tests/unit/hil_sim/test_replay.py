@@ -17,6 +17,7 @@ import pytest
 from hil_sim.cli.sim import main
 from hil_sim.replay.can_log import ReplayError
 from hil_sim.replay.robot import ReplayedRobot
+from tests.support.waiting import WAIT_S
 from tests.unit.hil_sim.outside import of
 from tests.unit.hil_sim.recording import Recording, keep_bytes, record
 
@@ -263,7 +264,7 @@ def test_nothing_to_play_is_refused(tmp_path: Path) -> None:
 
 def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
     line = [sys.executable, "-m", "gateway.main", "sim", *arguments]
-    return subprocess.run(line, capture_output=True, text=True, timeout=50, check=False)
+    return subprocess.run(line, capture_output=True, text=True, timeout=WAIT_S, check=False)
 
 
 def test_the_command_plays_to_the_end_and_writes_a_beginning_of_robot_toml(tmp_path: Path) -> None:

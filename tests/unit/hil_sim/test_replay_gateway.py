@@ -2,12 +2,12 @@
 
 import math
 import statistics
-import time
 from bisect import bisect
 from pathlib import Path
 
 from gateway.config import load
 from hil_sim.replay.robot import ReplayedRobot
+from tests.support.waiting import until
 from tests.unit.gateway.harness import Client, serving
 from tests.unit.hil_sim.outside import is_frame
 from tests.unit.hil_sim.recording import Recording, record
@@ -15,7 +15,6 @@ from tests.unit.hil_sim.recording import Recording, record
 COUNTS_PER_RADIAN = 409_600 / math.tau
 TPDO_OF_KNEE = 0x182
 SAMPLES = 150
-DEADLINE_S = 40.0
 A_LITTLE_N = 60.0  # of forces that swing between 0 and 900 N
 
 Series = list[tuple[int, float]]
@@ -47,9 +46,8 @@ def watched(walk: Recording) -> tuple[Series, Series]:
     robot = ReplayedRobot(walk.folder, [walk.log], walk.captures, loop=True, virtual_channel=str(walk.folder))
     with robot, serving(load(robot.config)) as address, Client(address) as client:
         client.call("stream.start", modules=["component"], rate_hz=0, channels=list(columns))
-        deadline_s = time.monotonic() + DEADLINE_S
-        while len(position) < SAMPLES or len(force) < SAMPLES:
-            assert time.monotonic() < deadline_s, f"only {len(position)} positions, {len(force)} forces"
+
+        def take() -> None:
             data = client.data()
             assert data["dropped"] == 0
             for name, series in columns.items():
@@ -57,6 +55,11 @@ def watched(walk: Recording) -> tuple[Series, Series]:
                 series += [
                     pair for pair in zip(data["stamp_ns"], values, strict=False) if pair[1] is not None
                 ]
+
+        def found() -> str:
+            return f"only {len(position)} positions, {len(force)} forces"
+
+        until(lambda: min(len(position), len(force)) >= SAMPLES, found, step=take)
     begins, ends = position[0][0], position[-1][0]
     return position, [pair for pair in force if begins <= pair[0] <= ends]
 

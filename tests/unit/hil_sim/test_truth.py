@@ -1,7 +1,6 @@
 """The truth file: complete lines, what they say, and how they relate to sensors and clocks."""
 
 import json
-import os
 import statistics
 import time
 from itertools import pairwise
@@ -17,6 +16,7 @@ from hil_sim.gait.timetable import Entry
 from hil_sim.gait.wearer import GRAVITY
 from hil_sim.robot import SimulatedRobot
 from hil_sim.truth import COLUMNS, TruthFile
+from tests.support.waiting import until
 
 Row = dict[str, Any]
 
@@ -115,10 +115,7 @@ def test_the_same_arguments_give_the_same_truth_and_writing_it_changes_nothing(t
 def test_lines_are_there_while_the_robot_runs(tmp_path: Path) -> None:
     path = tmp_path / "truth"
     with SimulatedRobot(tmp_path / "robot", virtual_channel=str(tmp_path), truth=path):
-        deadline = time.monotonic() + 20.0
-        while path.read_bytes().count(b"\n") < 20 and time.monotonic() < deadline:
-            os.sched_yield()
-        assert path.read_bytes().count(b"\n") >= 20
+        until(lambda: path.read_bytes().count(b"\n") >= 20, path.read_bytes)
     assert read(path)[1]
 
 

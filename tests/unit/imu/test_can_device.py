@@ -13,7 +13,7 @@ from drivers.component import Component, Kind
 from drivers.imu.can_device import CanImu
 from drivers.imu.settings import CanImuSettings
 from drivers.samples import State
-from tests.unit.bus.waiting import until
+from tests.support.waiting import until
 
 LEANING_10_DEGREES = bytes.fromhex("55 53 00 00 1C 07 00 00")  # pitch 1820 / 32768 · 180°
 

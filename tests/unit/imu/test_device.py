@@ -10,8 +10,9 @@ from drivers.component import Component, Kind
 from drivers.imu.device import Imu
 from drivers.imu.settings import ImuSettings
 from drivers.samples import State
+from tests.support.waiting import until
 from tests.unit.imu.encode import witmotion
-from tests.unit.port.terminals import Terminal, send_until, wait_until
+from tests.unit.port.terminals import Terminal, send_until
 
 LEANING_10_DEGREES = witmotion(0x53, 0, round(10 / 180 * 32768), 0, 0)
 SECOND_NS = 1_000_000_000
@@ -67,7 +68,7 @@ def test_value_is_live_then_null_as_it_goes_stale_and_lost(imu: Imu, terminal: T
 
 
 def test_bytes_without_a_frame_are_called_wrong_baud_rate_or_format(imu: Imu, terminal: Terminal) -> None:
-    wait_until(lambda: imu.line.problem(time.monotonic_ns()) is None, "the port to open")
+    until(lambda: imu.line.problem(time.monotonic_ns()) is None, "the port to open")
     send_until(
         terminal,
         b"\x00\xf8\x80\xfe",
@@ -85,11 +86,11 @@ def test_unplugged_sensor_is_lost_at_once_and_comes_back_without_a_restart(
 ) -> None:
     go_live(imu, terminal)
     terminal.unplug()
-    wait_until(lambda: imu.quality(time.monotonic_ns()).state is State.LOST, "the loss")
+    until(lambda: imu.quality(time.monotonic_ns()).state is State.LOST, "the loss")
     assert imu.latest.read(0, time.monotonic_ns()) == (None, None)
-    wait_until(lambda: "does not exist" in str(imu.quality(time.monotonic_ns()).problem), "the reason")
+    until(lambda: "does not exist" in str(imu.quality(time.monotonic_ns()).problem), "the reason")
     terminal.plug_in()
-    wait_until(lambda: imu.line.problem(time.monotonic_ns()) is None, "the port to open")
+    until(lambda: imu.line.problem(time.monotonic_ns()) is None, "the port to open")
     go_live(imu, terminal)
     quality = imu.quality(time.monotonic_ns())
     assert quality.state is State.OK

@@ -16,8 +16,8 @@ from drivers.errors import SettingsError
 from drivers.imu.canopen.cia410 import InclinometerSettings
 from drivers.imu.inclinometer import Inclinometer
 from drivers.samples import State
+from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode, Object
-from tests.unit.bus.waiting import until
 
 NODE = 20
 SLOPES_16, SLOPES_32 = (0x60100010, 0x60200010), (0x61100020, 0x61200020)

@@ -14,8 +14,9 @@ from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
+from tests.support.waiting import until
 from tests.unit.insole.encode import CALIBRATED, MISSING, RIGHT, Sender, cobs_frame
-from tests.unit.port.terminals import Terminal, send_until, wait_until
+from tests.unit.port.terminals import Terminal, send_until
 
 LOADED = [200] * 16  # 20 kPa everywhere
 
@@ -56,7 +57,7 @@ def sender() -> Sender:
 def send(terminal: Terminal, insole: Insole, frame: Callable[[], bytes]) -> None:
     """Send frames until the insole has taken one."""
     before = insole.latest.updated_ns
-    wait_until(lambda: insole.line.problem(time.monotonic_ns()) is None, "the port to open")
+    until(lambda: insole.line.problem(time.monotonic_ns()) is None, "the port to open")
     send_until(terminal, frame, lambda: insole.latest.updated_ns != before, "a sample")
 
 
@@ -131,7 +132,7 @@ def test_swapped_ports_are_named(insole: Insole, terminal: Terminal, sender: Sen
 def test_late_frame_changes_nothing(insole: Insole, terminal: Terminal, sender: Sender) -> None:
     send(terminal, insole, lambda: sender.frame(LOADED))
     terminal.send(cobs_frame([0] * 16, sequence=sender.sequence - 1))
-    wait_until(lambda: quality(insole).counters["out_of_order"] > 0, "the late frame")
+    until(lambda: quality(insole).counters["out_of_order"] > 0, "the late frame")
     assert values(insole)["cell_0"] == pytest.approx(20_000.0)
 
 
@@ -148,7 +149,7 @@ def test_both_feet_on_one_port_share_it_and_get_their_own_frames(terminal: Termi
     left.start()
     right.start()
     try:
-        wait_until(lambda: left.line.problem(time.monotonic_ns()) is None, "the port to open")
+        until(lambda: left.line.problem(time.monotonic_ns()) is None, "the port to open")
         send_until(
             terminal, both, lambda: None not in (left.latest.updated_ns, right.latest.updated_ns), "samples"
         )

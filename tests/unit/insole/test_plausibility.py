@@ -120,7 +120,6 @@ class Robot:
         return replace(felt, pascal=tuple(self.fault.cells(list(felt.pascal), self.now_s)))
 
 
-@pytest.mark.timeout(300)
 def test_half_an_hour_of_a_normal_wearer_raises_no_alarm() -> None:
     robot = Robot(Seeded())
     said: list[str] = []

@@ -13,8 +13,8 @@ from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.samples import Sample, State
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 from tests.unit.joint.conftest import drive_objects, surroundings, tpdo
 
 Make = Callable[..., JointDrive]

@@ -22,8 +22,8 @@ from drivers.joint.power import PowerDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import StopRpdo
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.bus.waiting import WAIT_S, until
 from tests.unit.joint.conftest import Objects, drive_eds, drive_objects
 from tests.unit.joint.sdo_drive import SdoDrive
 from tests.unit.joint.standard import S, after, statusword

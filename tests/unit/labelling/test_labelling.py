@@ -21,6 +21,7 @@ from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings, Upload
+from tests.support.waiting import until
 
 S = 10**9
 BEGAN = 1_800_000_000 * S
@@ -143,7 +144,6 @@ def test_a_label_is_taken_back_and_can_be_given_again(labelling: Labelling, sett
         assert [row for batch in found.batches for row in batch.to_pylist()] == [{"label": "walk"}]
 
 
-@pytest.mark.timeout(120)
 def test_a_collector_that_owns_the_spool_keeps_labels_and_uploads_them(
     labelling: Labelling, settings: ServerSettings
 ) -> None:
@@ -166,13 +166,12 @@ def test_what_a_collector_cannot_keep_is_an_error(
 
 
 def until_it_answers(settings: ServerSettings, collector: Collector) -> None:
-    deadline_s = time.monotonic() + 30
-    while time.monotonic() < deadline_s:
+    def answers() -> bool:
         with contextlib.suppress(NobodyCollects):
-            ask(settings.recorder.spool, "status")
-            return
-        collector.wait(0.01)
-    pytest.fail("the collector does not answer")
+            return bool(ask(settings.recorder.spool, "status"))
+        return False
+
+    until(answers, "the collector answers", step=lambda: collector.wait(0.01))
 
 
 @pytest.mark.parametrize(

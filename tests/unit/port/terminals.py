@@ -2,12 +2,11 @@
 
 import os
 import pty
-import time
 import tty
 from collections.abc import Callable
 from pathlib import Path
 
-DEADLINE_S = 20.0
+from tests.support.waiting import until
 
 
 class Terminal:
@@ -36,15 +35,6 @@ class Terminal:
         os.write(self._master, data)
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
-    """Return as soon as `condition` holds; the deadline is far beyond any slow machine."""
-    deadline = time.monotonic() + DEADLINE_S
-    while not condition():
-        if time.monotonic() > deadline:
-            raise TimeoutError(f"waited {DEADLINE_S} s for {what}")
-        time.sleep(0.005)
-
-
 def send_until(
     terminal: Terminal, data: bytes | Callable[[], bytes], condition: Callable[[], bool], what: str
 ) -> None:
@@ -54,4 +44,4 @@ def send_until(
         terminal.send(data if isinstance(data, bytes) else data())
         return condition()
 
-    wait_until(sent, what)
+    until(sent, what)

@@ -11,7 +11,8 @@ import serial
 
 from drivers.errors import Unavailable
 from drivers.port import SerialPort, open_port
-from tests.unit.port.terminals import Terminal, send_until, wait_until
+from tests.support.waiting import until
+from tests.unit.port.terminals import Terminal, send_until
 
 
 class Received:
@@ -57,12 +58,12 @@ def test_a_consumer_that_fails_is_told_and_reading_goes_on(terminal: Terminal) -
     port = port_at(terminal.path, sink)
     port.start()
     try:
-        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        until(lambda: port.opened_ns is not None, "the port to open")
         terminal.send(b"bad")
-        wait_until(lambda: port.problem is not None, "the failure to be told")
+        until(lambda: port.problem is not None, "the failure to be told")
         assert "ZeroDivisionError: oops" in str(port.problem)
         terminal.send(b"good")
-        wait_until(lambda: sink.data.endswith(b"good"), "reading to go on")
+        until(lambda: sink.data.endswith(b"good"), "reading to go on")
         assert sink.closings == 0
     finally:
         port.stop()
@@ -73,10 +74,10 @@ def test_bytes_arrive_unchanged_with_rising_stamps(terminal: Terminal) -> None:
     port = port_at(terminal.path, sink)
     port.start()
     try:
-        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        until(lambda: port.opened_ns is not None, "the port to open")
         before_ns = time.monotonic_ns()
         terminal.send(everything)
-        wait_until(lambda: len(sink.data) == 256, "256 bytes")
+        until(lambda: len(sink.data) == 256, "256 bytes")
         assert bytes(sink.data) == everything
         assert sink.stamps == sorted(sink.stamps)
         assert sink.stamps[0] >= before_ns
@@ -90,7 +91,7 @@ def test_what_waited_before_the_port_was_opened_is_thrown_away(terminal: Termina
     port = port_at(terminal.path, sink)
     port.start()
     try:
-        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        until(lambda: port.opened_ns is not None, "the port to open")
         send_until(terminal, b"new", lambda: b"new" in sink.data, "bytes")
         assert b"old" not in sink.data
     finally:
@@ -102,7 +103,7 @@ def test_an_idle_port_uses_no_processor_time_and_stops_at_once(terminal: Termina
     port = port_at(terminal.path, sink)
     port.start()
     try:
-        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        until(lambda: port.opened_ns is not None, "the port to open")
         thread = next(thread for thread in threading.enumerate() if thread.name == f"serial {terminal.path}")
         before = _switches(thread)
         time.sleep(0.3)
@@ -123,12 +124,12 @@ def test_missing_port_is_named_and_opened_when_it_appears(tmp_path: Path) -> Non
     port = port_at(terminal.path, sink)
     port.start()
     try:
-        wait_until(lambda: port.problem is not None, "a problem")
+        until(lambda: port.problem is not None, "a problem")
         assert port.problem is not None
         assert str(terminal.path) in port.problem
         assert "does not exist" in port.problem
         terminal.plug_in()
-        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        until(lambda: port.opened_ns is not None, "the port to open")
         assert port.problem is None
     finally:
         port.stop()
@@ -141,13 +142,13 @@ def test_unplugged_port_comes_back_by_the_same_path(terminal: Terminal) -> None:
     port.start()
     try:
         for round_number in range(3):
-            wait_until(lambda: port.opened_ns is not None, "the port to open")
+            until(lambda: port.opened_ns is not None, "the port to open")
             mark = f"round {round_number}".encode()
             send_until(terminal, mark, lambda mark=mark: mark in sink.data, "bytes")  # type: ignore[misc]
             terminal.unplug()
-            wait_until(lambda: port.opened_ns is None and port.problem is not None, "the unplug to be seen")
+            until(lambda: port.opened_ns is None and port.problem is not None, "the unplug to be seen")
             terminal.plug_in()
-        wait_until(lambda: port.opened_ns is not None, "the port to open")
+        until(lambda: port.opened_ns is not None, "the port to open")
         assert sink.openings == 4
         assert sink.closings == 3
     finally:
@@ -159,9 +160,9 @@ def test_port_in_use_is_named(terminal: Terminal) -> None:
     first, second = port_at(terminal.path, Received()), port_at(terminal.path, Received())
     first.start()
     try:
-        wait_until(lambda: first.opened_ns is not None, "the first to open")
+        until(lambda: first.opened_ns is not None, "the first to open")
         second.start()
-        wait_until(lambda: second.problem is not None, "a problem")
+        until(lambda: second.problem is not None, "a problem")
         assert second.problem is not None
         assert "in use by another program" in second.problem
     finally:
@@ -175,7 +176,7 @@ def test_file_that_is_no_port_is_named(tmp_path: Path) -> None:
     port = port_at(path, Received())
     port.start()
     try:
-        wait_until(lambda: port.problem is not None, "a problem")
+        until(lambda: port.problem is not None, "a problem")
         assert port.problem is not None
         assert "cannot be opened as a serial port" in port.problem
     finally:
@@ -205,6 +206,6 @@ def test_start_and_stop_are_idempotent_and_leave_nothing_open(terminal: Terminal
 def test_stop_ends_the_wait_between_two_attempts(tmp_path: Path) -> None:
     port = port_at(tmp_path / "nothing", Received())
     port.start()
-    wait_until(lambda: port.problem is not None, "a problem")
+    until(lambda: port.problem is not None, "a problem")
     port.stop()
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("serial ")]

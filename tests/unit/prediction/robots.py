@@ -24,10 +24,10 @@ from server_gui.core.prediction.service import Predicting
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 from server_gui.core.settings.server_file import ServerSettings, StoreSettings
 from tests.fake_robot import FakeRobot
+from tests.support.waiting import until
 from tests.unit.ml.serving.small import CHANNELS, MS, STEP_MS, Floats, hips, learned
 from tests.unit.recording.robots import description
 
-WAIT_S = 50.0  # pytest itself waits for 60 s
 AGAIN_S = 0.05
 ROBOT = "exo-01"
 ROWS = 10  # in a batch
@@ -47,6 +47,13 @@ def telemetry(rows: Floats, begin_ns: int = 0) -> Iterator[Telemetry]:
         columns = dict(zip(CHANNELS, part.T.tolist(), strict=True))
         received_ns = stamps[-1] + 5_000 * MS
         yield Telemetry(1, Batch(stamps, columns, at, 0, 0, 1, received_ns), ClockOffset(-5_000 * MS, 1))
+
+
+def walking() -> Iterator[Telemetry]:
+    """Batches of somebody who walks, for as long as they are asked for."""
+    for minute in itertools.count():
+        rows = hips(60, walks=True, seed=minute)
+        yield from telemetry(rows, begin_ns=minute * len(rows) * STEP_MS * MS)
 
 
 def publish(url: str, model: Learned | None = None, robot: str = "", **changes: Any) -> str:
@@ -86,13 +93,12 @@ class Told:
     stops: list[Ruled] = field(default_factory=list)
     stopped_s: float = 0.0  # when the newest stop was asked for, on our monotonic clock
     order: list[object] = field(default_factory=list)
-    changed: threading.Condition = field(default_factory=threading.Condition)
+    lock: threading.Lock = field(default_factory=threading.Lock)
 
     def tell(self, news: Sequence[Foreseen]) -> None:
-        with self.changed:
+        with self.lock:
             self.news += news
             self.order += news
-            self.changed.notify_all()
 
     def stop(self, ruled: Ruled) -> None:
         self.stopped_s = time.monotonic()
@@ -101,11 +107,16 @@ class Told:
 
     def until(self, condition: Callable[[], object], between: Callable[[], object] = lambda: None) -> None:
         """Wait for a condition on what is told, doing something again and again, however much is told."""
-        deadline_s = time.monotonic() + WAIT_S
-        with self.changed:
-            while not self.changed.wait_for(condition, AGAIN_S):
-                assert time.monotonic() < deadline_s, f"not told in {WAIT_S:g} s; told was {self.news[-3:]}"
-                between()
+
+        def is_so() -> object:
+            with self.lock:
+                return condition()
+
+        def again() -> None:
+            between()
+            time.sleep(AGAIN_S)
+
+        until(is_so, lambda: self.news[-3:], step=again)
 
     def predicted(self, robot: str = ROBOT) -> list[Predicted]:
         return [one for one in self.news if isinstance(one, Predicted) and one.robot == robot]

@@ -1,7 +1,6 @@
 """`gwrms predict --robot`: what is said of robots that nobody records, with faults beside."""
 
 import json
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -14,9 +13,9 @@ from server_gui.core.prediction.live import Live
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.core.settings.server_file import SettingsError
 from server_gui.terminal.predictions import told
+from tests.support import waiting
 from tests.unit.prediction.robots import SteadyRobot, publish, settings
 
-WAIT_S = 50.0
 WALKING = RuleSettings("activity", "walk", 0.5, action=Action.STOP)
 
 
@@ -27,10 +26,10 @@ def robot() -> Iterator[SteadyRobot]:
 
 
 def until(live: Live, so: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + WAIT_S
-    while not so():
-        live.look(0.1)
-        assert time.monotonic() < deadline_s, [told(name, watched) for name, watched in live.robots.items()]
+    def found() -> object:
+        return [told(name, watched) for name, watched in live.robots.items()]
+
+    waiting.until(so, found, step=lambda: live.look(0.1))
 
 
 def test_a_robot_is_predicted_while_somebody_looks_and_no_rule_stops_it(

@@ -21,6 +21,7 @@ from server_gui.core.prediction.news import Serves
 from server_gui.core.prediction.service import Predicting
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import TrackRecord
+from tests.support.waiting import WAIT_S
 from tests.unit.ml.serving.small import MS, STEP_MS, Floats, hips, learned
 from tests.unit.prediction.lab import Lab
 from tests.unit.prediction.robots import (
@@ -32,6 +33,7 @@ from tests.unit.prediction.robots import (
     served,
     settings,
     telemetry,
+    walking,
 )
 
 EVERY_NS = 100 * MS
@@ -90,8 +92,7 @@ def test_a_promoted_model_serves_without_a_restart_and_so_does_the_old_one_after
     folder_url: str,
 ) -> None:
     first = publish(folder_url)
-    rows = hips(600, walks=True)
-    sent = iter(telemetry(rows))
+    sent = walking()
     with predicting(settings(folder_url)) as (one, told):
         served(one, told)
 
@@ -138,7 +139,7 @@ def test_a_model_of_other_units_serves_nobody_and_says_why(folder_url: str) -> N
 
 def test_a_damaged_model_changes_nothing_and_is_said(folder_url: str) -> None:
     first = publish(folder_url)
-    sent = iter(telemetry(hips(600, walks=True)))
+    sent = walking()
     with predicting(settings(folder_url)) as (one, told):
         served(one, told)
         second = Registry(folder_url).publish(learned().state(), card(learned(), notes="another"))
@@ -193,7 +194,7 @@ def test_who_falls_behind_decides_about_the_newest_and_counts_what_was_skipped(
         try:
             served(one, told)
             send(one, rows[:300])
-            assert busy.wait(60)
+            assert busy.wait(WAIT_S)
             send(one, rows[300:], begin_ns=3_000 * MS)
         finally:
             go_on.set()
@@ -259,7 +260,7 @@ def test_what_labels_say_of_the_model_is_told_with_its_predictions(folder_url: s
     lab = Lab(folder_url, time.time_ns() - 3600 * 10**9)
     lab.say(["walk", "walk", "unknown"])
     lab.label("walk", -1000, 1000)
-    sent = iter(telemetry(hips(600, walks=True)))
+    sent = walking()
     with predicting(settings(folder_url)) as (one, told):
         served(one, told)
         told.until(
@@ -281,7 +282,7 @@ def test_labels_that_cannot_be_read_are_a_problem_and_prediction_goes_on(
     Store(folder_url)
     publish(folder_url)
     monkeypatch.setattr(TrackRecord, "figures", unreachable)
-    sent = iter(telemetry(hips(600, walks=True)))
+    sent = walking()
     with predicting(settings(folder_url)) as (one, told):
         served(one, told)
         told.until(lambda: told.predicted() and one.state.problems, lambda: one.take(ROBOT, next(sent)))

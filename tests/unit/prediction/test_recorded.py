@@ -1,7 +1,6 @@
 """A robot that is recorded is predicted: what is said is kept, and comes again from the recording."""
 
 import json
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
@@ -27,9 +26,10 @@ from server_gui.core.settings.server_file import (
     StoreSettings,
 )
 from server_gui.terminal.predictions import replay_told
+from tests.support import waiting
+from tests.support.waiting import WAIT_S
 from tests.unit.prediction.robots import SteadyRobot, publish
 
-WAIT_S = 30.0
 ENOUGH = 30  # decisions
 WALKING = RuleSettings("activity", "walk", 0.8, for_ms=200, action=Action.STOP)
 
@@ -52,11 +52,10 @@ def server(robot: SteadyRobot, tmp_path: Path, folder_url: str) -> ServerSetting
 
 
 def until(collector: Collector, condition: Callable[[CollectorReport], object]) -> CollectorReport:
-    deadline_s = time.monotonic() + WAIT_S
-    while not condition(report := collector.report().result(WAIT_S)):
-        assert time.monotonic() < deadline_s, report
-        collector.wait(0.05)
-    return report
+    def found() -> CollectorReport | None:
+        return report if condition(report := collector.report().result(WAIT_S)) else None
+
+    return waiting.until(found, collector.report, step=lambda: collector.wait(0.05))
 
 
 def judged(report: CollectorReport) -> int:

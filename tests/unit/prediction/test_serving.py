@@ -1,8 +1,7 @@
 """A model that was refused is tried again when something of it changes, or after a time; it is told once."""
 
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,10 @@ from ml.registry.registry import CARD, SKOPS, Registry
 from ml.store.objects import Objects
 from server_gui.core.prediction import model_loading as module
 from server_gui.core.prediction.model_loading import Serving
+from tests.support.waiting import until
 from tests.unit.ml.serving.small import CHANNELS, learned
 from tests.unit.prediction.robots import ROBOT, card, publish
 
-WAIT_S = 60.0
 KEY = ROBOT, "activity"
 
 
@@ -45,13 +44,6 @@ def serving(url: str) -> Iterator[Serving]:
     with Serving(url, poll_s=0.02) as one:
         one.robot(ROBOT, dict.fromkeys(CHANNELS, "rad"))
         yield one
-
-
-def until(condition: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.01)
 
 
 def looked(calls: Counter[str]) -> None:

@@ -23,13 +23,13 @@ from server_gui.core.recording.records import Facts, label
 from server_gui.core.recording.rows import Layout, Record, Run
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
+from tests.support.waiting import WAIT_S
 
 ROBOT, KNEE = "exo-01", "left_knee.position"
 MS, S = 10**6, 10**9
 ROW_NS = 10 * MS
 PER_BATCH = 5
 ROBOT_NS = 7_000 * S  # its monotonic clock minus ours
-WAIT_S = 20.0
 
 
 class Wall:

@@ -5,7 +5,7 @@ import logging
 import os
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,20 +16,11 @@ from server_gui.core.recording.compaction import Compacting
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import until
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
 HOUR_S = 3600.0
-WAIT_S = 200.0
-
-pytestmark = pytest.mark.timeout(240)  # a process is started, which may be long in coming
-
-
-def until(condition: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.spool_files import Files, Kept
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
-WAIT_S = 30.0
 
 
 def recorded(folder: Path, batches: int = 3) -> None:

@@ -19,6 +19,7 @@ from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, send, upload
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
@@ -89,11 +90,11 @@ def test_an_older_copy_of_a_spool_is_told_and_what_is_recorded_into_it_arrives(
         with Recorder(opened) as recorder:
             recorder.record("exo-01", 1, batch(0))
             recorder.cut(lambda: None)
-            recorder.flush(30)
+            recorder.flush(WAIT_S)
             shutil.copytree(spool, copy)
             recorder.record("exo-01", 1, batch(1))
             recorder.cut(lambda: None)
-            recorder.flush(30)
+            recorder.flush(WAIT_S)
             recorder.record("exo-01", 1, batch(2))
         for number in opened.waiting():
             send(opened, number, store)
@@ -124,7 +125,7 @@ def test_an_older_copy_is_told_also_where_what_it_lacks_was_recorded_by_a_later_
         uploader = Uploader(opened, lambda: Store(folder_url))
         recorder.record("exo-01", 1, batch(20))
         recorder.cut(lambda: None)
-        assert recorder.flush(30)
+        assert recorder.flush(WAIT_S)
         assert uploader._empty(asked=True)
         assert f"{HERE} has batch 3 of the spool {spool}, which had only 1" in uploader.state.ahead[0]
         assert uploader.state.lost == ()

@@ -12,8 +12,8 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.spool_files import identity
 from server_gui.core.recording.upload import lost_batches, send
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import until
 from tests.unit.recording.robots import batch
-from tests.unit.recording.test_compacting import until
 
 
 def recorded(folder: Path, store: Store, batches: int = 3) -> None:

@@ -20,9 +20,8 @@ from server_gui.core.recording.recorder import AGAIN_S, Alarm, AlarmKind, Record
 from server_gui.core.recording.records import Facts, label
 from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.spool import Spool
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import CHANNELS, batch, description, stamp_ns, value
-
-WAIT_S = 20.0
 
 
 @pytest.fixture

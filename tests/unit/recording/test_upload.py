@@ -5,9 +5,8 @@ import errno
 import os
 import sqlite3
 import threading
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,9 +25,9 @@ from server_gui.core.recording.rows import Layout, Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send, upload
 from server_gui.core.recording.uploader import Uploader
+from tests.support.waiting import WAIT_S, until
 from tests.unit.recording.robots import CHANNELS, batch, description, stamp_ns, value
 
-WAIT_S = 30.0
 HERE = TELEMETRY.location("exo-01", 1)
 
 
@@ -286,13 +285,6 @@ def test_nothing_is_uploaded_before_it_is_wanted_unless_asked(spool: Spool, fold
         assert spool.waiting() == [1]
         uploader.now()
         until(lambda: uploader.state.uploaded == 1)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline_s, "it did not happen"
-        time.sleep(0.01)
 
 
 def test_an_uploader_is_emptied_at_the_end_whatever_is_wanted(spool: Spool, folder_url: str) -> None:

@@ -10,7 +10,7 @@ from ml.store import Store
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
-from tests.unit.bus.waiting import until
+from tests.support.waiting import until
 from tests.unit.recording.robots import batch
 
 WAIT_S = 5.0

@@ -19,6 +19,7 @@ from server_gui.core.recording.segment import PAGE_BYTES
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.recording.wal import FRAME, HEADER, lost_commits
+from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
@@ -37,7 +38,7 @@ def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
         with Recorder(spool) as recorder:
             for seq in range(COMMITS):
                 recorder.record("exo-01", 1, batch(seq))
-                recorder.flush(30)
+                recorder.flush(WAIT_S)
             os.write(writer, b"!")
             time.sleep(600)
     assert os.read(reader, 1) == b"!"

@@ -9,6 +9,7 @@ import pytest
 
 from gateway.records.chain import Broken
 from gateway.records.journal import Journal, head_file, read_verified
+from tests.support.waiting import WAIT_S
 
 
 @pytest.fixture
@@ -31,7 +32,9 @@ def fill(path: Path, count: int = 5) -> None:
 
 
 def test_an_entry_says_who_when_what_before_after_and_result(journal: Journal, path: Path) -> None:
-    journal.append("gwrms set", "write", before={"a.b": 1.0}, after={"a.b": 2.0}, result="done").result(10)
+    journal.append("gwrms set", "write", before={"a.b": 1.0}, after={"a.b": 2.0}, result="done").result(
+        WAIT_S
+    )
     (entry,) = read_verified(path)
     assert (entry["n"], entry["who"], entry["what"], entry["result"]) == (1, "gwrms set", "write", "done")
     assert (entry["before"], entry["after"], entry["boot_id"]) == ({"a.b": 1.0}, {"a.b": 2.0}, "boot")
@@ -48,14 +51,14 @@ def test_entries_follow_each_other_over_restarts(path: Path) -> None:
 def test_the_tail_has_what_was_just_appended(journal: Journal) -> None:
     for number in range(200):
         journal.append("tester", "note", result="x" * number)
-    entries, cut = journal.tail(150).result(20)
+    entries, cut = journal.tail(150).result(WAIT_S)
     assert cut is None
     assert [entry["n"] for entry in entries] == list(range(51, 201))
-    assert [entry["n"] for entry in journal.tail(1000).result(20).entries] == list(range(1, 201))
+    assert [entry["n"] for entry in journal.tail(1000).result(WAIT_S).entries] == list(range(1, 201))
 
 
 def test_the_tail_of_an_empty_journal_is_empty(journal: Journal) -> None:
-    assert journal.tail(10).result(10) == ([], None)
+    assert journal.tail(10).result(WAIT_S) == ([], None)
 
 
 def test_every_single_altered_byte_is_found(path: Path) -> None:
@@ -123,24 +126,24 @@ def test_a_damaged_line_in_the_tail_is_said(journal: Journal, path: Path) -> Non
     fill(path, 3)
     whole = path.read_bytes()
     path.write_bytes(whole.replace(b"tester", b"t\xffster", 1))
-    assert len(journal.tail(2).result(10).entries) == 2
+    assert len(journal.tail(2).result(WAIT_S).entries) == 2
     with pytest.raises(OSError, match="is damaged"):
-        journal.tail(3).result(10)
+        journal.tail(3).result(WAIT_S)
 
 
 def test_whatever_fails_in_writing_an_entry_is_a_problem(
     journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    journal.append("tester", "before").result(10)
+    journal.append("tester", "before").result(WAIT_S)
     with monkeypatch.context() as failing:
         failing.setattr("gateway.records.durable.sync_folder", _broken)
         with pytest.raises(OSError, match="cannot be written: oops"):
-            journal.append("tester", "lost").result(10)
+            journal.append("tester", "lost").result(WAIT_S)
     assert journal.problem is not None
     assert [entry["what"] for entry in read_verified(path)] == ["before"]
     with pytest.raises(OSError, match="cannot be written"):
-        journal.append("tester", "lost", result=object()).result(10)
-    journal.append("tester", "after").result(10)
+        journal.append("tester", "lost", result=object()).result(WAIT_S)
+    journal.append("tester", "after").result(WAIT_S)
     assert journal.problem is None
     assert [entry["what"] for entry in read_verified(path)] == ["before", "after"]
 
@@ -182,14 +185,14 @@ def test_a_journal_whose_end_does_not_hold_is_kept_and_begun_anew(path: Path) ->
 def test_a_full_disk_fails_the_entry_and_leaves_the_journal_whole(path: Path) -> None:
     fill(path, 2)
     journal = Journal(path, "boot")
-    journal.append("tester", "before", result="").result(10)
+    journal.append("tester", "before", result="").result(WAIT_S)
     limit_fails = pytest.MonkeyPatch()
     limit_fails.setattr("gateway.records.journal.os.fsync", _no_space)
     with pytest.raises(OSError, match="No space left on device; make room"):
-        journal.append("tester", "lost", result="").result(10)
+        journal.append("tester", "lost", result="").result(WAIT_S)
     assert journal.problem is not None
     limit_fails.undo()
-    journal.append("tester", "after", result="").result(10)
+    journal.append("tester", "after", result="").result(WAIT_S)
     assert journal.problem is None
     journal.close()
     assert [entry["what"] for entry in read_verified(path)] == ["write", "write", "before", "after"]
@@ -198,13 +201,13 @@ def test_a_full_disk_fails_the_entry_and_leaves_the_journal_whole(path: Path) ->
 def test_an_entry_whose_head_cannot_be_written_is_not_in_the_journal(
     journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    journal.append("tester", "before").result(10)
+    journal.append("tester", "before").result(WAIT_S)
     with monkeypatch.context() as failing:
         failing.setattr("gateway.records.durable.os.fsync", _fails_for(f"{head_file(path).name}.draft"))
         with pytest.raises(OSError, match="No space left on device; make room"):
-            journal.append("tester", "lost").result(10)
+            journal.append("tester", "lost").result(WAIT_S)
     assert [entry["what"] for entry in read_verified(path)] == ["before"]
-    journal.append("tester", "after").result(10)
+    journal.append("tester", "after").result(WAIT_S)
     assert [entry["what"] for entry in read_verified(path)] == ["before", "after"]
 
 
@@ -212,11 +215,11 @@ def test_an_entry_whose_head_was_written_and_perhaps_not_kept_is_in_neither(
     journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The head has its new name, and only the folder cannot be made durable."""
-    journal.append("tester", "before").result(10)
+    journal.append("tester", "before").result(WAIT_S)
     with monkeypatch.context() as failing:
         failing.setattr("gateway.records.durable.sync_folder", _no_space)
         with pytest.raises(OSError, match="No space left on device"):
-            journal.append("tester", "lost").result(10)
+            journal.append("tester", "lost").result(WAIT_S)
     assert [entry["what"] for entry in read_verified(path)] == ["before"]
 
 

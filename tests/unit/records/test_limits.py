@@ -29,6 +29,7 @@ from gateway.records.limits import (
     client,
     within_limits,
 )
+from tests.support.waiting import WAIT_S
 
 SECOND_NS = 10**9
 ADA, BEN = "gwrms set (10.0.0.1:50001)", "window (10.0.0.1:50002)"
@@ -61,7 +62,7 @@ def flood(journal: Journal, share: Share = Share.ASKED, what: str = "lease taken
 
 def test_a_flood_is_counted_and_summed_up(journal: Journal, path: Path) -> None:
     written = flood(journal)
-    assert [one.exception(10) is None for one in written] == [True] * ENTRIES_AT_ONCE + [False] * 50
+    assert [one.exception(WAIT_S) is None for one in written] == [True] * ENTRIES_AT_ONCE + [False] * 50
     journal.close()
     entries = read_verified(path)
     assert len(entries) == ENTRIES_AT_ONCE + 1
@@ -74,10 +75,10 @@ def test_a_flood_is_summed_up_when_it_goes_on_and_when_nothing_else_happens(
     journal: Journal, clock: SimpleNamespace
 ) -> None:
     flood(journal)
-    journal.tail(1).result(10)  # as long as the clock stands, nothing is due
+    journal.tail(1).result(WAIT_S)  # as long as the clock stands, nothing is due
     clock.now_ns += 6 * SECOND_NS
-    journal.append(BEN, "lease taken", Share.ASKED).result(10)
-    entries, _ = journal.tail(3).result(10)
+    journal.append(BEN, "lease taken", Share.ASKED).result(WAIT_S)
+    entries, _ = journal.tail(3).result(WAIT_S)
     assert [entry["what"] for entry in entries[-2:]] == ["lease taken", LEFT_OUT]
 
 
@@ -94,17 +95,17 @@ def test_a_flood_that_nothing_follows_is_summed_up_by_itself(
     monkeypatch.setattr(_LeftOut, "entry", told)
     journal = Journal(path, "boot")
     flood(journal)
-    assert summed.wait(10)
+    assert summed.wait(WAIT_S)
     journal.close()
 
 
 def test_a_flood_takes_nothing_from_others_nor_from_its_own_stop(journal: Journal, path: Path) -> None:
     flood(journal)
-    journal.append(BEN, "write", Share.ASKED).result(10)
-    journal.append(BEN, "stop", Share.ACT).result(10)
-    journal.append(ADA, "stop", Share.ACT).result(10)
-    journal.append("guard", "alarm").result(10)
-    journal.append("gateway", "taken back").result(10)
+    journal.append(BEN, "write", Share.ASKED).result(WAIT_S)
+    journal.append(BEN, "stop", Share.ACT).result(WAIT_S)
+    journal.append(ADA, "stop", Share.ACT).result(WAIT_S)
+    journal.append("guard", "alarm").result(WAIT_S)
+    journal.append("gateway", "taken back").result(WAIT_S)
     told = [(entry["who"], entry["what"]) for entry in read_verified(path)[ENTRIES_AT_ONCE:]]
     assert told == [
         (BEN, "write"),
@@ -117,8 +118,8 @@ def test_a_flood_takes_nothing_from_others_nor_from_its_own_stop(journal: Journa
 
 def test_a_flood_of_stops_is_counted_too_and_takes_no_write(journal: Journal, path: Path) -> None:
     flood(journal, Share.ACT, "stop")
-    journal.append(ADA, "write", Share.ASKED).result(10)
-    journal.append(BEN, "stop", Share.ACT).result(10)
+    journal.append(ADA, "write", Share.ASKED).result(WAIT_S)
+    journal.append(BEN, "stop", Share.ACT).result(WAIT_S)
     journal.close()
     assert [entry["what"] for entry in read_verified(path)[-3:]] == ["write", "stop", LEFT_OUT]
 
@@ -126,20 +127,20 @@ def test_a_flood_of_stops_is_counted_too_and_takes_no_write(journal: Journal, pa
 def test_what_may_not_be_done_without_its_entry_is_refused_with_when_to_try_again(journal: Journal) -> None:
     flood(journal)
     with pytest.raises(TooMany, match=r"gwrms set .* has written more .*; try again in 0\.\d s"):
-        journal.append(ADA, "write", Share.ASKED).result(10)
+        journal.append(ADA, "write", Share.ASKED).result(WAIT_S)
     assert journal.problem is None
 
 
 def test_an_outcome_is_written_after_whatever_there_was(journal: Journal, path: Path) -> None:
     flood(journal)
-    journal.append(ADA, "write done").result(10)
+    journal.append(ADA, "write done").result(WAIT_S)
     assert read_verified(path)[-1]["what"] == "write done"
 
 
 def test_a_client_is_the_same_one_with_another_connection(journal: Journal) -> None:
     flood(journal)
     again = ADA.replace("50001", "50009")
-    assert isinstance(journal.append(again, "lease taken", Share.ASKED).exception(10), TooMany)
+    assert isinstance(journal.append(again, "lease taken", Share.ASKED).exception(WAIT_S), TooMany)
     assert client(again) == client(ADA) == "gwrms set (10.0.0.1)"
     assert client("10.0.0.1:50001") == "10.0.0.1"
 
@@ -148,7 +149,7 @@ def test_time_gives_room_again(clock: SimpleNamespace, journal: Journal) -> None
     flood(journal)
     clock.now_ns += SECOND_NS
     written = [journal.append(ADA, "lease taken", Share.ASKED) for _ in range(ENTRIES_A_SECOND + 1)]
-    assert [one.exception(10) is None for one in written] == [True] * ENTRIES_A_SECOND + [False]
+    assert [one.exception(WAIT_S) is None for one in written] == [True] * ENTRIES_A_SECOND + [False]
 
 
 def test_bytes_are_limited_as_entries_are() -> None:
@@ -212,12 +213,12 @@ def test_a_queue_of_entries_delays_the_next_by_no_more_than_two_syncs(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     journal = Journal(path, "boot")
-    journal.append(ADA, "first").result(10)
+    journal.append(ADA, "first").result(WAIT_S)
     go_on, syncs, fsync = threading.Event(), [0], os.fsync
 
     def counted(descriptor: int) -> None:
         syncs[0] += 1
-        go_on.wait(10)
+        go_on.wait(WAIT_S)
         fsync(descriptor)
 
     monkeypatch.setattr("gateway.records.journal.os.fsync", counted)
@@ -225,7 +226,7 @@ def test_a_queue_of_entries_delays_the_next_by_no_more_than_two_syncs(
         journal.append(ADA, "lease taken", Share.ASKED)
     stop = journal.append(BEN, "stop", Share.ACT)
     go_on.set()
-    stop.result(10)
+    stop.result(WAIT_S)
     monkeypatch.undo()
     journal.close()
     assert syncs[0] <= 2 * 3  # each batch syncs its lines, its head and the head's folder
@@ -237,14 +238,14 @@ def test_an_entry_that_cannot_be_encoded_fails_alone(path: Path, monkeypatch: py
     taken, held = module.Journal._take, threading.Event()
 
     def together(self: Journal) -> list[Any]:
-        held.wait(10)
+        held.wait(WAIT_S)
         return taken(self)
 
     monkeypatch.setattr(module.Journal, "_take", together)
-    journal.append(ADA, "first").result(10)
+    journal.append(ADA, "first").result(WAIT_S)
     written = [journal.append(ADA, "note", result=one) for one in ("good", object(), "good")]
     held.set()
-    assert [one.exception(10) is None for one in written] == [True, False, True]
+    assert [one.exception(WAIT_S) is None for one in written] == [True, False, True]
     journal.close()
     assert [entry["what"] for entry in read_verified(path)] == ["first", "note", "note"]
 
@@ -253,9 +254,9 @@ def test_what_comes_after_the_end_fails_and_waits_for_nothing(path: Path) -> Non
     journal = Journal(path, "boot")
     journal.close()
     with pytest.raises(OSError, match="the gateway is ending"):
-        journal.append(ADA, "late").result(10)
+        journal.append(ADA, "late").result(WAIT_S)
     with pytest.raises(OSError, match="the gateway is ending"):
-        journal.tail(1).result(10)
+        journal.tail(1).result(WAIT_S)
 
 
 # The size of one entry
@@ -278,7 +279,7 @@ def test_an_entry_of_ordinary_size_is_written_as_it_is() -> None:
     ids=["text", "letters-of-two-bytes", "escapes", "mapping", "list"],
 )
 def test_a_field_that_is_too_long_is_cut_and_says_so(journal: Journal, path: Path, value: Any) -> None:
-    journal.append(ADA, "stop", Share.ACT, reason=value, result="done").result(10)
+    journal.append(ADA, "stop", Share.ACT, reason=value, result="done").result(WAIT_S)
     (entry,) = read_verified(path)
     kept = entry["reason"]
     assert type(kept) is type(value)
@@ -289,7 +290,7 @@ def test_a_field_that_is_too_long_is_cut_and_says_so(journal: Journal, path: Pat
 
 
 def test_a_long_name_is_cut(journal: Journal, path: Path) -> None:
-    journal.append("n" * 60_000 + " (1.2.3.4:5)", "stop", Share.ACT).result(10)
+    journal.append("n" * 60_000 + " (1.2.3.4:5)", "stop", Share.ACT).result(WAIT_S)
     (entry,) = read_verified(path)
     assert len(entry["who"]) <= WHO_BYTES
     assert "who" in entry["cut"]

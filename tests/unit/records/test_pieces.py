@@ -13,6 +13,7 @@ from gateway.records import durable, journal, pieces
 from gateway.records.chain import Broken, Head, line
 from gateway.records.journal import Journal, Sizes, head_file, read_verified
 from gateway.records.reading import SHORTENED
+from tests.support.waiting import WAIT_S
 
 SMALL = Sizes(piece=2000, kept=1_000_000)
 TIGHT = Sizes(piece=2000, kept=5000)
@@ -31,7 +32,7 @@ def fill(path: Path, count: int = 40, sizes: Sizes = SMALL) -> None:
     """Each entry by itself, so that it is known where pieces end."""
     journal = Journal(path, "boot", sizes=sizes)
     for number in range(count):
-        journal.append("tester", "note", number=number).result(10)
+        journal.append("tester", "note", number=number).result(WAIT_S)
     journal.close()
 
 
@@ -320,7 +321,7 @@ def test_a_tail_goes_over_pieces(path: Path) -> None:
     fill(path)
     journal = Journal(path, "boot", sizes=SMALL)
     for count in (1, 7, 23, 40, 1000):
-        entries, cut = journal.tail(count).result(10)
+        entries, cut = journal.tail(count).result(WAIT_S)
         assert [entry["n"] for entry in entries] == list(range(max(1, 41 - count), 41))
         assert cut is None
     journal.close()
@@ -330,7 +331,7 @@ def test_a_tail_is_cut_at_its_bytes_and_says_so(path: Path, monkeypatch: pytest.
     monkeypatch.setattr(pieces, "TAIL_BYTES", 3000)
     fill(path)
     journal = Journal(path, "boot", sizes=SMALL)
-    entries, cut = journal.tail(30).result(10)
+    entries, cut = journal.tail(30).result(WAIT_S)
     journal.close()
     assert [entry["n"] for entry in entries] == list(range(41 - len(entries), 41))
     assert 3 < len(entries) < 30
@@ -340,15 +341,15 @@ def test_a_tail_is_cut_at_its_bytes_and_says_so(path: Path, monkeypatch: pytest.
 def test_whoever_reads_does_not_hold_the_writer(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is appended while somebody reads is durable before that has ended."""
     journal = Journal(path, "boot")
-    journal.append("tester", "first").result(10)
+    journal.append("tester", "first").result(WAIT_S)
     tail = pieces.tail
 
     def slowly(*arguments: Any) -> pieces.Tail:
-        journal.append("tester", "while somebody reads").result(10)
+        journal.append("tester", "while somebody reads").result(WAIT_S)
         return tail(*arguments)
 
     monkeypatch.setattr(pieces, "tail", slowly)
-    entries, _ = journal.tail(10).result(10)
+    entries, _ = journal.tail(10).result(WAIT_S)
     assert [entry["what"] for entry in entries] == ["first"]
     journal.close()
 

@@ -4,7 +4,6 @@ import io
 import json
 import math
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 
 from drivers.cli import look, sensor
 from drivers.errors import SettingsError, Unavailable
+from tests.support.waiting import until
 from tests.unit.port.terminals import Terminal
 from tests.unit.sensor_cli.streams import capture, streams
 
@@ -163,10 +163,8 @@ def test_what_is_recorded_is_replayed_at_its_pace(
     monkeypatch.setattr(look, "LISTEN_S", 0.5)
     replaying = threading.Thread(target=sensor.main, args=(["replay", str(file), "--link", str(link)],))
     replaying.start()
-    deadline = time.monotonic() + 20
-    while not link.exists() and time.monotonic() < deadline:
-        time.sleep(0.005)
     try:
+        until(link.exists, "the line is there")
         assert sensor.main([str(link), "--json"]) == 0
     finally:
         replaying.join()

@@ -5,8 +5,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -16,6 +14,7 @@ from server_gui.cli.demo import demo
 from server_gui.processes import children
 from server_gui.processes.children import Child, ChildFailed
 from server_gui.processes.ending import Ended, Ending
+from tests.support.waiting import until
 
 
 def nothing() -> None:
@@ -24,13 +23,6 @@ def nothing() -> None:
 
 def anything(line: str) -> str | None:
     return line or None
-
-
-def until(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def has_ended(process: psutil.Process) -> bool:

@@ -2,7 +2,6 @@
 
 import math
 import threading
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -22,6 +21,7 @@ from server_gui.terminal.keys import Key
 from server_gui.terminal.session import Session
 from server_gui.terminal.summary import Summary
 from tests.fake_robot import FakeRobot
+from tests.support import waiting
 
 SECOND_NS = 1_000_000_000
 
@@ -159,14 +159,13 @@ class Watcher:
         self.following = network.run(self.feed.run())
 
     def until(self, condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + 30
-        while not condition():
-            assert time.monotonic() < deadline, self.events[-5:]
-            assert not self.following.done()
-            for event in self._mailbox.drain():
-                self.events.append(event)
-                self.robot.apply(event)
-            time.sleep(0.005)
+        waiting.until(condition, lambda: self.events[-5:], step=self._take)
+
+    def _take(self) -> None:
+        assert not self.following.done()
+        for event in self._mailbox.drain():
+            self.events.append(event)
+            self.robot.apply(event)
 
 
 @pytest.fixture
@@ -218,11 +217,7 @@ def test_lost_component_is_named_with_its_reason(fake: FakeRobot, network: Netwo
 
 
 def until(session: Session, condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline
-        session.update()
-        time.sleep(0.005)
+    waiting.until(condition, step=session.update)
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from ml.store.errors import translated
 from ml.store.objects import Objects
 from ml.store.tables import EVENTS
 from tests.stores import SeaweedFS
+from tests.support.waiting import WAIT_S
 
 ROW = EVENTS.rows([{"robot": "exo-01", "kind": "marker"}])
 MY_KEY, MY_SECRET = "AKIAEXAMPLEKEY", "wJalrXUtnFEMI-example-secret"
@@ -76,7 +77,7 @@ class FakeS3(http.server.BaseHTTPRequestHandler):
         body = self.rfile.read(int(self.headers["Content-Length"]))
         there = self.path in self.objects
         if self.racers is not None and body != b"late":  # everybody has looked before anybody writes
-            self.racers.wait(10)
+            self.racers.wait(WAIT_S)
             there = False
         refuse = self.racers is not None and there
         if not refuse:

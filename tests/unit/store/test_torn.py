@@ -71,11 +71,17 @@ def test_an_append_that_is_cut_at_any_length_is_made_once(url: str) -> None:
     assert len(list(log_of(url).glob("*.torn*"))) > len(ends)
 
 
+def _lengths(data: bytes) -> list[int]:
+    """Every end of a line, with and without it, and what lies between at intervals."""
+    ends = [at for at in range(len(data)) if data[at : at + 1] == b"\n"]
+    return sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 101)} - {len(data)})
+
+
 def test_a_table_whose_making_is_cut_at_any_length_is_made_anew(url: str) -> None:
     for version in (1, 2, 3):
         entry(url, version).unlink()
     data = entry(url, 0).read_bytes()
-    for length in range(0, len(data), 29):
+    for length in _lengths(data):
         cut(entry(url, 0), data[:length])
         assert append(url, 1), length
         assert texts(url) == [1], length
@@ -96,8 +102,7 @@ def test_tidying_that_is_cut_anywhere_neither_loses_nor_doubles(
     for checkpoint in (*log_of(url).glob("*.parquet"), log_of(url) / "_last_checkpoint"):
         checkpoint.unlink()
     data = entry(url, 4).read_bytes()
-    ends = [at for at in range(len(data)) if data[at : at + 1] == b"\n"]
-    for length in sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 101)}):
+    for length in _lengths(data):
         cut(entry(url, 4), data[:length])
         Store(url).mend(EVENTS.name)
         assert texts(url) == [1, 2, 3], length
