@@ -23,9 +23,9 @@ from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
 from server_gui.core.follow.events import Event
-from server_gui.core.follow.feed import Following
+from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
-from server_gui.core.prediction.news import Foreseen
+from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.processing.units import Units
 from server_gui.core.settings.server_file import ServerSettings, name_of
 from server_gui.core.tuning.link import Link
@@ -37,7 +37,7 @@ from server_gui.views.x11_keys import NoX, X11Keys
 
 FRAME_MS: Final = 33
 SWITCH_S: Final = 0.0005  # a thread that wakes up gets Python within this, however busy the window is
-FOLLOWING: Final = Following(
+FOLLOWING: Final = FollowSettings(
     client="gwrms gui",
     channels=("*",),
     rate_hz=100.0,
@@ -87,7 +87,7 @@ class App:
         qt: QApplication,
         settings: ServerSettings,
         kept: QSettings,
-        following: Following,
+        following: FollowSettings,
         record: Record | None = None,
         file: Path | None = None,
     ) -> None:
@@ -96,7 +96,7 @@ class App:
         self._followed: list[Followed] = []
         self._mailboxes: dict[str, Mailbox] = {}
         self._stations: dict[str, Station] = {}
-        self._foreseen: collections.deque[Foreseen] = collections.deque(maxlen=FORESEEN)
+        self._foreseen: collections.deque[PredictionNews] = collections.deque(maxlen=FORESEEN)
         self._poster = Poster()
         self.feeds = Feeds(settings, following, record, self._show, self._foreseen.extend, self._stop)
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)

@@ -21,7 +21,7 @@ from skops.io.exceptions import UntrustedTypesFoundException
 
 from ml.errors import UnusableModel
 from ml.parsing import parsing
-from ml.registry.sound import check_trees
+from ml.registry.tree_checks import check_trees
 
 MAX_BYTES: Final = 64 << 20
 SCHEMA: Final = "schema.json"

@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import force_setattr
 
 from ml.store.errors import StoreError
-from ml.store.later import last
+from ml.store.precedence import last
 
 US_NS: Final = 1_000  # the store's times are microseconds
 

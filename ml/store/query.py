@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from ml.store import reading
 from ml.store.errors import StoreError, translated
-from ml.store.later import OPENED
+from ml.store.precedence import OPENED
 from ml.store.store import Store
 from ml.store.tables import TABLES
 
@@ -31,7 +31,7 @@ _KIND: Final = re.compile(r"^(\w+ )*Error: ")
 _READING: Final = "reading the Arrow source failed: IOError: "
 _DOTTED: Final = re.compile(r'Referenced table "(\w+)" not found')
 
-# Of rows of `labels`, as ml/store/labels.py and ml/store/later.py have it.
+# Of rows of `labels`, as ml/store/labels.py and ml/store/precedence.py have it.
 _ABOUT: Final = "robot, session, utc, ended, label, author, source"
 _HOLDING: Final = f"""SELECT * FROM (SELECT * FROM every QUALIFY 1 = row_number() OVER (
     PARTITION BY {_ABOUT}, split_part(coalesce(spool, ''), '/', 1)

@@ -14,7 +14,7 @@ from ml.store import reading
 from ml.store.errors import StoreError, translated
 from ml.store.fragments import DataFile, Extent
 from ml.store.labels import holding
-from ml.store.later import last, recorded_order
+from ml.store.precedence import last, recorded_order
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
 

@@ -21,7 +21,7 @@ from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError
 
 from ml.store import reading
-from ml.store.alone import alone
+from ml.store.compaction_lock import alone
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused, translated
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table

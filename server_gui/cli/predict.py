@@ -21,7 +21,7 @@ from ml.store.sessions import Session
 from server_gui.cli.cloud_reach import parser
 from server_gui.cli.rehearse import rehearse
 from server_gui.core.prediction.live import Live
-from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
+from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rehearsals import BENCHMARKS
 from server_gui.core.prediction.replay import Replayed, replay
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, load, name_of
@@ -30,7 +30,7 @@ from server_gui.terminal.predictions import replay_told, told
 
 LOOK_S: Final = 0.25  # a look at what has come waits at most so long
 
-Show = Callable[[Live, Sequence[Foreseen]], None]
+Show = Callable[[Live, Sequence[PredictionNews]], None]
 
 EPILOG: Final = """Live, robots are followed and nothing is recorded; a rule of the server's file says when it
 holds, and stops nothing: that does whoever records (gwrms collect, or a window that records).
@@ -132,12 +132,12 @@ def _page(live: Live) -> str:
     return "\n".join(told(name, watched) for name, watched in live.robots.items())
 
 
-def _show_json(_live: Live, foreseen: Sequence[Foreseen]) -> None:
+def _show_json(_live: Live, foreseen: Sequence[PredictionNews]) -> None:
     for one in foreseen:
         say_json(fields(one))
 
 
-def _show_new(foreseen: Sequence[Foreseen], said: dict[tuple[str, str], str]) -> None:
+def _show_new(foreseen: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
     """A line for each change."""
     for one in foreseen:
         match one:
@@ -154,7 +154,7 @@ def _show_new(foreseen: Sequence[Foreseen], said: dict[tuple[str, str], str]) ->
                     say(f"{one.robot} {why}\n")
 
 
-def fields(one: Foreseen) -> dict[str, Any]:
+def fields(one: PredictionNews) -> dict[str, Any]:
     """What was foreseen, for machines."""
     match one:
         case Predicted():

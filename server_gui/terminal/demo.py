@@ -18,7 +18,7 @@ from server_gui.processes.simulated import simulated_robot
 from server_gui.terminal import headless
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.dashboard import Dashboard, save_picture
-from server_gui.terminal.session import Session
+from server_gui.terminal.followed_robot import FollowedRobot
 
 WHOLE_S = 60.0  # for every component to be there
 TICK_S = 0.05
@@ -55,7 +55,7 @@ def run(options: Options) -> int:
             with simulated_robot(folder, options.scenario, ending.check) as (address, check):
                 if options.window:
                     return _window(str(address), options.seconds, folder)
-                with Session(address) as session:
+                with FollowedRobot(address) as session:
                     _view(session, options, str(address), check)
         except Ended as ended:
             return ended.status
@@ -82,7 +82,7 @@ def _folder(wanted: Path | None) -> Iterator[Path]:
         yield Path(made)
 
 
-def _view(session: Session, options: Options, where: str, check: Callable[[], None]) -> None:
+def _view(session: FollowedRobot, options: Options, where: str, check: Callable[[], None]) -> None:
     controls = Controls(session.station)
     if options.headless:
         _wait_whole(session, check)
@@ -102,12 +102,12 @@ def _view(session: Session, options: Options, where: str, check: Callable[[], No
     _picture(options.picture, session, controls, where)
 
 
-def _picture(path: Path | None, session: Session, controls: Controls, where: str) -> None:
+def _picture(path: Path | None, session: FollowedRobot, controls: Controls, where: str) -> None:
     if path is not None:
         save_picture(path, session.station, controls, where)
 
 
-def _wait_whole(session: Session, check: Callable[[], None]) -> None:
+def _wait_whole(session: FollowedRobot, check: Callable[[], None]) -> None:
     deadline = time.monotonic() + WHOLE_S
     while not session.is_whole():
         check()
@@ -122,7 +122,7 @@ def _wait_whole(session: Session, check: Callable[[], None]) -> None:
         time.sleep(TICK_S)
 
 
-def _headless(session: Session, seconds: float | None, check: Callable[[], None]) -> None:
+def _headless(session: FollowedRobot, seconds: float | None, check: Callable[[], None]) -> None:
     summary, robot, processing = session.begin_summary(), session.station.robot, session.station.processing
     began = time.monotonic()
     next_line = began + LINE_S

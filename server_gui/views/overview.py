@@ -15,9 +15,9 @@ from server_gui.core.desk.station import Station
 from server_gui.core.desk.walk import leg_phase
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.units import Unit
-from server_gui.views.foreseen import ACTIVITY, label_text, lines, model_phases
 from server_gui.views.joint_table import JointModel, JointTable
 from server_gui.views.marks import age_text
+from server_gui.views.predictions import ACTIVITY, label_text, lines, model_phases
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.colour_bar import ColourBar

@@ -12,7 +12,7 @@ from gateway.client import ClockOffset, ConnectionState
 from gateway.wire.control import JournalEntries
 from ml.store import Store
 from ml.store.labels import Label
-from server_gui.core.fleet.robot_recording import Keeping
+from server_gui.core.fleet.robot_recording import RobotRecording
 from server_gui.core.follow.events import Described, Journalled, LinkChanged, Telemetry
 from server_gui.core.recording import records
 from server_gui.core.recording.recorder import Recorder, RecorderSettings
@@ -100,7 +100,7 @@ class Server:
         self.recorder = Stepped(self.spool, self.times)
         self.uploader = Uploader(self.spool, self.connect)
         self.links = {name: Link(robot) for name, robot in self.robots.items()}
-        self.keeping = {name: Keeping(name, self.recorder) for name in self.robots}
+        self.keeping = {name: RobotRecording(name, self.recorder) for name in self.robots}
         self._pending, self._lost = [], 0
         for name in self.robots:
             self.link(name)

@@ -16,8 +16,8 @@ from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
-from server_gui.views.foreseen import lines, model_phases, status
 from server_gui.views.main_window import MainWindow
+from server_gui.views.predictions import lines, model_phases, status
 from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait

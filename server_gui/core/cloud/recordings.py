@@ -20,7 +20,7 @@ import pyarrow.dataset
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
 from ml.store.errors import translated
 from ml.store.labels import holding
-from ml.store.later import recorded_order
+from ml.store.precedence import recorded_order
 from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns

@@ -13,7 +13,7 @@ from typing import Final
 from urllib.parse import unquote, urlsplit
 
 from ml.store import durable
-from ml.store.alone import PLACE
+from ml.store.compaction_lock import PLACE
 from ml.store.errors import StoreError, translated
 from ml.store.objects import PIECE_BYTES, Object, Objects
 from ml.store.private import opener, private_folder

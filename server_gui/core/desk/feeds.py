@@ -17,24 +17,24 @@ from gateway.client import Address
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.fleet.collector import Collector, whole
 from server_gui.core.fleet.fleet import Subscriber
-from server_gui.core.fleet.remote_collector import Elsewhere
+from server_gui.core.fleet.remote_collector import RemoteCollector
 from server_gui.core.fleet.stop_links import StopRobot
 from server_gui.core.follow.events import Event, without_processes
-from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News
-from server_gui.core.prediction.news import Foreseen
-from server_gui.core.prediction.service import Predicting
+from server_gui.core.prediction.news import PredictionNews
+from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings
 from server_gui.core.threads.answers import Deliver
-from server_gui.core.threads.supervision import Watch
+from server_gui.core.threads.supervision import ThreadWatch
 
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first
 AGAIN_S: Final = 1.0  # between attempts
 
-Foresee = Callable[[Sequence[Foreseen]], None]  # in the thread that predicts
+Foresee = Callable[[Sequence[PredictionNews]], None]  # in the thread that predicts
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Feeds:
     def __init__(
         self,
         settings: ServerSettings,
-        following: Following,
+        following: FollowSettings,
         record: Record | None,
         show: Subscriber,
         foresee: Foresee,
@@ -73,17 +73,17 @@ class Feeds:
         self._ending = concurrent.futures.ThreadPoolExecutor(1, "ending")
         self._collector, self._why = self._collect()
         self._own: Network | None = None
-        self._elsewhere: Elsewhere | None = None
-        self._predicting: Predicting | None = None
+        self._elsewhere: RemoteCollector | None = None
+        self._predicting: PredictionService | None = None
         if self._collector is not None:
             self.network = self._collector.network
         else:
             self.network = self._own = Network()
-            self._elsewhere = None if record is None else Elsewhere(settings.recorder.spool)
-            self._predicting = Predicting(settings, foresee) if settings.prediction.enabled else None
+            self._elsewhere = None if record is None else RemoteCollector(settings.recorder.spool)
+            self._predicting = PredictionService(settings, foresee) if settings.prediction.enabled else None
         predicting = () if self._predicting is None else self._predicting.workers
-        self.others = Watch(())  # threads of the window itself
-        self._watch = Watch((self.network.worker, *predicting))  # where no collector has one
+        self.others = ThreadWatch(())  # threads of the window itself
+        self._watch = ThreadWatch((self.network.worker, *predicting))  # where no collector has one
 
     def __enter__(self) -> Self:
         for part in (self._collector, self._own, self._predicting):
@@ -111,7 +111,7 @@ class Feeds:
     def recording(self, deliver: Deliver, news: News) -> Recording:
         """What there is to say of who records; `look` keeps it right."""
         keeper = self._collector or self._elsewhere
-        by = {Collector: By.WINDOW, Elsewhere: By.OTHER}.get(type(keeper), By.NOBODY)
+        by = {Collector: By.WINDOW, RemoteCollector: By.OTHER}.get(type(keeper), By.NOBODY)
         return Recording(by, keeper, deliver, news, self._why)
 
     def follow(self, name: str, address: Address) -> None:
@@ -190,7 +190,7 @@ class Feeds:
         self._show(robot, without_processes(event))
 
 
-def shown_and_recorded(shown: Following, recorder: RecordingSettings) -> Following:
+def shown_and_recorded(shown: FollowSettings, recorder: RecordingSettings) -> FollowSettings:
     """What is asked of a robot that the window shows and records: by one link, once."""
     return replace(
         whole(recorder),

@@ -29,9 +29,9 @@ from server_gui.core.follow.events import (
 )
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot import Robot
-from server_gui.core.follow.robot_news import Watch
+from server_gui.core.follow.robot_news import RobotNews
 from server_gui.core.prediction.current import StationPredictions
-from server_gui.core.prediction.news import Foreseen, Ruled
+from server_gui.core.prediction.news import PredictionNews, Ruled
 from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.processing.units import Units
 from server_gui.core.threads.answers import Deliver, Result, when_done
@@ -39,10 +39,10 @@ from server_gui.core.tuning.commands import Commands
 from server_gui.core.tuning.comparison import Comparison
 from server_gui.core.tuning.edits import Change, Edits
 from server_gui.core.tuning.flash import Flash
-from server_gui.core.tuning.lease import Control
+from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
-from server_gui.core.tuning.stop import Stopping
-from server_gui.core.tuning.writing import WriteState, Writing
+from server_gui.core.tuning.stop import StopProgress
+from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 WATCH_NS: Final = 200_000_000  # between looks for news
 OVERDUE_S: Final = 2.0  # after a trial's end its values are looked at again
@@ -62,17 +62,17 @@ class Station:
         self.processes_at_ns: int | None = None
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
-        self.stopping = Stopping()
-        self.control = Control()
+        self.stopping = StopProgress()
+        self.control = LeaseState()
         self.edits = Edits()
-        self.writing = Writing()
+        self.writing = WriteProgress()
         self.file: Comparison | None = None  # what its parameters are compared with
         self.audit = Audit()
         self.flash = Flash(self.audit)
         self._commands = commands
         self._deliver = deliver
         self._news = news
-        self._watch = Watch(self.tell)
+        self._watch = RobotNews(self.tell)
         self._watched_ns = 0
 
     @property
@@ -159,7 +159,7 @@ class Station:
             snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
             self.processing.apply(dataclasses.replace(event, snapshot=snapshot))
 
-    def foresee(self, news: Foreseen) -> None:
+    def foresee(self, news: PredictionNews) -> None:
         """Apply what models say of this robot."""
         self.predictions.take(news)
         if isinstance(news, Ruled):

@@ -19,18 +19,18 @@ from ml.store import Store
 from server_gui.core.fleet.control_socket import Answers, door
 from server_gui.core.fleet.fleet import Fleet, Subscriber
 from server_gui.core.fleet.link_statistics import LinkReport
-from server_gui.core.fleet.live_prediction import Foresee, Foreseeing
+from server_gui.core.fleet.live_prediction import RecordedPrediction, TellPredictions
 from server_gui.core.fleet.stop_links import StopLinks, StopRobot
-from server_gui.core.follow.feed import ONCE, Following
+from server_gui.core.follow.feed import ONCE, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.prediction.state import PredictingState
-from server_gui.core.recording.compaction import Compacting
+from server_gui.core.recording.compaction import Compaction
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader, UploaderState
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings, Upload
-from server_gui.core.threads.supervision import Trouble, Watch
+from server_gui.core.threads.supervision import ThreadWatch, Trouble
 
 log = logging.getLogger(__name__)
 
@@ -75,9 +75,9 @@ class Collector:
         settings: ServerSettings,
         operator: str = "",
         notes: str = "",
-        following: Following | None = None,
+        following: FollowSettings | None = None,
         subscribers: Iterable[Subscriber] = (),
-        foresee: Foresee | None = None,
+        foresee: TellPredictions | None = None,
         stop: StopRobot | None = None,
     ) -> None:
         self.hangs = False
@@ -88,36 +88,38 @@ class Collector:
         self._spool = Spool(recorder.spool)
         self.network = Network()
         store, every_s = settings.store, settings.store.compact_s
-        compacting = None if every_s is None else Compacting(store.url, self._spool.folder, every_s)
+        compacting = None if every_s is None else Compaction(store.url, self._spool.folder, every_s)
         self._uploader = Uploader(self._spool, lambda: connect(store), self._wanted, compacting)
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
         self._fleet = Fleet(following or whole(recorder), self._recorder, operator, notes)
         self._stop_links = StopLinks(self.network, settings.rules if stop is None else ())
-        self._foreseeing = (
-            Foreseeing(settings, self._recorder, self._fleet.session, stop or self._stop_links.stop, foresee)
+        self._prediction = (
+            RecordedPrediction(
+                settings, self._recorder, self._fleet.session, stop or self._stop_links.stop, foresee
+            )
             if settings.prediction.enabled
             else None
         )
-        if self._foreseeing is not None:
-            self._fleet.subscribers.append(self._foreseeing.take)
+        if self._prediction is not None:
+            self._fleet.subscribers.append(self._prediction.take)
         self._fleet.subscribers.extend(subscribers)
         self._running: concurrent.futures.Future[None] | None = None
-        predicting = () if self._foreseeing is None else self._foreseeing.workers
+        predicting = () if self._prediction is None else self._prediction.workers
         workers = (self.network.worker, self._recorder.worker, self._uploader.worker, *predicting)
-        self.watch = Watch(workers)
+        self.watch = ThreadWatch(workers)
 
     def __enter__(self) -> Self:
         self._uploader.__enter__()
         self._recorder.__enter__()
         self.network.__enter__()
-        if self._foreseeing is not None:
-            self._foreseeing.__enter__()
+        if self._prediction is not None:
+            self._prediction.__enter__()
         self._running = self.network.run(self._run())
         return self
 
     def __exit__(self, *exc: object) -> None:
-        if self._foreseeing is not None:
-            self._foreseeing.__exit__()
+        if self._prediction is not None:
+            self._prediction.__exit__()
         self.network.__exit__()
         self._disk.shutdown()
         self._recorder.close()
@@ -229,13 +231,13 @@ class Collector:
             recorder=self._recorder.state,
             uploader=self._uploader.state,
             threads=self.watch.look(),
-            prediction=None if self._foreseeing is None else self._foreseeing.state,
+            prediction=None if self._prediction is None else self._prediction.state,
         )
 
 
-def whole(recorder: RecordingSettings) -> Following:
+def whole(recorder: RecordingSettings) -> FollowSettings:
     """What is asked of each robot: everything that the store has a table for."""
-    return Following(
+    return FollowSettings(
         client="gwrms collect",
         channels=recorder.channels,
         rate_hz=recorder.rate_hz,

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from gateway.client import Address
-from server_gui.core.fleet.link_log import Saying
+from server_gui.core.fleet.link_log import LinkLog
 from server_gui.core.fleet.link_statistics import LinkReport, LinkStatistics
-from server_gui.core.fleet.robot_recording import Keeping
+from server_gui.core.fleet.robot_recording import RobotRecording
 from server_gui.core.follow.events import Event
-from server_gui.core.follow.feed import Feed, Following, Tell
+from server_gui.core.follow.feed import Feed, FollowSettings, Tell
 from server_gui.core.recording.recorder import Recorder
 
 log = logging.getLogger(__name__)
@@ -28,14 +28,14 @@ class Member:
         self,
         robot: str,
         address: Address,
-        following: Following,
-        keeping: Keeping,
+        following: FollowSettings,
+        keeping: RobotRecording,
         others: Sequence[Tell],
     ) -> None:
         self.statistics = LinkStatistics(address)
         self._robot = robot
         self._keeping = keeping
-        subscribers = [keeping.take, self.statistics.take, Saying(robot, address).take, *others]
+        subscribers = [keeping.take, self.statistics.take, LinkLog(robot, address).take, *others]
         self._feed = functools.partial(Feed, address, subscribers, following)
 
     async def run(self) -> None:
@@ -63,7 +63,9 @@ class Fleet:
     For the network's thread, but for `robots`, `session` and `newest_ns`.
     """
 
-    def __init__(self, following: Following, recorder: Recorder, operator: str = "", notes: str = "") -> None:
+    def __init__(
+        self, following: FollowSettings, recorder: Recorder, operator: str = "", notes: str = ""
+    ) -> None:
         self.subscribers: list[Subscriber] = []  # of the robots that join from now on
         self._following = following
         self._recorder = recorder
@@ -80,7 +82,7 @@ class Fleet:
 
     def follow(self, robot: str, address: Address) -> None:
         """Another robot, from now on."""
-        keeping = Keeping(robot, self._recorder, self._operator, self._notes)
+        keeping = RobotRecording(robot, self._recorder, self._operator, self._notes)
         others = [functools.partial(subscriber, robot) for subscriber in self.subscribers]
         member = Member(robot, address, self._following, keeping, others)
         self._members = self._members | {robot: member}

@@ -8,7 +8,7 @@ from server_gui.core.follow.events import Described, Event, Failed, LinkChanged,
 log = logging.getLogger(__name__)
 
 
-class Saying:
+class LinkLog:
     """One robot's lines. What goes on as it was, such as a robot that stays away, is not said again."""
 
     def __init__(self, robot: str, address: Address) -> None:

@@ -10,8 +10,8 @@ import msgspec
 
 from gateway.wire.stop import Stopped
 from server_gui.core.fleet.stop_links import StopRobot
-from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
-from server_gui.core.prediction.service import Predicting
+from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled
+from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.rows import Record
@@ -19,11 +19,11 @@ from server_gui.core.settings.server_file import ServerSettings
 
 log = logging.getLogger(__name__)
 
-Foresee = Callable[[Sequence[Foreseen]], None]
+TellPredictions = Callable[[Sequence[PredictionNews]], None]
 
 
-class Foreseeing(Predicting):
-    """`Predicting`, for robots that are recorded; `show` is told of everything afterwards.
+class RecordedPrediction(PredictionService):
+    """`PredictionService`, for robots that are recorded; `show` is told of everything afterwards.
 
     `session` says what a robot's recording is called; `stop` stops a robot.
     """
@@ -34,7 +34,7 @@ class Foreseeing(Predicting):
         recorder: Recorder,
         session: Callable[[str], str],
         stop: StopRobot,
-        show: Foresee | None = None,
+        show: TellPredictions | None = None,
     ) -> None:
         super().__init__(settings, self._keep, self._ask_to_stop)
         self._recorder = recorder
@@ -42,7 +42,7 @@ class Foreseeing(Predicting):
         self._stop_robot = stop
         self._show = show
 
-    def _keep(self, news: Sequence[Foreseen]) -> None:
+    def _keep(self, news: Sequence[PredictionNews]) -> None:
         rows = [record(self._session(one.robot), one) for one in news if isinstance(one, Predicted)]
         if rows:
             self._recorder.add(*rows)

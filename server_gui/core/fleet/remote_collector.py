@@ -10,7 +10,7 @@ from server_gui.core.fleet.control_socket import ANSWER_S, ask
 from server_gui.core.threads.background import Background
 
 
-class Elsewhere:
+class RemoteCollector:
     """Whoever records into this spool; futures fail with `NobodyCollects` where nobody does."""
 
     def __init__(self, spool: Path) -> None:

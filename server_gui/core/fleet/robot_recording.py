@@ -20,7 +20,7 @@ from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 
 
-class Keeping:
+class RobotRecording:
     """One robot's recording, in the network's thread.
 
     A session lasts over dropped links, for as long as the robot's boot, configuration and software stay the

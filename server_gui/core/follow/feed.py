@@ -35,7 +35,7 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
-from server_gui.core.follow.validation import Arriving, Unfit, journal
+from server_gui.core.follow.validation import Unfit, Validator, journal
 
 Tell = Callable[[Event], None]
 
@@ -46,7 +46,7 @@ WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
 COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
 
 
-class Following(Struct, frozen=True):
+class FollowSettings(Struct, frozen=True):
     """What is asked of a robot, how often, and in whose name; `channels` and `parameters` are globs.
 
     What of them this robot does not have is left out. `rate_hz` 0 gives every source's own samples.
@@ -69,12 +69,12 @@ class Feed:
     one event those before come before those after.
     """
 
-    def __init__(self, address: Address, subscribers: Sequence[Tell], following: Following) -> None:
+    def __init__(self, address: Address, subscribers: Sequence[Tell], following: FollowSettings) -> None:
         self._subscribers = subscribers
         self._following = following
         self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
         self._backoff = Backoff()
-        self._arriving = Arriving()
+        self._arriving = Validator()
         self._dropped = asyncio.Event()
         self._newest_entry: dict[str, Any] = {"n": 0}
 

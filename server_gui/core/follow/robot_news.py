@@ -16,7 +16,7 @@ LINK_WORDS: Final = {
 }
 
 
-class Watch:
+class RobotNews:
     """Compares a robot with how it was at the last look; says each change once."""
 
     def __init__(self, tell: Tell) -> None:

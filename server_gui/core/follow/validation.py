@@ -38,7 +38,7 @@ class Unfit(ProtocolError):
     """What a robot has sent cannot be kept; says what, and where."""
 
 
-class Arriving:
+class Validator:
     """What one robot may send, by what it has sent before; for the thread that follows it."""
 
     def __init__(self) -> None:

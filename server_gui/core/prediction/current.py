@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from ml.serving.predictor import Prediction
-from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
+from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.settings.prediction import RuleSettings
 
 STALE_S: Final = 2.0  # what is older is no longer so
@@ -90,7 +90,7 @@ class StationPredictions:
         """Those that hold now, the newest last."""
         return tuple(self._rules.values())
 
-    def take(self, news: Foreseen) -> None:
+    def take(self, news: PredictionNews) -> None:
         """Take one fact."""
         self.revision += 1
         match news:

@@ -10,13 +10,13 @@ from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from ml.robot.groups import GROUPS
 from server_gui.core.follow.events import LinkChanged
-from server_gui.core.follow.feed import ONCE, Feed, Following, Tell
+from server_gui.core.follow.feed import ONCE, Feed, FollowSettings, Tell
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.robot import Robot
 from server_gui.core.prediction.current import StationPredictions
-from server_gui.core.prediction.news import Foreseen
-from server_gui.core.prediction.service import Predicting
+from server_gui.core.prediction.news import PredictionNews
+from server_gui.core.prediction.service import PredictionService
 from server_gui.core.settings.server_file import ServerSettings
 
 MOST: Final = 10_000  # foreseen, that wait for nobody
@@ -36,7 +36,7 @@ class Live:
     def __init__(self, settings: ServerSettings, robots: Mapping[str, Address]) -> None:
         self.robots = {name: Watched() for name in robots}
         self._addresses = robots
-        self._following = Following(
+        self._following = FollowSettings(
             "gwrms predict",
             channels=tuple(name for group in GROUPS.values() for name in group),
             parameters=(),
@@ -45,11 +45,11 @@ class Live:
             resources=ResourceSnapshotParams(processes=False),
             resources_s=ONCE,
         )
-        self._foreseen: collections.deque[Foreseen] = collections.deque(maxlen=MOST)
+        self._foreseen: collections.deque[PredictionNews] = collections.deque(maxlen=MOST)
         self._mailboxes = {name: Mailbox() for name in robots}
         self._network = Network()
         self._came = threading.Event()
-        self._predicting = Predicting(settings, self._foresee)
+        self._predicting = PredictionService(settings, self._foresee)
 
     def __enter__(self) -> Self:
         self._predicting.__enter__()
@@ -66,7 +66,7 @@ class Live:
         self._network.__exit__(*exc)
         self._predicting.__exit__(*exc)
 
-    def look(self, within_s: float) -> Sequence[Foreseen]:
+    def look(self, within_s: float) -> Sequence[PredictionNews]:
         """Wait so long for something to be foreseen, and apply what has come; all that was foreseen since."""
         self._came.wait(within_s)
         self._came.clear()
@@ -80,6 +80,6 @@ class Live:
             self.robots[one.robot].predictions.take(one)
         return found
 
-    def _foresee(self, news: Sequence[Foreseen]) -> None:
+    def _foresee(self, news: Sequence[PredictionNews]) -> None:
         self._foreseen.extend(news)
         self._came.set()

@@ -16,7 +16,7 @@ from ml.registry.card import Card, check_robot
 from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
-from server_gui.core.threads.polling import Looking
+from server_gui.core.threads.polling import Polling
 from server_gui.core.threads.supervision import Worker
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Model:
     learned: Learned
 
 
-class Serving:
+class ModelLoader:
     """The models of every robot that `robot` named; use it as a context manager, which ends its thread."""
 
     def __init__(self, store_url: str, poll_s: float) -> None:
@@ -54,7 +54,7 @@ class Serving:
         self._chosen_for: Mapping[str, dict[str, str]] = {}  # the robots at the newest look
         self._seen: Any = None  # what should serve then, and the files of what was refused
         self._retry_s = math.inf  # when that is tried again, on our monotonic clock
-        self._looking = Looking("models", self._look, poll_s, BREAK_OFF_S)
+        self._looking = Polling("models", self._look, poll_s, BREAK_OFF_S)
 
     @property
     def worker(self) -> Worker:

@@ -59,4 +59,4 @@ class Serves:
     why: Mapping[str, str]
 
 
-Foreseen = Predicted | Ruled | Serves
+PredictionNews = Predicted | Ruled | Serves

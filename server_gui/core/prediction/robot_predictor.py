@@ -10,7 +10,7 @@ from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.follow.events import Described, Event, Telemetry
 from server_gui.core.prediction.model_loading import Model
-from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
+from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rules import Rule
 from server_gui.core.prediction.state import Quality
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
@@ -55,7 +55,7 @@ class Watched:
 
     def predicted(
         self, robot: str, clock: "Clock", quality: Quality | None, predictions: Sequence[Prediction]
-    ) -> Iterator[Foreseen]:
+    ) -> Iterator[PredictionNews]:
         """What these predictions, of what was due, say; `quality` is how right the model was of late."""
         samples = [window.samples[0, :, -1] for window in self.due]
         self.due = []
@@ -99,7 +99,7 @@ class Clock:
         return time.monotonic_ns() + self.offset_ns - stamp_ns if self.known else None
 
 
-class Following:
+class RobotPredictor:
     """One robot, for the thread that predicts."""
 
     def __init__(self, robot: str, settings: PredictionSettings, rules: Iterable[RuleSettings]) -> None:

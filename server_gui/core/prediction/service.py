@@ -11,11 +11,11 @@ from ml.robot.task import TASKS
 from ml.serving.predictor import judged
 from server_gui.core.follow.events import Event
 from server_gui.core.prediction.inbox import Inbox
-from server_gui.core.prediction.model_loading import Model, Serving
-from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
-from server_gui.core.prediction.robot_predictor import Following, Watched
+from server_gui.core.prediction.model_loading import Model, ModelLoader
+from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled
+from server_gui.core.prediction.robot_predictor import RobotPredictor, Watched
 from server_gui.core.prediction.state import PredictingState, TaskReport
-from server_gui.core.prediction.track_record_updates import Tracking
+from server_gui.core.prediction.track_record_updates import TrackRecordUpdates
 from server_gui.core.settings.prediction import Action
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.supervision import BEAT_S, Worker
@@ -28,7 +28,7 @@ STILL_S: Final = 1.0  # what is due of one model, and the rows of all robots, ta
 BROKEN: Final = "it cannot be used: internal error, "
 
 
-class Predicting:
+class PredictionService:
     """Predicts from entering to leaving; use it as a context manager, which joins its threads.
 
     `take` gets everything that the robots' feeds tell. `tell` gets the news, and before that `stop` what asks
@@ -39,16 +39,18 @@ class Predicting:
     def __init__(
         self,
         settings: ServerSettings,
-        tell: Callable[[Sequence[Foreseen]], None],
+        tell: Callable[[Sequence[PredictionNews]], None],
         stop: Callable[[Ruled], None] | None = None,
     ) -> None:
         self._settings = settings
         self._tell = tell
         self._stop = stop
-        self._serving = Serving(settings.store.url, settings.prediction.poll_s)
-        self._tracking = Tracking(settings.store.url, lambda: {robot for robot, _ in self._serving.models})
+        self._serving = ModelLoader(settings.store.url, settings.prediction.poll_s)
+        self._tracking = TrackRecordUpdates(
+            settings.store.url, lambda: {robot for robot, _ in self._serving.models}
+        )
         self._inbox = Inbox()
-        self._robots: dict[str, Following] = {}
+        self._robots: dict[str, RobotPredictor] = {}
         self._broken: dict[str, str] = {}  # models, and why
         self._judged = 0
         self._skipped = 0
@@ -120,7 +122,7 @@ class Predicting:
     def _follow(self, robot: str, events: "collections.deque[Event]") -> None:
         known = self._robots.get(robot)
         if known is None:
-            known = Following(robot, self._settings.prediction, self._settings.rules)
+            known = RobotPredictor(robot, self._settings.prediction, self._settings.rules)
             self._robots[robot] = known
         self._serve(known)
         try:
@@ -131,7 +133,7 @@ class Predicting:
         if known.units:
             self._serving.robot(robot, known.units)
 
-    def _serve(self, robot: Following) -> None:
+    def _serve(self, robot: RobotPredictor) -> None:
         """Give a robot the models that serve it now, but for those that broke."""
         models, why = _of(robot.robot, self._serving.models), _of(robot.robot, self._serving.why)
         broken = {
@@ -146,9 +148,9 @@ class Predicting:
         if news is not None and (whole or news.why):
             self._tell([news])
 
-    def _due(self) -> Iterator[tuple[Model, list[tuple[Following, Watched]]]]:
+    def _due(self) -> Iterator[tuple[Model, list[tuple[RobotPredictor, Watched]]]]:
         """What is due, by model: robots that have the same one are judged together."""
-        found: dict[str, tuple[Model, list[tuple[Following, Watched]]]] = {}
+        found: dict[str, tuple[Model, list[tuple[RobotPredictor, Watched]]]] = {}
         for robot in self._robots.values():
             for watched in robot.tasks.values():
                 if watched.due:
@@ -157,7 +159,7 @@ class Predicting:
                     found.setdefault(model.card.id, (model, []))[1].append((robot, watched))
         yield from found.values()
 
-    def _judge(self, model: Model, due: Sequence[tuple[Following, Watched]]) -> list[Foreseen]:
+    def _judge(self, model: Model, due: Sequence[tuple[RobotPredictor, Watched]]) -> list[PredictionNews]:
         """What a model says of everything that is due; a model that breaks ends nothing but itself."""
         windows = [window for _, watched in due for window in watched.due]
         try:
@@ -166,7 +168,7 @@ class Predicting:
             log.exception("the model %s breaks; it serves no more", model.card.id)
             self._broken[model.card.id] = f"{model.card.id}: {BROKEN}{type(error).__name__}"
             return []
-        news: list[Foreseen] = []
+        news: list[PredictionNews] = []
         for robot, watched in due:
             own = [next(predictions) for _ in watched.due]
             quality = self._tracking.quality(robot.robot, model.card)
@@ -180,7 +182,7 @@ def _of(robot: str, found: Mapping[tuple[str, str], Thing]) -> dict[str, Thing]:
     return {task: found[robot, task] for task in TASKS if (robot, task) in found}
 
 
-def _reports(robot: Following) -> dict[str, TaskReport]:
+def _reports(robot: RobotPredictor) -> dict[str, TaskReport]:
     newest = {task: watched.newest for task, watched in robot.tasks.copy().items()}
     return {task: _report(known) for task, known in newest.items() if known is not None}
 

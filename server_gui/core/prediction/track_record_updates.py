@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Self
 from ml.registry.card import Card
 from ml.store import NoSuchTable, StoreError
 from server_gui.core.prediction.state import Figures, Quality
-from server_gui.core.threads.polling import Looking
+from server_gui.core.threads.polling import Polling
 from server_gui.core.threads.supervision import Worker
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ EVERY_S: Final = 60.0
 BREAK_OFF_S: Final = 5.0
 
 
-class Tracking:
+class TrackRecordUpdates:
     """The track record of the robots that `robots` tells; use it as a context manager: it ends its thread."""
 
     def __init__(self, store_url: str, robots: Callable[[], Set[str]]) -> None:
@@ -29,7 +29,7 @@ class Tracking:
         self._url = store_url
         self._robots = robots
         self._record: TrackRecord | None = None
-        self._looking = Looking("track record", self._look, EVERY_S, BREAK_OFF_S)
+        self._looking = Polling("track record", self._look, EVERY_S, BREAK_OFF_S)
         self.wake = self._looking.wake  # look now; from any thread
 
     @property

@@ -47,7 +47,7 @@ class Notification:
 Timed = tuple[Batch, int]  # and UTC minus the robot's monotonic clock
 
 
-class Gathering:
+class Batching:
     """One robot's telemetry between two commits, and what its connection is called.
 
     The connection id is made here, anew for every link, so that a row is named once in the world whatever

@@ -20,7 +20,7 @@ END_S: Final = 5.0
 COMMAND: Final = ("-P", "-m", "gateway.main", "cloud", "compact", "--json")
 
 
-class Compacting:
+class Compaction:
     """Runs `gwrms cloud compact` every so often, for one thread; in `folder` it notes when it last has."""
 
     def __init__(self, url: str, folder: Path, every_s: float) -> None:

@@ -10,23 +10,23 @@ Entry = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class News:
+class NewEntries:
     """Entries that follow the head; `missing` were written in between and can no longer be seen."""
 
     entries: Sequence[Entry]
     missing: int
 
 
-def news(entries: Sequence[Entry], head: JournalHead | None) -> News:
+def news(entries: Sequence[Entry], head: JournalHead | None) -> NewEntries:
     """What a tail (oldest first) says that was not known up to `head`.
 
     A journal that does not hold the head, though it should, has been begun anew: then all of it is news.
     """
     if head is None or not entries:
-        return News(entries, 0)
+        return NewEntries(entries, 0)
     first = entries[0]["n"]
     if first > head.n:
-        return News(entries, first - head.n - 1)
+        return NewEntries(entries, first - head.n - 1)
     later = [entry for entry in entries if entry["n"] > head.n]
     same = any(entry["n"] == head.n and entry["hash"] == head.hash for entry in entries)
-    return News(later if same else entries, 0)
+    return NewEntries(later if same else entries, 0)

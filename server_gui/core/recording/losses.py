@@ -13,7 +13,7 @@ _ANY: Final = ""  # nobody knows of which table
 
 
 @dataclass(slots=True)
-class Lost:
+class Loss:
     """So many rows, between two times where these are known; ns, UTC."""
 
     rows: int = 0
@@ -30,7 +30,7 @@ class Losses:
     """All that was lost and that no event tells yet; a robot "" is nobody knows whose."""
 
     def __init__(self) -> None:
-        self._found: dict[str, dict[str, Lost]] = defaultdict(lambda: defaultdict(Lost))
+        self._found: dict[str, dict[str, Loss]] = defaultdict(lambda: defaultdict(Loss))
 
     @property
     def rows(self) -> int:
@@ -53,10 +53,10 @@ class Losses:
         if rows:
             self._found[robot][_ANY].add(rows, [utc_ns])
 
-    def robots(self) -> Iterator[tuple[str, Lost, str]]:
+    def robots(self) -> Iterator[tuple[str, Loss, str]]:
         """Each robot with all that it has lost, and that in words."""
         for robot, tables in self._found.items():
-            whole = Lost()
+            whole = Loss()
             for lost in tables.values():
                 whole.add(lost.rows, lost.times_ns)
             yield robot, whole, "; ".join(_told(table, lost) for table, lost in tables.items())
@@ -70,14 +70,14 @@ class Losses:
         for robot, table, lost in others.each():
             self._found[robot][table].add(lost.rows, lost.times_ns)
 
-    def each(self) -> Iterator[tuple[str, str, Lost]]:
+    def each(self) -> Iterator[tuple[str, str, Loss]]:
         """Robot, table, and what is lost of that."""
         for robot, tables in self._found.items():
             for table, lost in tables.items():
                 yield robot, table, lost
 
 
-def _told(table: str, lost: Lost) -> str:
+def _told(table: str, lost: Loss) -> str:
     rows = "1 row" if lost.rows == 1 else f"{lost.rows} rows"
     of = f" of {table}" if table else ""
     span = ", {} to {}".format(*map(told_time, lost.times_ns)) if lost.times_ns else ""

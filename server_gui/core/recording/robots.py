@@ -8,10 +8,10 @@ from gateway.wire.robot import Description
 from ml.store.tables import PREDICTIONS
 from server_gui.core.follow import validation
 from server_gui.core.recording import records
-from server_gui.core.recording.batching import EventKind, Gathering, Notification
+from server_gui.core.recording.batching import Batching, EventKind, Notification
 from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.journal_tail import Entry, news
-from server_gui.core.recording.losses import Lost
+from server_gui.core.recording.losses import Loss
 from server_gui.core.recording.records import Facts, Session
 from server_gui.core.recording.rows import JournalHead, Record, Run
 
@@ -26,7 +26,7 @@ class Robots:
 
     def __init__(self, heads: Mapping[str, JournalHead]) -> None:
         self.heads = dict(heads)
-        self._robots: dict[str, Gathering] = {}
+        self._robots: dict[str, Batching] = {}
         self._sessions: dict[str, Session] = {}
         self._before: dict[
             str, tuple[str, int | None]
@@ -38,12 +38,12 @@ class Robots:
         """The rows of all robots since the last time."""
         return [run for robot in self._robots.values() for run in robot.runs()]
 
-    def known(self, robot: str) -> Gathering:
+    def known(self, robot: str) -> Batching:
         """One robot; a new one is known from now on."""
-        return self._robots.setdefault(robot, Gathering(robot))
+        return self._robots.setdefault(robot, Batching(robot))
 
     def take(self, robot: str, new: Notification) -> Iterable[Record]:
-        """Keep a notification; where there is no session it begins one. Raises as `Gathering.take`."""
+        """Keep a notification; where there is no session it begins one. Raises as `Batching.take`."""
         known = self.known(robot)
         known.check(new)  # else a session would have begun of which nobody is told
         begun = [] if known.session else self.begin(records.begin(robot, Facts(units=known.units)))
@@ -144,10 +144,10 @@ class Robots:
         if robot in kept:
             self.heads[robot] = kept[robot]
 
-    def lost(self, whose: str, lost: Lost, what: str) -> list[Record]:
+    def lost(self, whose: str, lost: Loss, what: str) -> list[Record]:
         """That rows were lost here; of nobody knows whom: told in the recording of every robot there is."""
         now = Moment.now()
-        known = [self.known(whose)] if whose else [*self._robots.values()] or [Gathering("")]
+        known = [self.known(whose)] if whose else [*self._robots.values()] or [Batching("")]
         text = f"this server lost rows of {whose or 'all its robots'}: {what}"
         data = {"rows": lost.rows} | dict(zip(("from", "to"), lost.times_ns, strict=False))
         return [robot.now(EventKind.LOST, text, now, **data) for robot in known]

@@ -14,7 +14,7 @@ import msgspec
 
 from gateway.cli.text import counted
 from ml.store import durable
-from ml.store.later import opened_us
+from ml.store.precedence import opened_us
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.receipts import LOST, RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
@@ -331,7 +331,7 @@ class Spool:
         self.notices.append(text)
 
     def _name(self) -> str:
-        """See `writer`, and ml/store/later.py."""
+        """See `writer`, and ml/store/precedence.py."""
         newest = self.receipts.newest()
         known = max(map(opened_us, [*self._writers, *([newest.writer] if newest else [])]))
         return f"{self.id}/{max(time.time_ns() // 1000, known + 1):016}-{uuid.uuid4().hex[:12]}"

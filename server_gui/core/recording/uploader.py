@@ -13,7 +13,7 @@ from gateway.cli.text import counted
 from gateway.client.backoff import Backoff
 from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.store import Store
-from server_gui.core.recording.compaction import Compacting
+from server_gui.core.recording.compaction import Compaction
 from server_gui.core.recording.errors import Damaged, RecordingError
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, lost_batches, send
@@ -54,7 +54,7 @@ class Uploader:
         spool: Spool,
         connect: Callable[[], Store],
         wanted: Callable[[], bool] = lambda: True,
-        compacting: Compacting | None = None,
+        compacting: Compaction | None = None,
     ) -> None:
         self.state = UploaderState(lost=(spool.missing,) if spool.missing else ())
         self._spool = spool

@@ -9,7 +9,7 @@ from server_gui.core.threads.supervision import Worker
 LOOK_S: Final = 600.0  # a look takes less
 
 
-class Looking:
+class Polling:
     """Calls `look` at once, then every `every_s` and after each `wake`; use it as a context manager.
 
     What hangs in a look holds leaving up for no longer than `break_off_s`; then it ends with the process.

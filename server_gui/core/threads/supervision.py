@@ -1,8 +1,8 @@
 """The one place that watches over this program's threads: one that dies or stands still is an alarm.
 
-A `Worker` is a thread that says again and again that it moves; `Watch.look` is called a few times a second by
-whoever waits anyway. Each trouble is said once in the log, stays for the screen and the status command, and
-goes when it is over.
+A `Worker` is a thread that says again and again that it moves; `ThreadWatch.look` is called a few times a
+second by whoever waits anyway. Each trouble is said once in the log, stays for the screen and the status
+command, and goes when it is over.
 """
 
 import logging
@@ -114,7 +114,7 @@ class Worker:
             log.exception("the thread %s has died", self.name)
 
 
-class Watch:
+class ThreadWatch:
     """Looks after workers; `look` may be called from any thread, and as often as one likes."""
 
     def __init__(self, workers: Iterable[Worker]) -> None:

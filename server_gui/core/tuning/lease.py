@@ -7,7 +7,7 @@ from gateway.wire.control import Lease
 
 
 @dataclass(slots=True)
-class Control:
+class LeaseState:
     """The lease as far as we know it; it ends by itself, with its link, or when given back."""
 
     until_ns: int | None = None

@@ -15,7 +15,7 @@ from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import Costs, Failed, Resources
 from server_gui.core.follow.feed import Tell
 from server_gui.core.follow.network import Network
-from server_gui.core.follow.validation import Arriving
+from server_gui.core.follow.validation import Validator
 
 LEASE_S: Final = 300.0  # the longest that a robot gives; every write begins it anew
 PROCESSES_S: Final = 1.0  # between looks at the process table, while it is shown
@@ -43,7 +43,7 @@ class Link:
         self._dropped = dropped
         self._processes = processes
         self._client = Client(address, LinkSettings(client=client), self._state_changed)
-        self._arriving = Arriving()
+        self._arriving = Validator()
         self._processes_wanted = asyncio.Event()
 
     async def run(self) -> None:

@@ -17,7 +17,7 @@ class StopState(Enum):
 
 
 @dataclass(slots=True)
-class Stopping:
+class StopProgress:
     """One robot's latest STOP; a newer one counts, whatever an older one is answered with."""
 
     state: StopState = StopState.IDLE

@@ -47,7 +47,7 @@ class Trial:
 
 
 @dataclass(slots=True)
-class Writing:
+class WriteProgress:
     """One robot's writes; `rows` says of each parameter what came of the latest write to it."""
 
     state: WriteState = WriteState.IDLE

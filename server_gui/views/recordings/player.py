@@ -21,8 +21,8 @@ from server_gui.core.archive.playback import SPEEDS
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import as_time
-from server_gui.views.foreseen import status
 from server_gui.views.overview import Overview
+from server_gui.views.predictions import status
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
 from server_gui.views.signals import Signals

@@ -23,7 +23,7 @@ TOKENS = (
     b'"__loader__": "ObjectNode"',
     b"[[[[",
 )
-MODULES = ("ml.registry.archive", "ml.registry.sound")
+MODULES = ("ml.registry.archive", "ml.registry.tree_checks")
 _ARRAY = (
     bytes.fromhex("934e554d50590100") + b"\x76\0{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }"
 )

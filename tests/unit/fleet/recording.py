@@ -11,14 +11,14 @@ from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from server_gui.core.fleet.fleet import Fleet
 from server_gui.core.follow.events import Event
-from server_gui.core.follow.feed import ONCE, Following
+from server_gui.core.follow.feed import ONCE, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.rows import Record, Run
 from server_gui.core.recording.spool import Spool
 from tests.support.waiting import until
 
-FOLLOWING = Following(
+FOLLOWING = FollowSettings(
     "test",
     channels=("*",),
     rate_hz=100.0,
@@ -97,7 +97,7 @@ class Recording:
 
 @contextlib.contextmanager
 def recording(
-    folder: Path, robots: Mapping[str, str], following: Following = FOLLOWING, **facts: str
+    folder: Path, robots: Mapping[str, str], following: FollowSettings = FOLLOWING, **facts: str
 ) -> Iterator[Recording]:
     """Follow these robots (name → address) and record them into `folder`."""
     shown: list[tuple[str, Event]] = []

@@ -23,7 +23,7 @@ from server_gui.core.settings.server_file import (
     ServerSettings,
     StoreSettings,
 )
-from server_gui.core.threads.supervision import STILL_S, Trouble, Watch, Worker
+from server_gui.core.threads.supervision import STILL_S, ThreadWatch, Trouble, Worker
 from tests.fake_robot import FakeRobot
 from tests.support.waiting import WAIT_S, until
 
@@ -39,7 +39,7 @@ def test_a_thread_that_dies_is_said_begun_anew_and_said_to_be_so(caplog: pytest.
             worker.beat()
 
     worker = Worker("recorder", run)
-    watch = Watch([worker])
+    watch = ThreadWatch([worker])
     worker.start()
     until(lambda: watch.look() and len(began) == 2)
     (trouble,) = watch.look()
@@ -53,7 +53,7 @@ def test_a_thread_that_dies_is_said_begun_anew_and_said_to_be_so(caplog: pytest.
 
 def test_a_thread_that_dies_again_and_again_does_not_work() -> None:
     worker = Worker("recorder", lambda: None)
-    watch = Watch([worker])
+    watch = ThreadWatch([worker])
     worker.start()
     until(lambda: any(not trouble.works for trouble in watch.look()))
     assert "2 times" in watch.look()[0].text
@@ -68,7 +68,7 @@ def test_a_thread_that_waits_as_long_as_it_takes_does_not_stand_still_but_its_de
         ending.wait(WAIT_S)
 
     worker = Worker("stop keys", run, math.inf)
-    watch = Watch(())
+    watch = ThreadWatch(())
     watch.add(worker)
     worker.start()
     time.sleep(STILL_S + 0.3)
@@ -90,7 +90,7 @@ def test_a_thread_that_stands_still_is_said_within_a_second_and_over_when_it_mov
             worker.beat()
 
     worker = Worker("recorder", run)
-    watch = Watch([worker])
+    watch = ThreadWatch([worker])
     worker.start()
     until(watch.look)
     assert STILL_S < 1.0
@@ -179,7 +179,7 @@ def test_what_was_in_hand_when_the_recorder_died_is_counted_as_lost(
         raise SystemExit
 
     with Spool(tmp_path, reserve_bytes=0) as spool, Recorder(spool) as recorder:
-        watch = Watch([recorder.worker])
+        watch = ThreadWatch([recorder.worker])
         monkeypatch.setattr(recorder, "_turn", die)
         recorder.mark("exo-01", "now")
         until(watch.look)

@@ -19,8 +19,8 @@ from ml.registry.code import features_hash, versions
 from ml.registry.registry import Registry
 from ml.robot.learned import Learned
 from server_gui.core.follow.events import Described, Telemetry
-from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
-from server_gui.core.prediction.service import Predicting
+from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled
+from server_gui.core.prediction.service import PredictionService
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 from server_gui.core.settings.server_file import ServerSettings, StoreSettings
 from tests.fake_robot import FakeRobot
@@ -89,13 +89,13 @@ def settings(url: str, *rules: RuleSettings) -> ServerSettings:
 class Told:
     """What prediction has told, for a test to wait for."""
 
-    news: list[Foreseen] = field(default_factory=list)
+    news: list[PredictionNews] = field(default_factory=list)
     stops: list[Ruled] = field(default_factory=list)
     stopped_s: float = 0.0  # when the newest stop was asked for, on our monotonic clock
     order: list[object] = field(default_factory=list)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def tell(self, news: Sequence[Foreseen]) -> None:
+    def tell(self, news: Sequence[PredictionNews]) -> None:
         with self.lock:
             self.news += news
             self.order += news
@@ -126,13 +126,15 @@ class Told:
 
 
 @contextmanager
-def predicting(server: ServerSettings) -> Iterator[tuple[Predicting, Told]]:
+def predicting(server: ServerSettings) -> Iterator[tuple[PredictionService, Told]]:
     told = Told()
-    with Predicting(server, told.tell, told.stop) as one:
+    with PredictionService(server, told.tell, told.stop) as one:
         yield one, told
 
 
-def served(predicting: Predicting, told: Told, robot: str = ROBOT, event: Described | None = None) -> None:
+def served(
+    predicting: PredictionService, told: Told, robot: str = ROBOT, event: Described | None = None
+) -> None:
     """Introduce a robot, and wait until a model serves it, so that its first row is seen already."""
     predicting.take(robot, event or described())
     told.until(lambda: (robot, "activity") in predicting.models)

@@ -18,7 +18,7 @@ from ml.store.objects import Objects
 from server_gui.core.prediction import inbox, robot_predictor
 from server_gui.core.prediction import service as module
 from server_gui.core.prediction.news import Serves
-from server_gui.core.prediction.service import Predicting
+from server_gui.core.prediction.service import PredictionService
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import TrackRecord
 from tests.support.waiting import WAIT_S
@@ -46,7 +46,7 @@ def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inbox, "MOST_NS", 3_600_000 * MS)
 
 
-def send(to: Predicting, rows: Floats, robot: str = ROBOT, begin_ns: int = 0) -> None:
+def send(to: PredictionService, rows: Floats, robot: str = ROBOT, begin_ns: int = 0) -> None:
     for event in telemetry(rows, begin_ns):
         to.take(robot, event)
 

@@ -12,7 +12,7 @@ from ml.registry.pointers import Pointers
 from ml.registry.registry import CARD, SKOPS, Registry
 from ml.store.objects import Objects
 from server_gui.core.prediction import model_loading as module
-from server_gui.core.prediction.model_loading import Serving
+from server_gui.core.prediction.model_loading import ModelLoader
 from tests.support.waiting import until
 from tests.unit.ml.serving.small import CHANNELS, learned
 from tests.unit.prediction.robots import ROBOT, card, publish
@@ -40,8 +40,8 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
 
 @contextmanager
-def serving(url: str) -> Iterator[Serving]:
-    with Serving(url, poll_s=0.02) as one:
+def serving(url: str) -> Iterator[ModelLoader]:
+    with ModelLoader(url, poll_s=0.02) as one:
         one.robot(ROBOT, dict.fromkeys(CHANNELS, "rad"))
         yield one
 

@@ -12,7 +12,7 @@ import pytest
 
 from ml.store import Store
 from ml.store.tables import TELEMETRY
-from server_gui.core.recording.compaction import Compacting
+from server_gui.core.recording.compaction import Compaction
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
@@ -41,7 +41,7 @@ def test_an_uploader_compacts_the_store_when_it_is_time(
     spool: Spool, store_url: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
-    compacting = Compacting(store_url, spool.folder, HOUR_S)
+    compacting = Compaction(store_url, spool.folder, HOUR_S)
     (spool.folder / "compacted").touch()
     long_ago(spool.folder)
     with Uploader(spool, lambda: Store(store_url), compacting=compacting):
@@ -53,7 +53,7 @@ def test_an_uploader_compacts_the_store_when_it_is_time(
 
 
 def test_the_first_time_is_one_period_after_the_first_use(tmp_path: Path) -> None:
-    compacting = Compacting("file:///nowhere", tmp_path, HOUR_S)
+    compacting = Compaction("file:///nowhere", tmp_path, HOUR_S)
     for _ in range(2):
         compacting.look()
         assert compacting._process is None
@@ -69,7 +69,7 @@ def test_the_first_time_is_one_period_after_the_first_use(tmp_path: Path) -> Non
 def test_a_compaction_that_fails_is_said_and_not_tried_again_at_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    compacting = Compacting("ftp://nowhere", tmp_path, HOUR_S)
+    compacting = Compaction("ftp://nowhere", tmp_path, HOUR_S)
     (tmp_path / "compacted").touch()
     long_ago(tmp_path)
     compacting.look()
@@ -95,7 +95,7 @@ def test_a_compaction_that_cannot_be_begun_is_said_once_and_ends_nothing(
     long_ago(tmp_path)
     owner, name = {"process": (subprocess, "Popen"), "note": (Path, "touch")}[fails]
     monkeypatch.setattr(owner, name, fail)
-    compacting = Compacting("file:///nowhere", tmp_path, 0.0)
+    compacting = Compaction("file:///nowhere", tmp_path, 0.0)
     for _ in range(3):
         compacting.look()
         compacting.close()

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
 from server_gui.core.follow.events import Event, Failed, LinkChanged, Telemetry
-from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.robot import Robot
@@ -17,8 +17,8 @@ from server_gui.core.tuning.edits import Change, unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.controls import Controls
+from server_gui.terminal.followed_robot import FollowedRobot
 from server_gui.terminal.keys import Key
-from server_gui.terminal.session import Session
 from server_gui.terminal.summary import Summary
 from tests.fake_robot import FakeRobot
 from tests.support import waiting
@@ -154,7 +154,7 @@ class Watcher:
         self.robot = Robot()
         self.events: list[Event] = []
         self._mailbox = Mailbox()
-        following = Following("test", ("*.position", "*.state"), ("gait.*",))
+        following = FollowSettings("test", ("*.position", "*.state"), ("gait.*",))
         self.feed = Feed(Address.parse(fake.address), [self._mailbox.put], following)
         self.following = network.run(self.feed.run())
 
@@ -216,25 +216,25 @@ def test_lost_component_is_named_with_its_reason(fake: FakeRobot, network: Netwo
     watcher.until(lambda: watcher.robot.values["left_knee.position"] is None)
 
 
-def until(session: Session, condition: Callable[[], object]) -> None:
+def until(session: FollowedRobot, condition: Callable[[], object]) -> None:
     waiting.until(condition, step=session.update)
 
 
 @pytest.fixture
-def session(fake: FakeRobot) -> Iterator[Session]:
-    with Session(Address.parse(fake.address)) as session:
+def session(fake: FakeRobot) -> Iterator[FollowedRobot]:
+    with FollowedRobot(Address.parse(fake.address)) as session:
         until(session, lambda: session.station.robot.parameters and session.is_whole())
         yield session
 
 
-def press(session: Session, key: Key, times: int = 1) -> Controls:
+def press(session: FollowedRobot, key: Key, times: int = 1) -> Controls:
     controls = Controls(session.station)
     for _ in range(times):
         controls.press(key)
     return controls
 
 
-def test_a_key_writes_and_the_lease_is_given_back(fake: FakeRobot, session: Session) -> None:
+def test_a_key_writes_and_the_lease_is_given_back(fake: FakeRobot, session: FollowedRobot) -> None:
     press(session, Key.RIGHT)
     station = session.station
     until(session, lambda: station.writing.state is WriteState.DONE)
@@ -243,7 +243,7 @@ def test_a_key_writes_and_the_lease_is_given_back(fake: FakeRobot, session: Sess
     assert len(fake.called("control.release")) == 1
 
 
-def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, session: Session) -> None:
+def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, session: FollowedRobot) -> None:
     station = session.station
     unit = unit_of("gait.step_length", "m", Units())
     station.write((Change("gait.step_length", unit, 0.4, 9.0, elsewhere=False),))
@@ -251,7 +251,7 @@ def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, session: Ses
     assert "above 0.6" in station.writing.text
 
 
-def test_stop_without_a_link_is_told_as_not_confirmed(fake: FakeRobot, session: Session) -> None:
+def test_stop_without_a_link_is_told_as_not_confirmed(fake: FakeRobot, session: FollowedRobot) -> None:
     fake.refuse()
     until(session, session.station.robot.is_stale)
     press(session, Key.STOP)

@@ -12,7 +12,7 @@ import pytest
 from deltalake import DeltaTable
 
 from ml.store import NoSuchTable, Store, StoreError, durable
-from ml.store.alone import COUNTS, PLACE, Claim, alone
+from ml.store.compaction_lock import COUNTS, PLACE, Claim, alone
 from ml.store.objects import Object
 from ml.store.tables import TELEMETRY
 from ml.store.upkeep import GRACE, Compacted, Pin, compact, pin, pins, retain, unpin, vacuum

@@ -9,7 +9,7 @@ from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, Looked, Telemetry
-from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News
@@ -18,7 +18,7 @@ from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.summary import Summary
 
 CLIENT = "gwrms view"
-FOLLOWING = Following(
+FOLLOWING = FollowSettings(
     CLIENT,
     channels=("*.position", "*.state", "*.error_code", "*.force", "*.tilt_forward", "*.tilt_side"),
     parameters=("gait.*",),
@@ -27,7 +27,7 @@ FOLLOWING = Following(
 PROCESSES = ResourceSnapshotParams(limit=8)
 
 
-class Session:
+class FollowedRobot:
     """Use it as a context manager; call `update` often, then read `station`."""
 
     def __init__(self, address: Address) -> None:
