@@ -30,6 +30,7 @@ KNOWN: Final[dict[str, str]] = {
     "a label that was removed comes back after a roll-back": "of a label before a roll-back holds",
     "a bit flip in the heads of journals is not seen": "after damage in a file that it is not in",
     "a number whose loss was told is lost again without an event": "of which a loss was told before",
+    "a file of the spool that a full disk kept from being made is called damaged": "no such table: meta",
     "each reboot is told as a step of the robot's clock": "a robot's clock was set by nobody",
 }
 

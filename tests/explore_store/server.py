@@ -39,7 +39,7 @@ from tests.explore_store.ledger import (
 from tests.explore_store.robots import ANGLE, COUNT, EVERY_NS, LATE_NS, RATIO, STREAM, TAIL, Link, Robot
 from tests.explore_store.times import Moment, Times
 
-CAPACITY = 12  # rows that may wait: few, so that a queue is soon full
+CAPACITY = 20  # rows that may wait: few, so that a queue is soon full
 LONG = 10**9  # batches end when a step says so
 PEOPLE = {"P01": "1", "p01 ": "1", "P-01": "1", "P02": "2", "P03": "3"}  # who is called so
 EVER_NS = 4_000_000_000_000_000_000  # the year 2096
