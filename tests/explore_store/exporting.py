@@ -9,7 +9,7 @@ from ml.store.labels import utc_ns
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.recording.errors import RecordingError
 from tests.explore_store import said
-from tests.explore_store.ledger import Begun, Row
+from tests.explore_store.ledger import Row, Said
 from tests.explore_store.robots import ANGLE, NO_DIMENSION, RATIO
 from tests.explore_store.server import Server
 from tests.explore_store.there import Line, number_of, values_of
@@ -42,11 +42,13 @@ def _mine(world: World, server: Server) -> Iterator[Row]:
 
 
 def _export(world: World, server: Server, known: Recordings, session: sessions.Session) -> None:
-    recorded = known.open(session)
     mine = {
         row.number: row for row in world.ledger.rows()
         if (row.robot, row.session) == (session.robot, session.session)
     }  # fmt: skip
+    recorded = (
+        known.open(session) if mine or session.rows or session.first else Recorded(session, (), 0, (), "")
+    )
     found = []
     units = {each.name: each.unit for each in recorded.channels}
     for line in _exported(recorded):
@@ -65,7 +67,8 @@ def _export(world: World, server: Server, known: Recordings, session: sessions.S
         orders[mine[number].link].append(number)
     for link, numbers in orders.items():
         world.check(numbers == sorted(numbers), "an export has rows in another order", link, numbers)
-    if session.session in {each.session for each in world.ledger.all_of(Begun) if each.server == server.name}:
+    whose = (server.name, session.robot, session.session)
+    if any((each.server, each.robot, each.session) == whose for each in world.ledger.all_of(Said)):
         hold = {said.label_of(line) for line in known.labels(session)}
         said.labels(world, hold, (server.name, (session.robot, session.session)))
 

@@ -87,9 +87,8 @@ def rest(world: World) -> None:
     for server in world.lived:
         world.times.sleep(2.0)
         with world.alive(server.name):
-            for _ in range(ATTEMPTS):
-                server.cut()
-                if server.upload():
+            for _ in range(ATTEMPTS - 1):  # to end is the last one
+                if not server.spool or not server.spool.waiting() or server.upload():
                     break
             server.stop()
             problem = server.uploader.state.problem

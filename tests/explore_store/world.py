@@ -2,6 +2,8 @@
 
 import concurrent.futures
 import contextlib
+import functools
+import importlib.metadata
 import os
 import random
 import re
@@ -14,7 +16,7 @@ from typing import Any, Final, Self
 
 import msgspec
 
-from ml.store import Store, durable, objects, store, writing
+from ml.store import Store, objects, store
 from ml.store.objects import Objects
 from ml.store.store import ABOUT, About
 from server_gui.core.recording import recorder
@@ -72,8 +74,9 @@ class World:
                 for name, value in list(vars(module).items()):
                     if value is theirs:
                         put(module, name, ours_)
-        for module in (durable, writing):
+        for module in [module for module in ours() if hasattr(module, "ThreadPoolExecutor")]:
             put(module, "ThreadPoolExecutor", _AtOnce)
+        put(importlib.metadata, "version", _version)
         put(recorder, "COMMIT_S", 0.0)
         put(sqlite3, "connect", watching(self.disk))
         for name, stand_in in changes(self.disk).items():
@@ -196,6 +199,9 @@ class World:
 
     def safe(self) -> Iterable[Any]:
         return (thing for thing in self.ledger.things if thing.fate is Fate.SAFE)
+
+
+_version: Final = functools.cache(importlib.metadata.version)  # of what is installed: it looks on the disk
 
 
 class _AtOnce:
