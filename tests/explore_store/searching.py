@@ -25,14 +25,7 @@ PLACES: Final = (*[Place.FOLDER] * 14, *[Place.SHARDS] * 5, Place.S3)  # S3 take
 SHRINK_S: Final = 60.0
 MEMORY: Final = Path("/dev/shm")  # a disk that costs nothing; ours says itself what a power cut leaves
 # What is not mended yet: what is wrong, and what a violation says then, as a regular expression.
-KNOWN: Final[dict[str, str]] = {
-    "what waits lacks channels without a dimension": "lacks a channel without a dimension",
-    "a label that was removed comes back after a roll-back": "of a label before a roll-back holds",
-    "a bit flip in the heads of journals is not seen": "after damage in a file that it is not in",
-    "a number whose loss was told is lost again without an event": "of which a loss was told before",
-    "a file of the spool that a full disk kept from being made is called damaged": "no such table: meta",
-    "each reboot is told as a step of the robot's clock": "a robot's clock was set by nobody",
-}
+KNOWN: Final[dict[str, str]] = {}
 
 
 @dataclass(slots=True)

@@ -32,7 +32,12 @@ def data_of(line: Line) -> dict[str, Any]:
 
 def is_of_a_batch(line: Line, server: Server) -> bool:
     """Whether an event tells that a batch of this server is lost as a whole."""
-    return bool(line["kind"] == EventKind.LOST.value and line["spool"] == f"{identity(server)}/lost")
+    spool, _, name = line["spool"].rpartition("/")
+    return (
+        line["kind"] == EventKind.LOST.value
+        and name == "lost"
+        and spool.partition("/")[0] == identity(server)
+    )
 
 
 def spoilt(world: World, server: Server, there: There, blamed: Collection[int]) -> None:
