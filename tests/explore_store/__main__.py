@@ -81,7 +81,7 @@ def _replay(text: str) -> int:
         return 2
     try:
         with S3() as s3:
-            points = played(script, s3)
+            points = played(script, s3).disk.points
     except Exception as error:  # noqa: BLE001 - that is what it is for
         _say(told(error))
         return 1
