@@ -151,7 +151,7 @@ _DEFECTS: Final[dict[str, Defect]] = {
     ),
     "only-last-pin-kept": Defect(
         "vacuum keeps one pinned version of each table",
-        "rows send send pin pin pin compact compact vacuum vacuum vacuum",
+        "rows send send pin pin pin pin pin compact compact vacuum vacuum vacuum vacuum",
         "pinned",
     ),
     "lost-says-no-rows": Defect(
