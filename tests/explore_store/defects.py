@@ -68,7 +68,7 @@ _DEFECTS: Final[dict[str, Defect]] = {
     "amended-by-utc": Defect(
         "amended parameters are ignored when the clock was set back",
         "amend amend clock clock clock turn",
-        "a session says not",
+        "a session says not|a session is over",
     ),
     "control-dropped": Defect(
         "a full queue drops sessions, labels and events",
