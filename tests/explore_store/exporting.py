@@ -84,13 +84,12 @@ def _is(world: World, row: Row, line: Line, units: dict[str, str | None]) -> Non
     times = {row.utc_ns(wall_ns) for wall_ns in row.walls_ns}
     world.check(line["stamp_ns"] == row.stamp_ns and utc_ns(line["utc"]) in times,
                 "an export has a row at another time", line, row)  # fmt: skip
-    for channel, value, unit in ((ANGLE, row.angle, row.unit), (RATIO, row.ratio, NO_DIMENSION)):
-        found = values_of(line, channel)
-        world.check(bool(found) or value is None or channel != RATIO,
-                    "an export lacks a channel without a dimension", row)  # fmt: skip
-        if found or channel != RATIO:
-            world.check(list(found.values()) == ([] if value is None else [value]),
-                        "an export has another value", row.number, found, value)  # fmt: skip
-        for name in found:
-            world.check(unit in (units[name], None), "an export has a value in another unit",
-                        row.number, name, units[name], unit)  # fmt: skip
+    found = values_of(line, ANGLE)
+    world.check(list(found.values()) == ([] if row.angle is None else [row.angle]),
+                "an export has another value", row.number, found, row.angle)  # fmt: skip
+    for name in found:
+        world.check(row.unit in (units[name], None), "an export has a value in another unit",
+                    row.number, name, units[name], row.unit)  # fmt: skip
+    ratio = {units[name]: value for name, value in values_of(line, RATIO).items()}
+    world.check(ratio == {NO_DIMENSION: row.ratio},
+                "an export lacks a channel without a dimension, or has it otherwise", row, ratio)  # fmt: skip

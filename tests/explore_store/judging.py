@@ -88,8 +88,7 @@ def rest(world: World) -> None:
         world.times.sleep(2.0)
         with world.alive(server.name):
             for _ in range(ATTEMPTS - 1):  # to end is the last one
-                if not server.spool or not server.spool.waiting() or server.upload():
-                    break
+                server.upload()
             server.stop()
             problem = server.uploader.state.problem
             world.check(problem is None, f"server {server.name} cannot upload", problem)

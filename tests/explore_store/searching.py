@@ -35,7 +35,7 @@ class Found:
     plays: int = 0
     steps: int = 0
     points: int = 0
-    known: int = 0  # plays that end in what is known
+    known: int = 0  # plays with what is known in them
     wrong: Script | None = None
     error: Exception | None = None
     seed: str = ""
