@@ -6,11 +6,11 @@ import time
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from gateway.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
-from gateway.outlets import Outlet
-from gateway.rates import Rates
-from gateway.session import Session
-from gateway.streams import Streams
+from gateway.connections.session import Session
+from gateway.streaming.outlets import Outlet
+from gateway.streaming.rates import Rates
+from gateway.streaming.streams import Streams
+from gateway.wire.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
 
 FRAME_BITS = 47  # of an 11-bit data frame, with the gap behind it and without its data
 

@@ -7,17 +7,17 @@ import socket
 from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
 
-from gateway import wire
-from gateway.classic import ClassicPort
 from gateway.config import RobotConfig
-from gateway.intake import Inlet, Intake
-from gateway.loop import Loop, Timer
-from gateway.places import Places
+from gateway.connections.classic import ClassicPort
+from gateway.connections.intake import Inlet, Intake
+from gateway.connections.places import Places
+from gateway.connections.session import Session
+from gateway.connections.sharing import Sharing
+from gateway.process.loop import Loop, Timer
+from gateway.process.resting import ENDING
 from gateway.registry import MODULES, Spec
-from gateway.resting import ENDING
 from gateway.service import Service
-from gateway.session import Session
-from gateway.sharing import Sharing
+from gateway.wire import framing
 
 log = logging.getLogger(__name__)
 
@@ -120,7 +120,7 @@ class Daemon:
             inlet.close()
             return
 
-        def session(refusal: wire.RpcError | None) -> Session:
+        def session(refusal: framing.RpcError | None) -> Session:
             return Session(
                 self._loop, inlet, self._service.handle, self._config.gateway.stuck_s, self._sharing, refusal
             )
@@ -141,7 +141,7 @@ class Daemon:
             self._loop.call_later(TIDY_S, self._tidy)
 
     def _tidy(self) -> None:
-        from gateway.memory import MemoryLock  # for a gateway that has worked
+        from gateway.process.memory import MemoryLock  # for a gateway that has worked
 
         self._tidying = False
         MemoryLock.give_back()

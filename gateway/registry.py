@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gateway import wire
 from gateway.config import RobotConfig
-from gateway.futures import done, failed
-from gateway.loop import Loop, Timer
+from gateway.process.futures import done, failed
+from gateway.process.loop import Loop, Timer
+from gateway.wire import framing
 
 if TYPE_CHECKING:
-    from gateway.session import Answer, Session
+    from gateway.connections.session import Answer, Session
 
 log = logging.getLogger(__name__)
 
@@ -73,11 +73,11 @@ class Spec:
 
 # A module stands below those it needs.
 MODULES: Mapping[str, Spec] = {
-    "resource": Spec("gateway.modules.resource:ResourceModule"),
-    "component": Spec("gateway.modules.component:ComponentModule"),
-    "blame": Spec("gateway.modules.blame:BlameModule", needs=("component",)),
+    "resource": Spec("gateway.modules.resource.module:ResourceModule"),
+    "component": Spec("gateway.modules.component.module:ComponentModule"),
+    "blame": Spec("gateway.modules.resource.blame:BlameModule", needs=("component",)),
     "status": Spec("gateway.modules.status:StatusModule", needs=("component", "resource")),
-    "control": Spec("gateway.modules.control:ControlModule", needs=("component",)),
+    "control": Spec("gateway.modules.control.module:ControlModule", needs=("component",)),
     "guard": Spec("gateway.guard.module:GuardModule", needs=("component", "control")),
 }
 
@@ -139,7 +139,7 @@ class Registry:
         """The running module; `user` keeps it (and what it needs) until `leave`. No user: it lingers only."""
         slot = self._slots[name]
         if self.ending:
-            return failed(wire.refuse(wire.Kind.UNAVAILABLE, "the gateway is ending"))
+            return failed(framing.refuse(framing.Kind.UNAVAILABLE, "the gateway is ending"))
         if user is None:
             slot.linger_until_ns = self._linger_from_now_ns()
         else:
@@ -164,7 +164,7 @@ class Registry:
         """Stop everything now, whoever uses it; calls `closed` in the loop when all is off."""
         self._closing = closed
         for name in self._slots:
-            self._give_up(name, wire.refuse(wire.Kind.UNAVAILABLE, "the gateway is ending"))
+            self._give_up(name, framing.refuse(framing.Kind.UNAVAILABLE, "the gateway is ending"))
         self._settle()
 
     def _stops_by(self, stop_now: StopNow | None) -> None:
@@ -280,10 +280,12 @@ class Registry:
             self.when_off()
 
     def _failed(self, name: str, slot: _Slot, reason: Exception) -> None:
-        self._give_up(name, wire.refuse(wire.Kind.UNAVAILABLE, f"the module {name} cannot start: {reason}"))
+        self._give_up(
+            name, framing.refuse(framing.Kind.UNAVAILABLE, f"the module {name} cannot start: {reason}")
+        )
         self._ended(slot)
 
-    def _give_up(self, name: str, error: wire.RpcError) -> None:
+    def _give_up(self, name: str, error: framing.RpcError) -> None:
         """Tell everybody who waits for it or for what stands on it; the next request tries again."""
         slot = self._slots[name]
         slot.users.clear()

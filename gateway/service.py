@@ -6,21 +6,22 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
-from gateway import __version__, messages, wire
-from gateway.boot import boot_id
-from gateway.budget import Budget
+from gateway import __version__
+from gateway.always_on import Standing
 from gateway.config import RobotConfig
-from gateway.first_stop import FirstStop
-from gateway.futures import gather, then
-from gateway.loop import Loop
-from gateway.modules.resource import RESOURCE_CHANNELS
+from gateway.connections.session import Answer, Session
+from gateway.connections.stop_lines import STOP
+from gateway.modules.resource.module import RESOURCE_CHANNELS
+from gateway.process.boot import boot_id
+from gateway.process.first_stop import FirstStop
+from gateway.process.futures import gather, then
+from gateway.process.loop import Loop
 from gateway.records.folder import RecordsFolder
 from gateway.registry import MODULES, Module, Registry, Spec
-from gateway.session import Answer, Session
-from gateway.sources import channel_info, check_globs, merge, narrow
-from gateway.standing import Standing
-from gateway.stop_lines import STOP
-from gateway.streams import Streams
+from gateway.streaming.budget import Budget
+from gateway.streaming.sources import channel_info, check_globs, merge, narrow
+from gateway.streaming.streams import Streams
+from gateway.wire import framing, messages
 
 if TYPE_CHECKING:
     from gateway.cost import Costs
@@ -115,7 +116,7 @@ class Service:
         del self._sessions[session]
         self.registry.leave(session)
 
-    def handle(self, session: Session, request: wire.Request) -> Answer:
+    def handle(self, session: Session, request: framing.Request) -> Answer:
         """The answer to one request, now or later.
 
         Raises:
@@ -124,8 +125,8 @@ class Service:
         """
         method = messages.METHODS.get(request.method)
         if method is None:
-            raise wire.unknown_method(request.method)
-        params = wire.decode_params(request.params, method.params)
+            raise framing.unknown_method(request.method)
+        params = framing.decode_params(request.params, method.params)
         own = self._own.get(request.method)
         if own is not None:
             return own(session, params)
@@ -147,21 +148,22 @@ class Service:
         return self.registry.use(name, user)
 
     def _hello(self, session: Session, params: messages.HelloParams) -> messages.Hello:
-        if params.protocol != wire.PROTOCOL:
-            raise wire.refuse(
-                wire.Kind.BAD_PARAMS, f"this gateway speaks protocol {wire.PROTOCOL}, not {params.protocol}"
+        if params.protocol != framing.PROTOCOL:
+            raise framing.refuse(
+                framing.Kind.BAD_PARAMS,
+                f"this gateway speaks protocol {framing.PROTOCOL}, not {params.protocol}",
             )
         if not params.client.isprintable():
-            raise wire.refuse(wire.Kind.BAD_PARAMS, "a client's name is of printable characters")
+            raise framing.refuse(framing.Kind.BAD_PARAMS, "a client's name is of printable characters")
         if session.named not in (None, params.client):
-            raise wire.refuse(
-                wire.Kind.BAD_PARAMS,
+            raise framing.refuse(
+                framing.Kind.BAD_PARAMS,
                 f"this connection has called itself {session.named!r} already; keep to it",
             )
         session.named = params.client
         session.who = f"{params.client} ({session.peer})"
         robot = self._config.robot.name
-        return messages.Hello(wire.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)
+        return messages.Hello(framing.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)
 
     def _clock(self) -> messages.Clock:
         return messages.Clock(time.monotonic_ns(), time.time_ns(), self._boot_id)
@@ -228,17 +230,19 @@ class Service:
             check_globs("channel", names, params.channels, absent)
             chosen = narrow(everything, params.channels)
             if session.closed:
-                raise wire.refuse(wire.Kind.UNAVAILABLE, "the connection has ended")
+                raise framing.refuse(framing.Kind.UNAVAILABLE, "the connection has ended")
             if not chosen:
-                raise wire.refuse(wire.Kind.UNAVAILABLE, "there is no channel to stream; see robot.describe")
+                raise framing.refuse(
+                    framing.Kind.UNAVAILABLE, "there is no channel to stream; see robot.describe"
+                )
             return messages.StreamStarted(self.streams.start(session, chosen, params.rate_hz))
 
         return then(gather(modules), start)
 
     def _stream_stop(self, session: Session, params: messages.StreamStopParams) -> messages.Done:
         if not self.streams.stop(session, params.stream):
-            raise wire.refuse(
-                wire.Kind.UNKNOWN_NAME,
+            raise framing.refuse(
+                framing.Kind.UNKNOWN_NAME,
                 f"this connection has no stream {params.stream}; it may have ended before",
             )
         return messages.Done()

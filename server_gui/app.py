@@ -15,20 +15,20 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
-from gateway.messages import ResourceSnapshotParams
-from server_gui.core.desk.archive import Archive
+from gateway.wire.messages import ResourceSnapshotParams
+from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.feeds import Feeds, Record
-from server_gui.core.desk.link import Link
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
-from server_gui.core.events import Event
-from server_gui.core.feed import Following
-from server_gui.core.mailbox import Mailbox
+from server_gui.core.follow.events import Event
+from server_gui.core.follow.feed import Following
+from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.prediction.news import Foreseen
 from server_gui.core.processing.units import Units
-from server_gui.core.settings import ServerSettings, name_of
-from server_gui.own_robot import OwnRobot
+from server_gui.core.settings.server_file import ServerSettings, name_of
+from server_gui.core.tuning.link import Link
+from server_gui.processes.own_robot import OwnRobot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look, Theme

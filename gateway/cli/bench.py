@@ -13,7 +13,7 @@ from gateway.cli.text import NONE, percent, say, say_json, size, table
 from gateway.client import Batch, Robot
 from gateway.client.address import Address
 from gateway.client.clock import ClockOffset
-from gateway.messages import ResourceSnapshotParams
+from gateway.wire.messages import ResourceSnapshotParams
 
 REQUESTS, SECONDS, RATES_HZ = 200, 5.0, (50.0, 1000.0)
 MOST_WITH_PSUTIL = 200

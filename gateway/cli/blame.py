@@ -6,7 +6,7 @@ from collections import Counter
 from gateway.cli.arguments import seconds
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, say, say_json, table
-from gateway.messages import Overrun, Overruns
+from gateway.wire.messages import Overrun, Overruns
 
 POLL_S = 1.0
 

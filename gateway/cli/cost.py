@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from gateway.cli.arguments import seconds
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, budget, percent, say, say_json, size, table
-from gateway.messages import BusCost, ClientCost, GatewayCost, StreamCost
+from gateway.wire.messages import BusCost, ClientCost, GatewayCost, StreamCost
 
 SECONDS = 2.0
 

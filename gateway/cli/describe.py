@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, budget, exact, say, say_json, table
-from gateway.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo, StopInfo
+from gateway.wire.messages import ChannelInfo, Description, GuardInfo, GuardRuleInfo, ParameterInfo, StopInfo
 
 PAGE = 100  # columns
 

@@ -2,7 +2,7 @@
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, say, say_json, table, warn
-from gateway.messages import Enabled
+from gateway.wire.messages import Enabled
 
 EPILOG = """Only where the gateway is the bus's master ([gateway] role = "master"), and while no stop is held.
 All drives make one transition, each confirms it, then the next; before the last one the setpoint is

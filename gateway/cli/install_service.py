@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gateway import config
+from gateway.cli.systemd_units import LEAST_LINGER_S, MARK, Service, folder
 from gateway.cli.text import say
-from gateway.cli.units import LEAST_LINGER_S, MARK, Service, folder
 
 _DESCRIPTION = """\
 Writes systemd units for the gateway of CONFIG.

@@ -8,7 +8,7 @@ from gateway.cli.reach import check_names, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.trial import wait_for_decision
 from gateway.coding import Number
-from gateway.messages import Description, ParameterInfo, ParameterValue, Written
+from gateway.wire.messages import Description, ParameterInfo, ParameterValue, Written
 
 LONGEST_TRIAL_S = 300.0
 

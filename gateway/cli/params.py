@@ -6,18 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from gateway.cli.parameters import say_written, trial_s
-from gateway.cli.params_diff import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
-from gateway.cli.params_file import FileProblem, Scope
-from gateway.cli.params_formats import format_of, read_file
 from gateway.cli.reach import ask, check_names, choose, parameter_names, parser, reach
 from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.trial import wait_for_decision
 from gateway.client import Robot
 from gateway.coding import Number
-from gateway.limits import LINE_LIMIT
-from gateway.messages import ParameterValue, ParameterWriteParams
+from gateway.connections.limits import LINE_LIMIT
+from gateway.parameter_files.comparison import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
+from gateway.parameter_files.contents import FileProblem, Scope
+from gateway.parameter_files.formats import format_of, read_file
 from gateway.records import durable
-from gateway.wire import encode_request
+from gateway.wire.framing import encode_request
+from gateway.wire.messages import ParameterValue, ParameterWriteParams
 
 USAGE = """\
 usage: gwrms params save FILE [GLOB ...]

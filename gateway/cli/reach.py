@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from gateway.cli.text import did_you_mean, say, warn
 from gateway.client import Address, BadAddress, ClientError, ConnectionState, LinkSettings, Robot
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
-from gateway.messages import Description
+from gateway.wire.messages import Description
 
 
 class UnknownName(ClientError):

@@ -2,7 +2,7 @@
 
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import NONE, say, say_json, table, warn
-from gateway.messages import Reset
+from gateway.wire.messages import Reset
 
 EPILOG = """Each drive is led to "switch on disabled": one that moves is stopped before, a fault is reset, and
 one that held its position lets go of it. Nothing is enabled: that is the controller's part, or

@@ -12,11 +12,13 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from gateway import config, notify, wire
+from gateway import config
+from gateway.connections.listeners import Listeners, inherited, listen, rest
 from gateway.daemon import Daemon
-from gateway.listeners import Listeners, inherited, listen, rest
-from gateway.memory import share_heap
-from gateway.resting import ENDING
+from gateway.process import notify
+from gateway.process.memory import share_heap
+from gateway.process.resting import ENDING
+from gateway.wire import framing
 
 log = logging.getLogger(__name__)
 
@@ -119,7 +121,7 @@ def _listeners(gateway: config.GatewaySettings, handed: Listeners | None) -> Lis
 def _refuse(handed: Listeners, error: config.ConfigError) -> int:
     """Tell everybody who has come why they are not served; where it was woken, rest again."""
     log.error("%s", error)
-    line = wire.encode_error(None, wire.refuse(wire.Kind.UNAVAILABLE, str(error)))
+    line = framing.encode_error(None, framing.refuse(framing.Kind.UNAVAILABLE, str(error)))
     for listener in handed.all:
         listener.setblocking(False)
         with contextlib.suppress(BlockingIOError):

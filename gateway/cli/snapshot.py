@@ -9,7 +9,7 @@ import msgspec
 from gateway.cli.reach import channel_names, check_names, parser, reach
 from gateway.cli.text import NONE, age, exact, measured, percent, say, say_json, size, table
 from gateway.client import Robot
-from gateway.messages import (
+from gateway.wire.messages import (
     ControlProcess,
     Description,
     QualityInfo,

@@ -3,7 +3,7 @@
 from gateway.cli.reach import parser, reach
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import ClientError
-from gateway.messages import Stopped
+from gateway.wire.messages import Stopped
 
 WARNING = (
     "This is a software stop over the network, not a safety-rated stop: keep the hardware one within reach."

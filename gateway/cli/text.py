@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from gateway.coding import text as digits
-from gateway.messages import BudgetInfo, ChannelInfo
 from gateway.plain import json_plain, plain
+from gateway.wire.messages import BudgetInfo, ChannelInfo
 
 NONE = "–"
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole

@@ -6,8 +6,8 @@ import time
 
 from gateway.cli.text import exact, say, say_json
 from gateway.client import RemoteError, Robot
-from gateway.messages import Written
-from gateway.wire import Kind
+from gateway.wire.framing import Kind
+from gateway.wire.messages import Written
 
 LOOK_S = 1.0  # how often the robot is asked whether the trial still stands
 

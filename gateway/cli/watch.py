@@ -9,7 +9,7 @@ from gateway.cli.arguments import number
 from gateway.cli.reach import channel_names, check_names, parser, reach
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
-from gateway.messages import ChannelInfo, Description, ModuleName
+from gateway.wire.messages import ChannelInfo, Description, ModuleName
 
 Row = tuple[int, dict[str, float | None]]
 

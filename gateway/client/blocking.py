@@ -11,7 +11,7 @@ from gateway.client.client import Client
 from gateway.client.clock import ClockOffset
 from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
-from gateway.messages import (
+from gateway.wire.messages import (
     Confirmed,
     Description,
     Enabled,

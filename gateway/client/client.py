@@ -8,7 +8,7 @@ from gateway.client.address import Address
 from gateway.client.errors import LinkLost, NotConnected, RemoteError
 from gateway.client.link import Link, LinkSettings, OnState
 from gateway.client.subscription import Subscription
-from gateway.messages import (
+from gateway.wire.messages import (
     AcquireParams,
     ComponentParams,
     Confirmed,

@@ -10,7 +10,6 @@ from typing import Self
 
 import msgspec
 
-from gateway import wire
 from gateway.client.address import Address
 from gateway.client.errors import (
     CallTimeout,
@@ -22,6 +21,7 @@ from gateway.client.errors import (
     Unreachable,
 )
 from gateway.plain import plain
+from gateway.wire import framing
 
 OnNotification = Callable[[str, msgspec.Raw], None]
 OnResult = Callable[[msgspec.Raw], None]
@@ -64,7 +64,7 @@ class Connection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
         self._waiting: dict[int, tuple[asyncio.Future[msgspec.Raw], OnResult | None]] = {}
         self._ids = itertools.count(1)
-        self._lines = wire.LineSplitter(wire.ANSWER_LIMIT)
+        self._lines = framing.LineSplitter(framing.ANSWER_LIMIT)
         self._decode = msgspec.json.Decoder(Incoming).decode
 
     @classmethod
@@ -108,7 +108,7 @@ class Connection(asyncio.Protocol):
         number = next(self._ids)
         answer: asyncio.Future[msgspec.Raw] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (answer, on_result)
-        self._transport.write(wire.encode_request(number, method, params))
+        self._transport.write(framing.encode_request(number, method, params))
         try:
             async with asyncio.timeout(timeout_s):
                 return await answer
@@ -150,7 +150,7 @@ class Connection(asyncio.Protocol):
 
     # --- matching
 
-    def _take(self, line: wire.Line) -> None:
+    def _take(self, line: framing.Line) -> None:
         if not isinstance(line, bytes):
             raise ProtocolError(f"{self.address} does not speak as a gateway does: {line}")
         try:

@@ -16,7 +16,8 @@ from gateway.client.clock import ClockTracker
 from gateway.client.connection import UNREADABLE, Connection
 from gateway.client.errors import CallTimeout, ClientError, LinkLost, NotConnected, ProtocolError, RemoteError
 from gateway.client.subscription import Subscription
-from gateway.messages import (
+from gateway.wire.framing import PROTOCOL
+from gateway.wire.messages import (
     STREAM_DATA,
     Clock,
     Done,
@@ -28,7 +29,6 @@ from gateway.messages import (
     StreamStartParams,
     StreamStopParams,
 )
-from gateway.wire import PROTOCOL
 
 Answer = TypeVar("Answer")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from gateway.client.errors import ClientError
-from gateway.messages import StreamData, StreamStartParams
+from gateway.wire.messages import StreamData, StreamStartParams
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from drivers.latest import Latest, Listener
 from drivers.samples import Channel
 from gateway.guard.checks import ALARMS
 from gateway.guard.watcher import State
-from gateway.loop import Loop
+from gateway.process.loop import Loop
 
 log = logging.getLogger(__name__)
 

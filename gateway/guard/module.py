@@ -9,20 +9,20 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 from drivers.bus.arming import Arming
-from gateway import messages
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
 from gateway.guard.rules import Action
 from gateway.guard.settings import GuardSettings, limit
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
+from gateway.wire import messages
 
 if TYPE_CHECKING:
     from drivers.joint.drive import JointDrive
-    from gateway.modules.component import ComponentModule
-    from gateway.modules.control import ControlModule
+    from gateway.connections.session import Answer, Session
+    from gateway.modules.component.module import ComponentModule
+    from gateway.modules.control.module import ControlModule
     from gateway.registry import Context
-    from gateway.session import Answer, Session
 
 LOOK_NS = 250_000_000  # how often the loop looks, where no watcher wants to be looked at sooner
 LEAST_S = 0.005

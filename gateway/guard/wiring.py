@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from gateway.guard.inputs import Changed
-from gateway.guard.making import Wire, make
 from gateway.guard.rules import Rule, SymmetryRule
 from gateway.guard.settings import BUS, WATCHES, quantities
 from gateway.guard.watcher import Watcher
+from gateway.guard.watchers import Wire, make
 
 if TYPE_CHECKING:
-    from gateway.modules.assembly import Robot
+    from gateway.modules.component.assembly import Robot
 
 NOBODY = "the robot"
 

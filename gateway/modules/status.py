@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
-from gateway.futures import then
-from gateway.messages import Params, ResourceSnapshot, Snapshot
-from gateway.modules.resource import RESOURCE_CHANNELS, ResourceModule, columns
-from gateway.sources import Selection, narrow
+from gateway.modules.resource.module import RESOURCE_CHANNELS, ResourceModule, columns
+from gateway.process.futures import then
+from gateway.streaming.sources import Selection, narrow
+from gateway.wire.messages import Params, ResourceSnapshot, Snapshot
 
 if TYPE_CHECKING:
-    from gateway.modules.component import ComponentModule
+    from gateway.connections.session import Answer, Session
+    from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context
-    from gateway.session import Answer, Session
 
 # What the prediction's features are made from; everything else stays on the robot.
 COMPONENT_GLOBS = (

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, Final
 
 import msgspec
 
-from gateway.futures import failed
+from gateway.process.futures import failed
 from gateway.records import durable, pieces
 from gateway.records.chain import Broken, Head, line
 from gateway.records.limits import OWN, Limits, Share, TooMany, within_limits

@@ -3,11 +3,11 @@
 import logging
 from pathlib import Path
 
-from gateway.boot import boot_id
-from gateway.messages import RecordsInfo
+from gateway.process.boot import boot_id
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import Journal
 from gateway.records.undo import UndoFile
+from gateway.wire.messages import RecordsInfo
 
 log = logging.getLogger(__name__)
 

@@ -5,8 +5,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from gateway.messages import ParameterInfo
-from server_gui.core.robot import Robot
+from gateway.wire.messages import ParameterInfo
+from server_gui.core.follow.robot import Robot
 from server_gui.terminal.keys import Key
 
 STEPS = 20  # from one end of a parameter's range to the other

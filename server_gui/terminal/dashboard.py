@@ -10,9 +10,9 @@ from rich.console import Console, RenderableType
 from rich.layout import Layout
 from rich.live import Live
 
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_measures import Gait
 from server_gui.core.processing.robot_processing import RobotProcessing
-from server_gui.core.robot import Robot
 from server_gui.terminal import panels
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.keys import Keyboard

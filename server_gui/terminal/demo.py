@@ -7,12 +7,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
-from server_gui.simulated import simulated_robot
+from server_gui.core.settings.server_file import (
+    RecordingSettings,
+    RobotSettings,
+    ServerSettings,
+    StoreSettings,
+)
+from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.simulated import simulated_robot
 from server_gui.terminal import headless
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.dashboard import Dashboard, save_picture
-from server_gui.terminal.ending import Ended, Ending
 from server_gui.terminal.session import Session
 
 WHOLE_S = 60.0  # for every component to be there

@@ -5,10 +5,10 @@ import sys
 
 from gateway.client import ConnectionState
 from gateway.plain import plain
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
-from server_gui.core.robot import Robot
-from server_gui.core.summary import Range, Summary
+from server_gui.terminal.summary import Range, Summary
 
 NONE = "–"
 

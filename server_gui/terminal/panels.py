@@ -11,12 +11,12 @@ from rich.table import Table
 from rich.text import Text
 
 from gateway.client import ConnectionState
-from gateway.messages import ParameterInfo, ParameterValue, Written
 from gateway.plain import plain
-from server_gui.core.events import Failed
+from gateway.wire.messages import ParameterInfo, ParameterValue, Written
+from server_gui.core.follow.events import Failed
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
-from server_gui.core.robot import Robot
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.marks import (
     BAD,

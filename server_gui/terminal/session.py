@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from typing import Self
 
 from gateway.client import Address
-from server_gui.core.events import Failed, Looked, StopAnswered, Telemetry
-from server_gui.core.feed import Feed, Following
-from server_gui.core.mailbox import Mailbox
-from server_gui.core.network import Network
+from server_gui.core.follow.events import Failed, Looked, StopAnswered, Telemetry
+from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.mailbox import Mailbox
+from server_gui.core.follow.network import Network
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.robot_processing import RobotProcessing
-from server_gui.core.robot import Robot
-from server_gui.core.summary import Summary
+from server_gui.terminal.summary import Summary
 
 FOLLOWING = Following(
     "gwrms view",

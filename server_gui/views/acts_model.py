@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from PySide6.QtCore import Qt
 
-from gateway.messages import Number
 from gateway.plain import plain
-from server_gui.core.desk.acts import Act
+from gateway.wire.messages import Number
+from server_gui.core.audit.acts import Act
 from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import brief, exact
 from server_gui.views.theme import Theme

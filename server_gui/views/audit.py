@@ -16,11 +16,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from server_gui.core.archive.collected_journals import Found, KeptJournals
+from server_gui.core.archive.histories import History, histories
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.edits import unit_of
-from server_gui.core.desk.histories import History, histories
-from server_gui.core.desk.kept_journals import Found, KeptJournals
-from server_gui.core.desk.news import NewsKind
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.tuning.edits import unit_of
 from server_gui.views.acts_model import ROBOT, TIME, ActsModel, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text

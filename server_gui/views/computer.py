@@ -4,7 +4,7 @@ from typing import Final
 
 from msgspec import UNSET
 
-from gateway.messages import GatewayCost, ResourceSnapshot
+from gateway.wire.messages import GatewayCost, ResourceSnapshot
 from server_gui.core.desk.station import Station
 
 MIB: Final = 1 << 20

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from gateway.plain import plain
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.news import Item
+from server_gui.core.follow.news import Item
 from server_gui.views.joint_table import GLYPHS
 from server_gui.views.marks import NEWS
 from server_gui.views.theme import Theme

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWi
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.stopping import StopState
+from server_gui.core.tuning.stop import StopState
 from server_gui.views.foreseen import status
 from server_gui.views.marks import Mark, age_text, drives_mark
 from server_gui.views.theme import Theme

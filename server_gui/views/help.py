@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QComboBox, QTextBrowser, QVBoxLayout, QWidget
 
-from server_gui.core.manual import sections
+from server_gui.core.desk.manual import sections
 from server_gui.views.theme import Theme
 
 

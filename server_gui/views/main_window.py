@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.desk.archive import Archive
+from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.core.processing.units import UNITS, Units
 from server_gui.views.audit import Audit

@@ -6,9 +6,9 @@ from typing import Final
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QBrush, QColor, QPainter, QPen, QPolygonF
 
-from server_gui.core.desk.news import NewsKind
 from server_gui.core.desk.station import Station
-from server_gui.core.robot import Robot
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.robot import Robot
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,8 @@ from typing import Any, Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
-from gateway.messages import ProcessUse
 from gateway.plain import plain
+from gateway.wire.messages import ProcessUse
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.messages import ChannelInfo
+from gateway.wire.messages import ChannelInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest
 from server_gui.core.desk.station import Station

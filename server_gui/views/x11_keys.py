@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Final, Self
 
-from server_gui.core.watching import Worker
+from server_gui.core.threads.supervision import Worker
 
 F12, SPACE = 0xFFC9, 0x0020  # keysyms
 CONTROL, CAPS_LOCK, NUM_LOCK = 0x04, 0x02, 0x10

@@ -15,8 +15,13 @@ import time
 from pathlib import Path
 
 from server_gui.core.fleet.collector import Collector
-from server_gui.core.prediction.settings import PredictionSettings
-from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.prediction import PredictionSettings
+from server_gui.core.settings.server_file import (
+    RecordingSettings,
+    RobotSettings,
+    ServerSettings,
+    StoreSettings,
+)
 
 RATE_HZ, CHANNELS = 100, 60
 WARM_S, MEASURE_S = 3.0, 20.0

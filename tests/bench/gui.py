@@ -21,7 +21,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
-from gateway.messages import StreamData
+from gateway.wire.messages import StreamData
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.soles import cells_of

@@ -33,7 +33,7 @@ from ml.robot.learned import Learned
 from ml.robot.task import TASKS, Task
 from ml.serving.grid import period_ns
 from ml.serving.predictor import Windows, judged
-from server_gui.core.prediction.settings import Action, RuleSettings
+from server_gui.core.settings.prediction import Action, RuleSettings
 from tests.unit.ml.serving.small import hips
 from tests.unit.prediction.robots import predicting, publish, served, settings, telemetry
 

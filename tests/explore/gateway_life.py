@@ -7,9 +7,10 @@ from typing import Any, cast
 
 import msgspec
 
-from gateway import config, wire
+from gateway import config
 from gateway.daemon import Daemon
-from gateway.messages import METHODS
+from gateway.wire import framing
+from gateway.wire.messages import METHODS
 from tests.explore.net import Connection, Listener
 from tests.explore.world import World
 
@@ -26,7 +27,7 @@ class Asked:
     answered_ns: int | None = None
     lost: bool = False  # nobody is there any more to take its answer
     result: Any = None
-    error: wire.ErrorBody | None = None
+    error: framing.ErrorBody | None = None
 
     @property
     def kind(self) -> str | None:
@@ -70,7 +71,7 @@ class Life:
         """Send a request, over a new connection where there is none."""
         asked = Asked(next(self._numbers), who, method, params, self.world.runtime.now_ns)
         self.asked.append(asked)
-        self.say(who, wire.encode_request(asked.number, method, params))
+        self.say(who, framing.encode_request(asked.number, method, params))
         return asked
 
     def say(self, who: str, lines: bytes) -> None:
@@ -109,7 +110,7 @@ class Life:
         if found is None or found.answered_ns is not None:
             return
         found.answered_ns = self.world.runtime.now_ns
-        if isinstance(response.error, wire.ErrorBody):
+        if isinstance(response.error, framing.ErrorBody):
             found.error = response.error
         elif isinstance(response.result, msgspec.Raw):
             found.result = msgspec.json.decode(response.result, type=METHODS[found.method].result)
@@ -121,4 +122,4 @@ class _Answer(msgspec.Struct, frozen=True):
 
     id: Any = None
     result: msgspec.Raw | msgspec.UnsetType = msgspec.UNSET
-    error: wire.ErrorBody | msgspec.UnsetType = msgspec.UNSET
+    error: framing.ErrorBody | msgspec.UnsetType = msgspec.UNSET

@@ -10,7 +10,7 @@ from ml.store import Store, StoreError, upkeep
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, TELEMETRY
 from server_gui.core.cloud import verify
-from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.batching import EventKind
 from tests.explore_store import damages, exporting, said, telling
 from tests.explore_store.ledger import Fate, Row
 from tests.explore_store.robots import ANGLE, NO_DIMENSION, RATIO

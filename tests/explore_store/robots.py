@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 
 from gateway.client import Batch
-from gateway.messages import Description
+from gateway.wire.messages import Description
 
 COUNT, ANGLE, RATIO = "x.count", "knee.angle", "drive.load"
 NO_DIMENSION = ""  # the unit of the last one

@@ -11,11 +11,11 @@ from typing import Any
 import msgspec
 
 from gateway.client import ClockOffset, ConnectionState
-from gateway.messages import JournalEntries
+from gateway.wire.messages import JournalEntries
 from ml.store import Store
 from ml.store.labels import Label
-from server_gui.core.events import Described, Journalled, LinkChanged, Telemetry
-from server_gui.core.fleet.keeping import Keeping
+from server_gui.core.fleet.robot_recording import Keeping
+from server_gui.core.follow.events import Described, Journalled, LinkChanged, Telemetry
 from server_gui.core.recording import records
 from server_gui.core.recording.recorder import Recorder, RecorderSettings
 from server_gui.core.recording.spool import Spool

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from ml.store.labels import utc_ns as ns
-from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.batching import EventKind
 from tests.explore_store.ledger import Amended, Asked, Bad, Begun, Fate, Loss, Mark, Over, Row, Thing
 from tests.explore_store.robots import LATE_NS
 from tests.explore_store.server import Server

@@ -6,7 +6,7 @@ from typing import Any
 
 from ml.store import Store, reading
 from ml.store.tables import EVENTS, TELEMETRY, Table
-from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.batching import EventKind
 from tests.explore_store.robots import COUNT
 from tests.explore_store.server import Server
 

@@ -14,7 +14,7 @@ from PySide6.QtCore import QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication
 
 from server_gui.app import FOLLOWING, App, stop_keys
-from server_gui.core.settings import ServerSettings, add_robots
+from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.tree import NEW
 

@@ -13,7 +13,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gateway.client import Batch, ClockOffset, ConnectionState
-from gateway.messages import (
+from gateway.wire.messages import (
     ChannelInfo,
     Clock,
     ComponentInfo,
@@ -35,10 +35,10 @@ from gateway.messages import (
     StopInfo,
     Throttling,
 )
-from server_gui.core.desk.commands import Commands
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.events import Described, Event, LinkChanged, Looked, Resources, Telemetry
+from server_gui.core.follow.events import Described, Event, LinkChanged, Looked, Resources, Telemetry
+from server_gui.core.tuning.commands import Commands
 from server_gui.views.main_window import MainWindow
 
 JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle"))

@@ -6,9 +6,9 @@ from typing import Any
 
 import msgspec
 
-from gateway.messages import JournalEntries
 from gateway.records.journal import Journal
-from server_gui.core.events import Journalled
+from gateway.wire.messages import JournalEntries
+from server_gui.core.follow.events import Journalled
 
 
 class RobotsJournal:

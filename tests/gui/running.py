@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 
 from server_gui.app import FOLLOWING, App
 from server_gui.core.desk.feeds import Record
-from server_gui.core.settings import ServerSettings
+from server_gui.core.settings.server_file import ServerSettings
 from tests.gui.fakes import destroy
 
 WITHIN_S = 50.0

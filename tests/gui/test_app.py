@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from server_gui.app import App
-from server_gui.core.desk.stopping import StopState
-from server_gui.core.desk.writing import WriteState
-from server_gui.core.settings import ServerSettings, add_robots
+from server_gui.core.settings.server_file import ServerSettings, add_robots
+from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.writing import WriteState
 from tests.fake_robot import FakeRobot
 from tests.gui.running import running, wait
 

@@ -19,20 +19,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.messages import Stopped
+from gateway.wire.messages import Stopped
 from ml.store import Store, StoreError
+from server_gui.core.archive import library
+from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
-from server_gui.core.desk import library
-from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.recording import By, Recording
-from server_gui.core.desk.stopping import StopState
-from server_gui.core.fleet.foreseeing import record as record_of
+from server_gui.core.fleet.live_prediction import record as record_of
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.tuning.stop import StopState
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.main_window import MainWindow
 from server_gui.views.recordings.panel import Recordings

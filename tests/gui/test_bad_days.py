@@ -12,11 +12,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
 
 from gateway.client import ConnectionState
-from gateway.messages import LayoutInfo
+from gateway.wire.messages import LayoutInfo
 from server_gui.app import App
-from server_gui.core.desk.news import NewsKind
-from server_gui.core.events import LinkChanged
-from server_gui.core.settings import ServerSettings, add_robots
+from server_gui.core.follow.events import LinkChanged
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.views.main_window import MainWindow
 from server_gui.views.widgets.files import ask_open, ask_save
 from tests.fake_robot import FakeRobot

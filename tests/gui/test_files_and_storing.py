@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog
 
 from gateway.client import LinkLost, RemoteError
-from gateway.messages import ComponentInfo, Stored, Written
-from server_gui.core.desk.writing import WriteState
+from gateway.wire.messages import ComponentInfo, Stored, Written
+from server_gui.core.tuning.writing import WriteState
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.store_page import SETTLE_MS

@@ -9,13 +9,13 @@ import pytest
 from gateway.client import ConnectionState
 from ml.registry.card import Source
 from ml.serving.trust import Trust
-from server_gui.core.desk.predictions import OFF, Recalled, Shown
 from server_gui.core.desk.station import Station
-from server_gui.core.events import LinkChanged
+from server_gui.core.follow.events import LinkChanged
+from server_gui.core.prediction.current import OFF, Recalled, Shown
 from server_gui.core.prediction.news import Ruled, Serves
-from server_gui.core.prediction.settings import Action, RuleSettings
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
+from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.foreseen import lines, model_phases, status
 from server_gui.views.main_window import MainWindow
 from tests.gui.fakes import Bench, looked, walking

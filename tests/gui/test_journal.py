@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from gateway.client import ConnectionState
-from gateway.messages import QualityInfo, Snapshot
-from server_gui.core.desk.acts import OPEN, Act, acts
-from server_gui.core.desk.audit import KEPT, Audit
-from server_gui.core.events import Journalled, LinkChanged, Looked
+from gateway.wire.messages import QualityInfo, Snapshot
+from server_gui.core.audit.acts import OPEN, Act, acts
+from server_gui.core.audit.journal import KEPT, Audit
+from server_gui.core.follow.events import Journalled, LinkChanged, Looked
 from tests.gui.fakes import HELD, Bench, described, looked, telemetry
 from tests.gui.journals import RobotsJournal
 

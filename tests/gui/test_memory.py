@@ -13,9 +13,9 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Batch, ClockOffset, ConnectionState
-from gateway.messages import ProcessUse, Written
+from gateway.wire.messages import ProcessUse, Written
 from server_gui.core.desk.station import Station
-from server_gui.core.events import LinkChanged, Telemetry
+from server_gui.core.follow.events import LinkChanged, Telemetry
 from server_gui.views.main_window import MainWindow
 from tests.gui.fakes import Bench, described, looked, resources, walking
 

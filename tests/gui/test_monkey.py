@@ -18,8 +18,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import ConnectionState, NotConnected
-from gateway.messages import Confirmed, Lease, ProcessUse, Reset, Reverted, Stopped, Stored, Written
-from server_gui.core.events import LinkChanged
+from gateway.wire.messages import Confirmed, Lease, ProcessUse, Reset, Reverted, Stopped, Stored, Written
+from server_gui.core.follow.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
 from tests.gui.fakes import HELD, JOINTS, Bench, FakeCommands, described, looked, resources, walking

@@ -3,8 +3,8 @@
 import pytest
 
 from server_gui import qt_needs
-from server_gui.commands.gui import main
-from server_gui.core.settings import SettingsError
+from server_gui.cli.gui import main
+from server_gui.core.settings.server_file import SettingsError
 from server_gui.qt_needs import NoWindow
 
 

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
-from gateway.messages import LayoutInfo
+from gateway.wire.messages import LayoutInfo
 from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.desk.walk import leg_phase, phase_at
 from server_gui.core.processing.gait_events import Leg

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 
 from gateway.client import CallTimeout, RemoteError
-from gateway.messages import Confirmed, Lease, Reverted, Written
+from gateway.wire.messages import Confirmed, Lease, Reverted, Written
 from server_gui.core.processing.units import Units
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import SETTLE_MS

@@ -9,7 +9,7 @@ from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QApplication, QMessageBox, QWidget
 
 import server_gui.views
-from gateway.messages import ProcessUse
+from gateway.wire.messages import ProcessUse
 from server_gui.core.processing.units import Units
 from server_gui.views.processes import ProcessModel
 from server_gui.views.theme import Theme

@@ -17,13 +17,19 @@ from ml.store.tables import TELEMETRY
 from server_gui.app import App
 from server_gui.core.desk import feeds
 from server_gui.core.desk.feeds import Record
-from server_gui.core.desk.news import News
 from server_gui.core.desk.recording import SOON, By, Recording, Tone
 from server_gui.core.fleet.collector import Collector, CollectorReport
-from server_gui.core.fleet.statistics import LinkStatistics
+from server_gui.core.fleet.link_statistics import LinkStatistics
+from server_gui.core.follow.news import News
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload, add_robots
+from server_gui.core.settings.server_file import (
+    RecordingSettings,
+    ServerSettings,
+    StoreSettings,
+    Upload,
+    add_robots,
+)
 from server_gui.views.widgets.elided import ElidedLabel
 from tests.fake_robot import FakeRobot
 from tests.gui.running import running, wait

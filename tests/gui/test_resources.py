@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from PySide6.QtCore import Qt
 
 from gateway.client import ConnectionState
-from gateway.messages import BudgetInfo, ClientCost, GatewayCost, ProcessUse, Throttling
-from server_gui.core.events import Costs, LinkChanged
+from gateway.wire.messages import BudgetInfo, ClientCost, GatewayCost, ProcessUse, Throttling
+from server_gui.core.follow.events import Costs, LinkChanged
 from server_gui.views.computer import held_back
 from server_gui.views.processes import CPU, MEMORY, NAME
 from server_gui.views.resources import Resources

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtGui import QImage
 
-from gateway.messages import ProcessUse
+from gateway.wire.messages import ProcessUse
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, looked, resources, stop_is_whole, walking

@@ -8,8 +8,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
 from gateway.client import LinkLost, NotConnected
-from gateway.messages import Reset, Stopped
-from server_gui.core.desk.stopping import StopState
+from gateway.wire.messages import Reset, Stopped
+from server_gui.core.tuning.stop import StopState
 from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys

@@ -8,8 +8,8 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 
-from server_gui.core.settings import SettingsError, load
-from server_gui.core.settings_file import change
+from server_gui.core.settings.file_edits import change
+from server_gui.core.settings.server_file import SettingsError, load
 from server_gui.views.cloud.settings_form import SettingsForm
 from server_gui.views.theme import Theme
 from tests.gui.fakes import destroy

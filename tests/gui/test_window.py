@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
-from server_gui.core.events import LinkChanged
+from server_gui.core.follow.events import LinkChanged
 from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme

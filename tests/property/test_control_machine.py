@@ -83,9 +83,9 @@ class ControlMachine(RuleBasedStateMachine):
         self.ending.callback(self.the_journal_is_intact)
         patch = self.ending.enter_context(pytest.MonkeyPatch.context())
         self.bench = Bench()
-        patch.setattr("gateway.modules.component.assemble", self.bench.assemble)
-        patch.setattr("gateway.modules.trials.LAST_RETRY_S", 0.02)
-        patch.setattr("gateway.modules.trials.FIRST_RETRY_S", 0.02)
+        patch.setattr("gateway.modules.component.module.assemble", self.bench.assemble)
+        patch.setattr("gateway.modules.control.trials.LAST_RETRY_S", 0.02)
+        patch.setattr("gateway.modules.control.trials.FIRST_RETRY_S", 0.02)
         text = ROBOT.replace(HEAD, HEAD.replace("port = 0", 'port = 0\nrecords = "records"')) + GUARD
         settled = config(folder, text)
         self.folder = RecordsFolder(settled.records)

@@ -16,7 +16,7 @@ from ml.store import Store
 from ml.store.errors import NoSuchTable
 from ml.store.tables import TELEMETRY
 from server_gui.core.fleet.collector import CollectorReport
-from server_gui.core.fleet.door import NobodyCollects, ask
+from server_gui.core.fleet.control_socket import NobodyCollects, ask
 from tests.scenario.processes import DEADLINE_S, until
 
 KEYS = ("session", "connection", "stream", "seq", "row", "stamp_ns")

@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from server_gui.terminal.children import Child, ChildFailed
+from server_gui.processes.children import Child, ChildFailed
 
 DEADLINE_S = 120.0
 

@@ -20,7 +20,7 @@ from hil_sim.control_socket import ask
 from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import JOINTS
 from hil_sim.robot import SimulatedRobot
-from server_gui.terminal.children import Child, ChildFailed
+from server_gui.processes.children import Child, ChildFailed
 from tests.scenario.processes import DEADLINE_S, nothing
 from tests.scenario.processes import until as until_told
 from tests.unit.gateway.harness import Client, serving

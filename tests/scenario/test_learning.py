@@ -23,9 +23,9 @@ from ml.store import NoSuchTable, Store
 from ml.store.labels import Label, Source
 from ml.store.sessions import Session as Stored
 from ml.store.sessions import labels, sessions
-from server_gui.core.labelling import Labelling
+from server_gui.core.archive.labelling import Labelling
 from server_gui.core.prediction.state import PredictingState
-from server_gui.core.settings import load
+from server_gui.core.settings.server_file import load
 from tests.scenario.collecting import Collecting
 from tests.scenario.processes import Bench, until
 from tests.unit.training.walkers import BEGAN_UTC, Made, put

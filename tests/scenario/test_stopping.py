@@ -20,7 +20,7 @@ from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import JOINTS
 from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.robot import SimulatedRobot
-from server_gui.terminal.children import ChildFailed
+from server_gui.processes.children import ChildFailed
 from tests.scenario.processes import Bench, gwrms
 from tests.scenario.processes import until as until_processes
 from tests.unit.gateway.harness import Client, serving, until

@@ -18,7 +18,7 @@ from hil_sim.control_socket import ask
 from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.node.dictionary import Value
 from hil_sim.robot import SimulatedRobot
-from server_gui.terminal.children import Child
+from server_gui.processes.children import Child
 from tests.scenario.processes import DEADLINE_S, Bench, is_dead, listening, nothing
 from tests.scenario.processes import until as until_processes
 from tests.unit.gateway.harness import Answered, Client, serving, until

@@ -22,11 +22,11 @@ from drivers.bus.frames import ERROR
 from drivers.bus.sdo_channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.config import RobotConfig, load
-from gateway.futures import done, failed
 from gateway.guard.rules import Rule
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
-from gateway.modules.assembly import Robot, assemble
+from gateway.modules.component.assembly import Robot, assemble
+from gateway.process.futures import done, failed
 from hil_sim import robot_file
 from hil_sim.bus.can_bus import Frame
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock
@@ -254,7 +254,7 @@ class Watched:
         self._ports: dict[str, DirectPort] = {}
         make = partial(DirectPort, ports=self._ports, now_ns=self.now_ns)
         monkeypatch.setattr("drivers.line.SerialPort", make)
-        monkeypatch.setattr("gateway.modules.assembly.CanBus", DirectBus)
+        monkeypatch.setattr("gateway.modules.component.assembly.CanBus", DirectBus)
 
     def _config(self, folder: Path, rules: str) -> RobotConfig:
         text = robot_file.text(folder, robot_file.virtual_bus("none"), self.simulated)

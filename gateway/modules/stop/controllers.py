@@ -13,10 +13,10 @@ from drivers.joint.quick_stop import FIRST_PATIENCE_S, READ_PERIOD_S, StopOutcom
 from eds import Description
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Coding, CodingError
-from gateway.futures import failed
 from gateway.modules.stop.machine import Finding
 from gateway.modules.stop.settings import ControllerStop
 from gateway.modules.stop.target import OneAtATime, Report
+from gateway.process.futures import failed
 
 INSIST_S = 1.0  # how long a controller may take to confirm
 

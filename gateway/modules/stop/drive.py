@@ -10,7 +10,7 @@ from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
 from drivers.latest import Latest
 from drivers.samples import Channel
-from gateway.futures import failed
+from gateway.process.futures import failed
 
 
 class Drive(Protocol):

@@ -11,12 +11,12 @@ from drivers.joint.cia402 import MODES, DriveState, option_text
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
-from gateway.futures import back, done, failed, gather, then
-from gateway.loop import Loop
-from gateway.messages import Enabled
 from gateway.modules.stop.drive import Drive, quick_stop
 from gateway.modules.stop.reset import as_led, state_words
+from gateway.process.futures import back, done, failed, gather, then
+from gateway.process.loop import Loop
 from gateway.records.journal import Journal
+from gateway.wire.messages import Enabled
 
 Objection = Callable[[], str | None]  # why it must not go on, `None` where it may
 

@@ -11,12 +11,12 @@ from functools import partial
 
 from drivers.joint.cia402 import DriveState
 from drivers.joint.leading import OVERTAKEN, Led
-from gateway.futures import back, done, failed, gather, then, within
-from gateway.loop import Loop
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.machine import Finding
 from gateway.modules.stop.target import stop_all
+from gateway.process.futures import back, done, failed, gather, then, within
+from gateway.process.loop import Loop
 
 # States in which a drive has no current; only what is known to be in one of them lets a hold end.
 AT_REST = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})

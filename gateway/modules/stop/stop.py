@@ -9,14 +9,14 @@ from concurrent.futures import Future
 from typing import Any
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway.futures import back, done, gather, outcome, then
-from gateway.loop import Loop
-from gateway.messages import StopOutcome as Said
-from gateway.messages import Stopped
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.settings import Fallback, StopSettings
 from gateway.modules.stop.stopper import Stopper, Tell, nmt_stop
 from gateway.modules.stop.target import Report, Target
+from gateway.process.futures import back, done, gather, outcome, then
+from gateway.process.loop import Loop
+from gateway.wire.messages import StopOutcome as Said
+from gateway.wire.messages import Stopped
 
 log = logging.getLogger(__name__)
 

@@ -14,16 +14,12 @@ from typing import TYPE_CHECKING, cast
 
 from drivers.bus.settings import Role
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
-from gateway import messages
-from gateway.boot import boot_id
 from gateway.config import RobotConfig
-from gateway.futures import back, done, gather, outcome, pass_on, then
-from gateway.loop import Loop
 from gateway.modules.stop.authority import Address, Authority
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.enabling import Enabling
-from gateway.modules.stop.hold_file import HeldStop, HoldFile
+from gateway.modules.stop.hold_record import HeldStop, HoldFile
 from gateway.modules.stop.machine import OVERTAKEN, Action, Input, Step
 from gateway.modules.stop.reset import Descent, Lowering
 from gateway.modules.stop.stop import StopAnswers
@@ -31,13 +27,17 @@ from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Report, Target, stop_all
 from gateway.modules.stop.thread import Ended, StopThread
 from gateway.modules.stop.watch import LOOK_S, Watch
+from gateway.process.boot import boot_id
+from gateway.process.futures import back, done, gather, outcome, pass_on, then
+from gateway.process.loop import Loop
 from gateway.records.journal import Share
 from gateway.records.records import Records
-from gateway.sources import check_globs, matches
-from gateway.wire import Kind, refuse
+from gateway.streaming.sources import check_globs, matches
+from gateway.wire import messages
+from gateway.wire.framing import Kind, refuse
 
 if TYPE_CHECKING:
-    from gateway.modules.component import ComponentModule
+    from gateway.modules.component.module import ComponentModule
 
 REWRITE_S = 5.0  # how often a record is tried again that could not be written
 GATEWAY = "gateway"  # who the journal says it was, where nobody asked

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from drivers.bus.arming import ACTING
 from drivers.joint.quick_stop import StopOutcome
-from gateway.futures import done, then
 from gateway.modules.stop.drive import Drive, quick_stop
 from gateway.modules.stop.settings import Fallback
 from gateway.modules.stop.target import OneAtATime, Report
+from gateway.process.futures import done, then
 
 Tell = Callable[[str, str], object]  # a drive's name, and what was done to it in words
 

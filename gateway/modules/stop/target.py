@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway.futures import pass_on
+from gateway.process.futures import pass_on
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from drivers.urgency import make_urgent
-from gateway.memory import MemoryLock
+from gateway.process.memory import MemoryLock
 
 log = logging.getLogger(__name__)
 

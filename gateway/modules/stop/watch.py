@@ -15,13 +15,13 @@ from typing import Any
 from drivers.bus.emcy import Emcy
 from drivers.errors import DriverError
 from drivers.samples import Sample
-from gateway.futures import outcome
 from gateway.modules.stop.authority import Authority
 from gateway.modules.stop.controllers import Controller
 from gateway.modules.stop.drive import Drive, is_enabled
 from gateway.modules.stop.machine import Finding, Input, Phase
 from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Target, stop_all
+from gateway.process.futures import outcome
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ from ml.store.errors import NoSuchTable
 from ml.store.fragments import DataFile
 from ml.store.store import Batches, Store
 from ml.store.tables import TELEMETRY, Table
-from server_gui.core.recording import lacking
+from server_gui.core.recording import missing_rows
 from server_gui.core.recording.receipts import Part
 
 Whose = tuple[str, str | None, str | None]  # location; robot and session where rows of these lie together
@@ -44,7 +44,7 @@ class Again(Store):
         """As `Store.append`, but what is missing is added also where the number is known; always True."""
         super().append(table, location, schema, lambda: iter(()), writer, 0)  # its columns, and no rows
         before = len(self.passed) + len(self.left)
-        rows = lacking.newer(self._lacking(table, location, schema, batches), self, location)
+        rows = missing_rows.newer(self._lacking(table, location, schema, batches), self, location)
         is_whole = len(self.passed) + len(self.left) == before
         known = (self.table(location).transaction_version(writer) or 0) >= sequence
         if is_whole and not known:
@@ -58,12 +58,12 @@ class Again(Store):
         self, table: Table, location: str, schema: pa.Schema, batches: Batches
     ) -> list[pa.RecordBatch]:
         if table.name == TELEMETRY.name:
-            return lacking.of_telemetry(self, location, self._open_ones(location, batches()), self._hear)
+            return missing_rows.of_telemetry(self, location, self._open_ones(location, batches()), self._hear)
         if (location, *NOBODYS) in self.closed:
             self.passed.add(location)
             return []
         rows = pa.Table.from_batches(batches(), schema)
-        found: list[pa.RecordBatch] = lacking.of_rows(self, table, rows, self._hear).to_batches()
+        found: list[pa.RecordBatch] = missing_rows.of_rows(self, table, rows, self._hear).to_batches()
         return found
 
     def _open_ones(self, location: str, runs: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:

@@ -10,9 +10,9 @@ from enum import Enum
 from typing import Final
 
 from ml.store.errors import StoreError
-from server_gui.core.background import Background
-from server_gui.core.fleet.door import NobodyCollects
+from server_gui.core.fleet.control_socket import NobodyCollects
 from server_gui.core.recording.errors import RecordingError
+from server_gui.core.threads.background import Background
 
 log = logging.getLogger(__name__)
 

@@ -11,11 +11,11 @@ from mcap.records import Schema
 from mcap_ros2.writer import Writer
 
 from ml.store.sessions import Session
-from server_gui.core.cloud.chosen import Recording, Row
-from server_gui.core.cloud.drafts import draft
+from server_gui.core.cloud.atomic_files import draft
 from server_gui.core.cloud.ros import definition, header
+from server_gui.core.cloud.selection import Recording, Row
 from server_gui.core.cloud.topics import Message, Topic, ros_name, topics
-from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.batching import EventKind
 
 EVENTS_TOPIC: Final = "/diagnostics"
 _LEVELS: Final = {EventKind.MARKER.value: 0, EventKind.LOST.value: 2}  # of DiagnosticStatus; others are 1

@@ -3,7 +3,7 @@
 import msgspec
 
 from ml.store.store import Store
-from server_gui.core.cloud.proving import tables
+from server_gui.core.cloud.receipt_check import tables
 from server_gui.core.recording.receipts import Receipt, canonical
 from server_gui.core.recording.spool import Spool
 

@@ -11,7 +11,7 @@ from ml.store.errors import StoreError
 from ml.store.sessions import Session
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY, Table
-from server_gui.core.cloud.merging import Merge
+from server_gui.core.cloud.merge import Merge
 
 Advance = Callable[[int], object]
 

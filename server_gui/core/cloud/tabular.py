@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 
 from ml.store.sessions import KEYS, Channel
 from ml.store.tables import TELEMETRY, field
-from server_gui.core.cloud.chosen import Recording
-from server_gui.core.cloud.drafts import draft
+from server_gui.core.cloud.atomic_files import draft
+from server_gui.core.cloud.selection import Recording
 
 
 def write_csv(file: Path, recording: Recording) -> int:

@@ -15,7 +15,7 @@ from ml.store.sessions import Channel, Session
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.rows import Floats, Ints
-from server_gui.core.settings import ServerSettings
+from server_gui.core.settings.server_file import ServerSettings
 
 Bools = npt.NDArray[np.bool_]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from gateway.cli.text import counted, size
 from ml.store.fragments import DataFile
-from server_gui.core.cloud.proving import Proof
+from server_gui.core.cloud.receipt_check import Proof
 
 
 @dataclass(frozen=True, slots=True)

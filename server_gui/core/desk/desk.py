@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from server_gui.core.desk.news import News
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.news import News
 from server_gui.core.processing.units import Units
 
 

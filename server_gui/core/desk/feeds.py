@@ -14,19 +14,19 @@ from typing import Final, Self
 from msgspec.structs import replace
 
 from gateway.client import Address
-from server_gui.core.desk.answers import Deliver
-from server_gui.core.desk.news import News
 from server_gui.core.desk.recording import By, Recording
-from server_gui.core.events import Event, without_processes
-from server_gui.core.feed import Feed, Following
 from server_gui.core.fleet.collector import Collector, whole
-from server_gui.core.fleet.elsewhere import Elsewhere
-from server_gui.core.network import Network
+from server_gui.core.fleet.remote_collector import Elsewhere
+from server_gui.core.follow.events import Event, without_processes
+from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.network import Network
+from server_gui.core.follow.news import News
 from server_gui.core.prediction.news import Foreseen
-from server_gui.core.prediction.predicting import Predicting
+from server_gui.core.prediction.service import Predicting
 from server_gui.core.recording.errors import SpoolUnusable
-from server_gui.core.settings import RecordingSettings, ServerSettings
-from server_gui.core.watching import Watch
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings
+from server_gui.core.threads.answers import Deliver
+from server_gui.core.threads.supervision import Watch
 
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first

@@ -8,11 +8,11 @@ from enum import Enum
 from typing import Final, Protocol
 
 from gateway.cli.text import size
-from server_gui.core.desk.answers import Deliver, when_done
-from server_gui.core.desk.news import News, NewsKind
 from server_gui.core.fleet.collector import CollectorReport
+from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import AlarmKind
-from server_gui.core.watching import Trouble
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.threads.supervision import Trouble
 
 LOOK_NS: Final = 1_000_000_000  # between looks
 SOON: Final = "this window records as soon as it can"

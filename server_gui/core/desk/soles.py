@@ -6,8 +6,8 @@ from functools import cache
 from importlib import resources
 from typing import Final
 
-from gateway.messages import LayoutInfo
-from server_gui.core.robot import Robot
+from gateway.wire.messages import LayoutInfo
+from server_gui.core.follow.robot import Robot
 
 Cell = tuple[float, float]  # x forward from the heel, y left, m
 

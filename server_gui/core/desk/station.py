@@ -9,7 +9,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
-from gateway.messages import (
+from gateway.wire.messages import (
     Description,
     GatewayCost,
     Lease,
@@ -19,21 +19,9 @@ from gateway.messages import (
     Stored,
     Written,
 )
-from server_gui.core.desk.answers import Deliver, Result, when_done
-from server_gui.core.desk.audit import Audit
-from server_gui.core.desk.commands import Commands
-from server_gui.core.desk.comparison import Comparison
-from server_gui.core.desk.control import Control
-from server_gui.core.desk.edits import Change, Edits
-from server_gui.core.desk.link import LEASE_S
-from server_gui.core.desk.news import News, NewsKind
-from server_gui.core.desk.predictions import StationPredictions
+from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.rings import Rings
-from server_gui.core.desk.stopping import Stopping
-from server_gui.core.desk.stored import Flash
-from server_gui.core.desk.watch import Watch
-from server_gui.core.desk.writing import WriteState, Writing
-from server_gui.core.events import (
+from server_gui.core.follow.events import (
     Costs,
     Described,
     Event,
@@ -43,10 +31,22 @@ from server_gui.core.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.follow.news import News, NewsKind
+from server_gui.core.follow.robot import Robot
+from server_gui.core.follow.robot_news import Watch
+from server_gui.core.prediction.current import StationPredictions
 from server_gui.core.prediction.news import Foreseen, Ruled
 from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.processing.units import Units
-from server_gui.core.robot import Robot
+from server_gui.core.threads.answers import Deliver, Result, when_done
+from server_gui.core.tuning.commands import Commands
+from server_gui.core.tuning.comparison import Comparison
+from server_gui.core.tuning.edits import Change, Edits
+from server_gui.core.tuning.flash import Flash
+from server_gui.core.tuning.lease import Control
+from server_gui.core.tuning.link import LEASE_S
+from server_gui.core.tuning.stop import Stopping
+from server_gui.core.tuning.writing import WriteState, Writing
 
 WATCH_NS: Final = 200_000_000  # between looks for news
 OVERDUE_S: Final = 2.0  # after a trial's end its values are looked at again

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from server_gui.core.cloud.tape import Rows
-from server_gui.core.events import Event, Telemetry, replaced
+from server_gui.core.follow.events import Event, Telemetry, replaced
 from server_gui.core.recording.rows import Floats, Ints
 
 PERIOD_NS: Final = 10_000_000

@@ -14,23 +14,23 @@ import msgspec
 from msgspec import Struct
 
 from gateway.client import Address
-from gateway.messages import ResourceSnapshotParams
+from gateway.wire.messages import ResourceSnapshotParams
 from ml.store import Store
-from server_gui.core.events import Event
-from server_gui.core.feed import ONCE, Following
-from server_gui.core.fleet.door import Answers, door
+from server_gui.core.fleet.control_socket import Answers, door
 from server_gui.core.fleet.fleet import Fleet, Show
-from server_gui.core.fleet.foreseeing import Foresee, Foreseeing
-from server_gui.core.fleet.statistics import LinkReport
-from server_gui.core.network import Network
+from server_gui.core.fleet.link_statistics import LinkReport
+from server_gui.core.fleet.live_prediction import Foresee, Foreseeing
+from server_gui.core.follow.events import Event
+from server_gui.core.follow.feed import ONCE, Following
+from server_gui.core.follow.network import Network
 from server_gui.core.prediction.state import PredictingState
-from server_gui.core.recording.compacting import Compacting
+from server_gui.core.recording.compaction import Compacting
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader, UploaderState
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload
-from server_gui.core.watching import Trouble, Watch
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings, Upload
+from server_gui.core.threads.supervision import Trouble, Watch
 
 log = logging.getLogger(__name__)
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from gateway.client import Address
-from server_gui.core.events import Event, Failed, StopAnswered
-from server_gui.core.feed import Feed, Following
-from server_gui.core.fleet.keeping import Keeping
-from server_gui.core.fleet.saying import Saying
-from server_gui.core.fleet.statistics import LinkReport, LinkStatistics
+from server_gui.core.fleet.link_log import Saying
+from server_gui.core.fleet.link_statistics import LinkReport, LinkStatistics
+from server_gui.core.fleet.robot_recording import Keeping
+from server_gui.core.follow.events import Event, Failed, StopAnswered
+from server_gui.core.follow.feed import Feed, Following
 from server_gui.core.recording.recorder import Recorder
 
 log = logging.getLogger(__name__)

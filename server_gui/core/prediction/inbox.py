@@ -4,7 +4,7 @@ import collections
 import threading
 from typing import Final
 
-from server_gui.core.events import Event, Telemetry
+from server_gui.core.follow.events import Event, Telemetry
 
 MOST_NS: Final = 10_000_000_000  # of rows that may wait, robot by robot
 

@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Self
 
 from gateway.client import Address
-from gateway.messages import ResourceSnapshotParams
+from gateway.wire.messages import ResourceSnapshotParams
 from ml.robot.groups import GROUPS
-from server_gui.core.desk.predictions import StationPredictions
-from server_gui.core.events import Event, LinkChanged
-from server_gui.core.feed import ONCE, Feed, Following, Tell
-from server_gui.core.mailbox import Mailbox
-from server_gui.core.network import Network
+from server_gui.core.follow.events import Event, LinkChanged
+from server_gui.core.follow.feed import ONCE, Feed, Following, Tell
+from server_gui.core.follow.mailbox import Mailbox
+from server_gui.core.follow.network import Network
+from server_gui.core.follow.robot import Robot
+from server_gui.core.prediction.current import StationPredictions
 from server_gui.core.prediction.news import Foreseen
-from server_gui.core.prediction.predicting import Predicting
-from server_gui.core.robot import Robot
-from server_gui.core.settings import ServerSettings
+from server_gui.core.prediction.service import Predicting
+from server_gui.core.settings.server_file import ServerSettings
 
 MOST: Final = 10_000  # foreseen, that wait for nobody
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
-from server_gui.core.prediction.settings import RuleSettings
 from server_gui.core.prediction.state import Quality
+from server_gui.core.settings.prediction import RuleSettings
 
 
 @dataclass(frozen=True, slots=True)

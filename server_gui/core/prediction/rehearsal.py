@@ -8,7 +8,7 @@ from msgspec import Struct
 
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction.rules import Rule
-from server_gui.core.prediction.settings import RuleSettings
+from server_gui.core.settings.prediction import RuleSettings
 
 FORESEEN_NS: Final = 1_500_000_000  # before what it foresees, a rule may begin so early
 HOUR_NS: Final = 3_600_000_000_000

@@ -12,7 +12,7 @@ from ml.evaluate.alarms import Told
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction.rehearsal import Rehearsed, Stretch, rehearse
 from server_gui.core.prediction.replay import Replayed
-from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
+from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 
 SECOND_NS: Final = 1_000_000_000
 ALSO: Final[Mapping[str, frozenset[str]]] = MappingProxyType(

@@ -20,10 +20,10 @@ from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS
 from ml.training.recorded import Recorded, recorded
 from ml.training.truth import NOBODY
-from server_gui.core.prediction.comparing import Decisions, compared, counted, quality
-from server_gui.core.prediction.serving import Model
-from server_gui.core.prediction.settings import PredictionSettings
+from server_gui.core.prediction.model_loading import Model
+from server_gui.core.prediction.scoring import Decisions, compared, counted, quality
 from server_gui.core.prediction.state import Quality
+from server_gui.core.settings.prediction import PredictionSettings
 
 
 class Live(Struct, frozen=True):

@@ -5,7 +5,7 @@ from typing import Final
 
 from ml.robot.task import ABNORMAL
 from ml.serving.predictor import Prediction
-from server_gui.core.prediction.settings import RuleSettings
+from server_gui.core.settings.prediction import RuleSettings
 
 HOLE: Final = 3  # times `every_ns`: longer without a prediction, and it begins anew
 

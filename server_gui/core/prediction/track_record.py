@@ -21,7 +21,7 @@ from ml.store.fragments import DataFile, data_files
 from ml.store.labels import ACTIVITIES, INSTANTS, Label, holding
 from ml.store.tables import LABELS, PREDICTIONS, Table
 from ml.training.recorded import Recorded
-from server_gui.core.prediction.comparing import Counts, Decisions, compared, counted, quality
+from server_gui.core.prediction.scoring import Counts, Decisions, compared, counted, quality
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures
 
 Key = tuple[str, str, str]  # robot, task, model

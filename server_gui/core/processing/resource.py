@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec import UNSET
 
-from gateway.messages import ProcessUse, ResourceSnapshot
+from gateway.wire.messages import ProcessUse, ResourceSnapshot
 from server_gui.core.processing.history import COARSE_S, Floats, History
 from server_gui.core.processing.trend import Slope, theil_sen
 

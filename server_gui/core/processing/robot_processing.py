@@ -2,15 +2,15 @@
 
 import time
 
-from gateway.messages import Description
-from server_gui.core.events import Described, Event, LinkChanged, Looked, Refused, Resources, Telemetry
+from gateway.wire.messages import Description
+from server_gui.core.follow.events import Described, Event, LinkChanged, Looked, Refused, Resources, Telemetry
 from server_gui.core.processing.communication import LinkMonitor, LinkQuality
 from server_gui.core.processing.component import ComponentProcessing, Derived
 from server_gui.core.processing.resource import ResourceProcessing
 
 
 class RobotProcessing:
-    """Fed with the same events as `server_gui.core.robot.Robot`, by one thread; views only read.
+    """Fed with the same events as `server_gui.core.follow.robot.Robot`, by one thread; views only read.
 
     A robot that was started again has another clock: what was derived from its samples begins anew, what is
     known of its link and computer stays.

@@ -11,19 +11,19 @@ from enum import Enum
 from typing import Any, Final, NamedTuple, Self
 
 from gateway.client import Batch
-from gateway.messages import Description, ResourceSnapshot
+from gateway.wire.messages import Description, ResourceSnapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES, TELEMETRY
 from server_gui.core.recording import records
+from server_gui.core.recording.batching import EventKind, Notification
 from server_gui.core.recording.clocks import Moment, Reading
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
-from server_gui.core.recording.gathering import EventKind, Notification
-from server_gui.core.recording.journals import Entry
-from server_gui.core.recording.lost import Losses, Part
+from server_gui.core.recording.journal_tail import Entry
+from server_gui.core.recording.losses import Losses, Part
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.robots import Robots
 from server_gui.core.recording.rows import Record, Run
 from server_gui.core.recording.spool import Spool
-from server_gui.core.watching import BEAT_S, Worker
+from server_gui.core.threads.supervision import BEAT_S, Worker
 
 log = logging.getLogger(__name__)
 

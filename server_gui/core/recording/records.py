@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import msgspec
 
-from gateway.messages import ResourceSnapshot
+from gateway.wire.messages import ResourceSnapshot
 from ml.store.labels import Label
 from server_gui.core.recording.rows import Record
 

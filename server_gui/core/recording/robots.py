@@ -3,14 +3,14 @@
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 
-from gateway.messages import Description, ResourceSnapshot
+from gateway.wire.messages import Description, ResourceSnapshot
 from ml.store.tables import PREDICTIONS
-from server_gui.core import arriving
+from server_gui.core.follow import validation
 from server_gui.core.recording import records
+from server_gui.core.recording.batching import EventKind, Gathering, Notification
 from server_gui.core.recording.clocks import Moment
-from server_gui.core.recording.gathering import EventKind, Gathering, Notification
-from server_gui.core.recording.journals import Entry, news
-from server_gui.core.recording.lost import Lost
+from server_gui.core.recording.journal_tail import Entry, news
+from server_gui.core.recording.losses import Lost
 from server_gui.core.recording.records import Facts, Session
 from server_gui.core.recording.rows import JournalHead, Record, Run
 
@@ -127,7 +127,7 @@ class Robots:
             Unfit: it is no journal; what is recorded of it stays as it was.
 
         """
-        arriving.journal(entries)
+        validation.journal(entries)
         new = news(entries, self.heads.get(robot))
         found = [records.journal(robot, entry) for entry in new.entries]
         if entries:

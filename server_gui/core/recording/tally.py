@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 
 from ml.store import sums
 from ml.store.tables import UTC
-from server_gui.core.recording.lacking import numbers_alone
+from server_gui.core.recording.missing_rows import numbers_alone
 from server_gui.core.recording.receipts import Mark, Part, Stream
 
 Units = Mapping[str, str | None]

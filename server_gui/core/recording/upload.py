@@ -17,12 +17,12 @@ from ml.store import upkeep
 from ml.store.errors import NoSuchTable, translated
 from ml.store.store import Store
 from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
-from server_gui.core.recording import lacking
+from server_gui.core.recording import missing_rows
+from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
-from server_gui.core.recording.gathering import EventKind
-from server_gui.core.recording.lost import told_time
+from server_gui.core.recording.losses import told_time
 from server_gui.core.recording.receipts import ANEW, Part, Receipt, went_to
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
@@ -115,7 +115,7 @@ def _append(spool: Spool, store: Store, lost: "_Lost", writer: str, number: int,
     rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
     new = _bring(store, rows, f"{writer}.{named}")
     if not (new or _is_retained(spool, store, writer, number)):
-        gone = lacking.of_rows(store, EVENTS, rows)
+        gone = missing_rows.of_rows(store, EVENTS, rows)
         new = gone.num_rows > 0 and _bring(store, gone, f"{writer}.{named}.{uuid.uuid4().hex[:12]}")
     if new:
         spool.receipts.add(Receipt(writer, number, store.url, (_told(store, writer, number),), (lost.text,)))
@@ -222,7 +222,7 @@ def _telemetry(
                 yield batch
 
     if not store.append(TELEMETRY, location, columns.schema, batches, writer, segment.number):
-        look = functools.partial(lacking.of_telemetry, store, location)
+        look = functools.partial(missing_rows.of_telemetry, store, location)
         _complete(store, TELEMETRY, location, writer, segment.number, lambda: look(batches()))
     return tally.parts(location, store.identity(location), _units(store, location, columns.schema))
 
@@ -230,7 +230,7 @@ def _telemetry(
 def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -> Part:
     again = functools.partial(data.to_reader, None)
     if not store.append(table, table.name, data.schema, again, writer, batch):
-        look = functools.partial(lacking.of_rows, store, table, data)
+        look = functools.partial(missing_rows.of_rows, store, table, data)
         _complete(store, table, table.name, writer, batch, lambda: look().to_batches())
     units = _units(store, table.name, data.schema)
     return tallied(data, table.name, store.identity(table.name), units)
@@ -251,12 +251,12 @@ def _complete(
     look: Callable[[], list[pa.RecordBatch]],
 ) -> None:
     """Bring what the table lacks of a batch whose number it knows, but for what retention has removed."""
-    rows = lacking.newer(look(), store, location)
+    rows = missing_rows.newer(look(), store, location)
     if not rows:
         return
-    named = lacking.name(writer, batch, rows)
+    named = missing_rows.name(writer, batch, rows)
     new = store.append(table, location, rows[0].schema, lambda: iter(rows), named, 1)
-    if not new and lacking.newer(look(), store, location):
+    if not new and missing_rows.newer(look(), store, location):
         count = sum(each.num_rows for each in rows)
         raise Contradicted(
             f"{store.url}/{location} had {count} rows of batch {batch}, which were removed since"

@@ -13,11 +13,11 @@ from gateway.cli.text import counted
 from gateway.client.backoff import Backoff
 from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.store import Store
-from server_gui.core.recording.compacting import Compacting
+from server_gui.core.recording.compaction import Compacting
 from server_gui.core.recording.errors import Damaged, RecordingError
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, lost_batches, send
-from server_gui.core.watching import Worker
+from server_gui.core.threads.supervision import Worker
 
 log = logging.getLogger(__name__)
 

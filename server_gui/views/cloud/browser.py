@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QHeaderView, QSizePolicy, QTreeWidget, QTreeWidget
 
 from gateway.cli.text import size
 from ml.store.objects import Object
+from server_gui.core.archive.library import Library
 from server_gui.core.cloud.usage import Usage
-from server_gui.core.desk.answers import Deliver, when_done
-from server_gui.core.desk.library import Library
+from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.views.theme import Theme
 
 TITLES: Final = ("Table, robot, file", "Files", "Rows", "Size", "From", "To")

@@ -21,11 +21,11 @@ from PySide6.QtWidgets import (
 
 from gateway.cli.text import size
 from ml.store.sessions import Session
-from server_gui.core.cloud.reached import endpoint_told, keys_told
-from server_gui.core.cloud.work import check, download, upload
-from server_gui.core.desk.archive import Archive
+from server_gui.core.archive.archive import Archive
+from server_gui.core.cloud.actions import check, download, upload
+from server_gui.core.cloud.credentials import endpoint_told, keys_told
 from server_gui.core.desk.recording import Recording
-from server_gui.core.settings import default_file
+from server_gui.core.settings.server_file import default_file
 from server_gui.views.cloud.browser import Browser
 from server_gui.views.cloud.jobs_table import JobsTable, under_way
 from server_gui.views.cloud.settings_form import SettingsForm

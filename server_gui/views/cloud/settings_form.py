@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QPushButton, QWidget
 
-from server_gui.core.settings import ServerSettings, SettingsError, Upload
-from server_gui.core.settings_file import Value, change
+from server_gui.core.settings.file_edits import Value, change
+from server_gui.core.settings.server_file import ServerSettings, SettingsError, Upload
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
 

@@ -7,12 +7,12 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QSlider
 
-from gateway.messages import Number, ParameterInfo
+from gateway.wire.messages import Number, ParameterInfo
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.stored import RULE
 from server_gui.core.processing.units import Unit
+from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.tree import exact
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.elided import ElidedLabel

@@ -3,8 +3,8 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout
 
-from server_gui.core.desk.comparison import Comparison
 from server_gui.core.desk.desk import Desk
+from server_gui.core.tuning.comparison import Comparison
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 

@@ -14,12 +14,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.cli.params_file import FileProblem
-from server_gui.core.desk.comparison import open_file, save_file, staged_as
+from gateway.parameter_files.contents import FileProblem
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.edits import Change, unit_of
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.writing import WriteState
+from server_gui.core.tuning.comparison import open_file, save_file, staged_as
+from server_gui.core.tuning.edits import Change, unit_of
+from server_gui.core.tuning.writing import WriteState
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
 from server_gui.views.parameters.file_bar import FileBar

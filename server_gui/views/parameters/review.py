@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.desk.edits import Change
+from server_gui.core.tuning.edits import Change
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 

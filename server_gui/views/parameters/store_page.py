@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.storing import Storable, objection, storable
+from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.storing import Storable, objection, storable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel

@@ -15,13 +15,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.cli.params_diff import Verdict
-from gateway.messages import ParameterInfo
+from gateway.parameter_files.comparison import Verdict
+from gateway.wire.messages import ParameterInfo
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.stored import RULE
 from server_gui.core.processing.units import Unit
+from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.filter import NAME_ROLE, Filter
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import set_tip

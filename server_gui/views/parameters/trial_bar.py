@@ -4,9 +4,9 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout
 
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.edits import unit_of
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.writing import Trial
+from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.writing import Trial
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
 

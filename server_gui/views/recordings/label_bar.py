@@ -15,8 +15,8 @@ from PySide6.QtWidgets import (
 )
 
 from ml.store.labels import ACTIVITIES, INSTANTS, Label
+from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.cloud.tape import Tape
-from server_gui.core.desk.labels import SessionLabels
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QStackedWidget
 
-from server_gui.core.desk.archive import Archive
+from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.player import Player
 from server_gui.views.recordings.sessions import SessionsPage

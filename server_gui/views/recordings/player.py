@@ -16,11 +16,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.cloud.chosen import Choice
+from server_gui.core.archive.archive import Archive
+from server_gui.core.archive.playback import SPEEDS
+from server_gui.core.cloud.actions import FORMATS, export
+from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import as_time
-from server_gui.core.cloud.work import FORMATS, export
-from server_gui.core.desk.archive import Archive
-from server_gui.core.desk.playback import SPEEDS
 from server_gui.views.foreseen import status
 from server_gui.views.overview import Overview
 from server_gui.views.recordings.label_bar import LabelBar

@@ -21,8 +21,8 @@ from gateway.cli.text import size
 from gateway.plain import plain
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
+from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.tape import Tape
-from server_gui.core.desk.archive import Archive
 from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from ml.store.labels import Label, utc_ns
 from server_gui.core.cloud.tape import Tape
-from server_gui.core.recording.gathering import EventKind
+from server_gui.core.recording.batching import EventKind
 from server_gui.views.marks import Mark, draw
 from server_gui.views.theme import Theme
 

@@ -9,7 +9,7 @@ from gateway.client.connection import Connection
 from gateway.client.errors import ClientError
 from gateway.client.link import Link, LinkSettings
 from gateway.client.subscription import Subscription
-from gateway.messages import METHODS, StreamStartParams
+from gateway.wire.messages import METHODS, StreamStartParams
 
 TOKENS = (
     b'{"jsonrpc":"2.0","id":1,"result":',

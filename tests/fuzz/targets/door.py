@@ -2,7 +2,7 @@
 
 import msgspec
 
-from server_gui.core.fleet.door import _answer
+from server_gui.core.fleet.control_socket import _answer
 from server_gui.core.recording.rows import Record
 
 TOKENS = (
@@ -12,7 +12,7 @@ TOKENS = (
     b'"}',
     b"[[[[",
 )
-MODULES = ("server_gui.core.fleet.door",)
+MODULES = ("server_gui.core.fleet.control_socket",)
 
 
 def _keep(text: str) -> int:

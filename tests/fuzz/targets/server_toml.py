@@ -2,8 +2,8 @@
 
 import tomllib
 
-from server_gui.core.settings import SettingsError, load
-from server_gui.core.settings_file import changed
+from server_gui.core.settings.file_edits import changed
+from server_gui.core.settings.server_file import SettingsError, load
 from tests.fuzz.files import as_file
 
 TOKENS = (
@@ -23,7 +23,7 @@ TOKENS = (
     b"'''",
     b"#",
 )
-MODULES = ("server_gui.core.settings", "server_gui.core.settings_file")
+MODULES = ("server_gui.core.settings.server_file", "server_gui.core.settings.file_edits")
 
 
 def fuzz(data: bytes) -> None:

@@ -2,8 +2,8 @@
 
 import json
 
-from gateway.stop_lines import STOP, StopSplitter, stop_in
-from gateway.wire import BadLine, StopRequest
+from gateway.connections.stop_lines import STOP, StopSplitter, stop_in
+from gateway.wire.framing import BadLine, StopRequest
 
 TOKENS = (
     b'"method": "robot.stop"',
@@ -15,7 +15,7 @@ TOKENS = (
     b"\\",
     b'"reason":',
 )
-MODULES = ("gateway.stop_lines", "gateway.wire")
+MODULES = ("gateway.connections.stop_lines", "gateway.wire.framing")
 SHORT = 64  # bytes, beyond which a line is too long
 
 

@@ -11,12 +11,12 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from eds import dcf
-from gateway.cli.params_diff import Verdict, compare
-from gateway.cli.params_file import COMMANDS
-from gateway.limits import LINE_LIMIT
+from gateway.connections.limits import LINE_LIMIT
 from gateway.main import main
-from gateway.messages import ParameterInfo, ParameterValue
-from gateway.modules.parameters import Lock
+from gateway.modules.control.parameters import Lock
+from gateway.parameter_files.comparison import Verdict, compare
+from gateway.parameter_files.contents import COMMANDS
+from gateway.wire.messages import ParameterInfo, ParameterValue
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, config, serving
 
 EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'
@@ -26,7 +26,7 @@ STEP, CYCLE, TORQUE, VELOCITY = (0x2001, 0), (0x2002, 0), (0x6072, 0), (0x6081, 
 @pytest.fixture
 def robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator["Served"]:
     bench = Bench()
-    monkeypatch.setattr("gateway.modules.component.assemble", bench.assemble)
+    monkeypatch.setattr("gateway.modules.component.module.assemble", bench.assemble)
     monkeypatch.chdir(tmp_path)
     for drive in (bench.left, bench.right):
         drive.set_state(DISABLED)

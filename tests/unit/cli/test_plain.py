@@ -11,11 +11,11 @@ from rich.console import Console
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import Robot
 from gateway.client.errors import RemoteError
-from gateway.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
 from gateway.plain import json_plain, plain
-from server_gui.commands.collect import PlainLines
-from server_gui.core.events import Failed, Resources
-from server_gui.core.robot import Robot as Known
+from gateway.wire.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
+from server_gui.cli.collect import PlainLines
+from server_gui.core.follow.events import Failed, Resources
+from server_gui.core.follow.robot import Robot as Known
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.panels import WIDE, footer, header, resources
 from tests.fake_robot import FakeRobot, Refusal

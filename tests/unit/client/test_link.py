@@ -18,7 +18,7 @@ from gateway.client import (
     Subscription,
     Unreachable,
 )
-from gateway.messages import StreamStartParams
+from gateway.wire.messages import StreamStartParams
 from tests.fake_robot import FakeRobot, Refusal
 from tests.unit.client.in_loop import in_loop
 

@@ -15,7 +15,7 @@ import pytest
 from gateway.main import main
 from ml.store import Store
 from ml.store.upkeep import pin
-from server_gui.core.fleet.door import NAME
+from server_gui.core.fleet.control_socket import NAME
 from server_gui.core.recording.spool import Spool
 from tests.unit.cloud.recordings import Recorded, record
 

@@ -19,11 +19,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from ml.store import StoreError, StoreUnreachable
 from ml.store.sessions import Channel, Session
 from server_gui.core.cloud import ros
-from server_gui.core.cloud.chosen import Choice, Recording, choose
-from server_gui.core.cloud.drafts import draft
+from server_gui.core.cloud.atomic_files import draft
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded as Opened
 from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.cloud.selection import Choice, Recording, choose
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, Recorded, record
 from tests.unit.recording.robots import value

@@ -14,7 +14,7 @@ from ml.store.objects import Object, Objects
 from ml.store.private import closed_folder, opener, private_folder
 from ml.store.tables import EVENTS
 from server_gui.core.cloud import transfer
-from server_gui.core.cloud.drafts import draft
+from server_gui.core.cloud.atomic_files import draft
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from tests.unit.recording.robots import batch

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from server_gui.core.cloud.reached import endpoint_told, keys_told
+from server_gui.core.cloud.credentials import endpoint_told, keys_told
 
 URL = "s3://lab/exo"
 SECRET = "wJalrXUtnFEMI"

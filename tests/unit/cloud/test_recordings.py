@@ -10,8 +10,8 @@ import pytest
 from ml.store import Store, StoreUnreachable
 from ml.store.sessions import NoSuchSession
 from ml.store.tables import EVENTS
-from server_gui.core.cloud.chosen import Choice, choose
 from server_gui.core.cloud.recordings import Recorded, Recordings
+from server_gui.core.cloud.selection import Choice, choose
 from server_gui.core.cloud.tabular import write_csv
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.recorder import Recorder

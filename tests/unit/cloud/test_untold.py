@@ -13,16 +13,16 @@ from ml.store import Store
 from ml.store import sessions as stored
 from ml.store.sessions import UNTOLD, Session
 from ml.training.recorded import recorded
+from server_gui.core.archive.library import look
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.recordings import Recordings
-from server_gui.core.desk.library import look
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.recording.robots import CHANNELS, batch, description
 
 ROWS, WAIT_S = 50, 30.0

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.main import main
-from gateway.messages import ProcessUse
+from gateway.wire.messages import ProcessUse
 from ml.store import Store
 from server_gui.core.recording import records
 from server_gui.core.recording.recorder import Recorder

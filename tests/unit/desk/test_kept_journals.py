@@ -9,14 +9,14 @@ from msgspec.structs import replace
 
 from gateway.records.journal import Journal, Sizes
 from ml.store import Store, StoreError
-from server_gui.core.background import Background
-from server_gui.core.desk import kept_journals as module
-from server_gui.core.desk.chains import chained, journals, problem
-from server_gui.core.desk.kept_journals import KeptJournals, look
+from server_gui.core.archive import collected_journals as module
+from server_gui.core.archive.collected_journals import KeptJournals, look
+from server_gui.core.audit.chains import chained, journals, problem
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.threads.background import Background
 from tests.gui.journals import RobotsJournal
 from tests.unit.desk.test_library import until
 

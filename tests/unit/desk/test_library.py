@@ -11,11 +11,11 @@ import pytest
 
 from ml.store import Store
 from ml.store.sessions import find
-from server_gui.core.cloud import work
-from server_gui.core.cloud.chosen import Choice
+from server_gui.core.archive.library import Library, look
+from server_gui.core.cloud import actions
 from server_gui.core.cloud.jobs import Cancelled, Job, Jobs, JobState
-from server_gui.core.desk.library import Library, look
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.cloud.selection import Choice
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.cloud.recordings import BATCHES, ROWS, Recorded, record
 
 WAIT_S = 30.0
@@ -95,13 +95,13 @@ def test_a_store_that_is_away_is_said_tried_again_and_what_waits_is_shown(
     assert library.close(WAIT_S)
 
 
-@pytest.mark.parametrize("kind", work.FORMATS)
+@pytest.mark.parametrize("kind", actions.FORMATS)
 def test_a_span_is_exported_in_the_background(
     settings: ServerSettings, recorded: Recorded, jobs: Jobs, tmp_path: Path, kind: str
 ) -> None:
     session = find(recorded.store, recorded.session)
     file = tmp_path / f"walk.{kind}"
-    job = over(jobs.add("export", work.export(settings, session, Choice(), kind, file)))
+    job = over(jobs.add("export", actions.export(settings, session, Choice(), kind, file)))
     assert job.state is JobState.DONE, job.said
     assert (job.done, job.total, job.unit) == (BATCHES * ROWS, BATCHES * ROWS, "rows")
     assert file.stat().st_size > 100
@@ -109,7 +109,7 @@ def test_a_span_is_exported_in_the_background(
         assert pq.read_table(file).num_rows == BATCHES * ROWS
         assert session.first is not None
         none = Choice(end=session.first - timedelta(seconds=1))
-        job = over(jobs.add("export", work.export(settings, session, none, kind, file)))
+        job = over(jobs.add("export", actions.export(settings, session, none, kind, file)))
         assert job.state is JobState.FAILED
         assert "has nothing from" in job.said
         assert pq.read_table(file).num_rows == BATCHES * ROWS
@@ -119,18 +119,18 @@ def test_what_waits_is_uploaded_downloaded_and_verified(
     settings: ServerSettings, jobs: Jobs, tmp_path: Path
 ) -> None:
     made = record(settings.store.url, settings.recorder.spool, sent=False)
-    assert "nothing waits" in over(jobs.add("upload", work.upload(settings))).said
-    whole = over(jobs.add("download", work.download(settings.store.url, tmp_path / "whole")))
+    assert "nothing waits" in over(jobs.add("upload", actions.upload(settings))).said
+    whole = over(jobs.add("download", actions.download(settings.store.url, tmp_path / "whole")))
     assert whole.state is JobState.DONE, whole.said
     session = find(Store(settings.store.url), made.session)
-    some = over(jobs.add("download", work.download(settings.store.url, tmp_path / "some", [session])))
+    some = over(jobs.add("download", actions.download(settings.store.url, tmp_path / "some", [session])))
     assert f"{BATCHES * ROWS} rows" in some.said
     for name in ("whole", "some"):
         assert find(Store((tmp_path / name).as_uri()), made.session).rows == BATCHES * ROWS
-    verified = over(jobs.add("verify", work.check(settings, deep=True)))
+    verified = over(jobs.add("verify", actions.check(settings, deep=True)))
     assert "is whole" in verified.said
     next((tmp_path / "store").rglob("*.parquet")).unlink()
-    damaged = over(jobs.add("verify", work.check(settings, deep=False)))
+    damaged = over(jobs.add("verify", actions.check(settings, deep=False)))
     assert damaged.state is JobState.FAILED
     assert "is not there" in damaged.said
 
@@ -147,7 +147,7 @@ def test_a_job_is_cancelled_and_leaves_nothing_behind(
         return ""
 
     first = jobs.add("first", hold)
-    second = jobs.add("export", work.export(settings, session, Choice(), "csv", tmp_path / "walk.csv"))
+    second = jobs.add("export", actions.export(settings, session, Choice(), "csv", tmp_path / "walk.csv"))
     assert running.wait(WAIT_S)
     second.cancel()
     holding.set()
@@ -167,7 +167,7 @@ def test_a_copy_under_way_is_cancelled(
         advance(job, count)
 
     monkeypatch.setattr(Job, "advance", cancelled)
-    job = over(jobs.add("copy", work.download(settings.store.url, tmp_path / "copy", [session])))
+    job = over(jobs.add("copy", actions.download(settings.store.url, tmp_path / "copy", [session])))
     assert (job.state, job.said) == (JobState.CANCELLED, "cancelled")
 
 
@@ -202,10 +202,10 @@ def test_what_waits_for_upload_is_exported_too_and_once(
 ) -> None:
     record(settings.store.url, settings.recorder.spool, sent=False)
     waits = look(settings).sessions[0]
-    export = work.export(settings, waits, Choice(), "csv", tmp_path / "walk.csv")
+    export = actions.export(settings, waits, Choice(), "csv", tmp_path / "walk.csv")
     job = over(jobs.add("export", export))
     assert job.said.endswith(f"walk.csv: {BATCHES * ROWS} rows")
-    over(jobs.add("upload", work.upload(settings)))
+    over(jobs.add("upload", actions.upload(settings)))
     copied = tmp_path / "spool" / "00000001.uploaded.db"
     copied.rename(tmp_path / "spool" / "00000001.db")
     job = over(jobs.add("export", export))

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from ml.store import Store, StoreError
+from server_gui.core.archive import playback as module
+from server_gui.core.archive.playback import Playback
 from server_gui.core.cloud import spooled
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.tape import Rows, Tape
-from server_gui.core.desk import playback as module
 from server_gui.core.desk.desk import Shown
-from server_gui.core.desk.playback import Playback
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.cloud.recordings import UNITS
 from tests.unit.recording.robots import CHANNELS, batch, described, description
 

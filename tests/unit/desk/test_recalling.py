@@ -9,17 +9,17 @@ import pytest
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from ml.store import Store
+from server_gui.core.archive.playback import NOT_PREDICTED, Playback
+from server_gui.core.archive.recall import said
 from server_gui.core.cloud.tape import Tape
-from server_gui.core.desk import predictions as module
 from server_gui.core.desk.desk import Shown
-from server_gui.core.desk.playback import NOT_PREDICTED, Playback
-from server_gui.core.desk.recalling import said
-from server_gui.core.fleet.foreseeing import record as record_of
+from server_gui.core.fleet.live_prediction import record as record_of
+from server_gui.core.prediction import current as module
 from server_gui.core.prediction.news import Predicted
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.desk.test_playback import at_once, record, settle, tape_of
 from tests.unit.ml.serving.small import learned
 from tests.unit.prediction.robots import card

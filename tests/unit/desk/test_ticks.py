@@ -6,7 +6,7 @@ import pytest
 from gateway.client import ConnectionState
 from server_gui.core.cloud.tape import Rows
 from server_gui.core.desk.ticks import HELD_NS, LATE_NS, PERIOD_NS, Ticks, at_ticks, drawable
-from server_gui.core.events import LinkChanged, Telemetry
+from server_gui.core.follow.events import LinkChanged, Telemetry
 from tests.gui.fakes import telemetry
 
 MS = 1_000_000

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import eds
-from eds.cli import main
+from eds.cli.eds import main
 from eds.shipped import SHIPPED, shipped
 from tests.unit.eds.test_load import HEAD, variable
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from gateway.client import Address
-from gateway.messages import ResourceSnapshotParams
-from server_gui.core.events import Event
-from server_gui.core.feed import ONCE, Following
+from gateway.wire.messages import ResourceSnapshotParams
 from server_gui.core.fleet.fleet import Fleet
-from server_gui.core.network import Network
+from server_gui.core.follow.events import Event
+from server_gui.core.follow.feed import ONCE, Following
+from server_gui.core.follow.network import Network
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.rows import Record, Run
 from server_gui.core.recording.spool import Spool

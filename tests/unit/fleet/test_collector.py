@@ -16,10 +16,16 @@ from ml.store import Store
 from ml.store.tables import TELEMETRY
 from server_gui.core.fleet import collector as module
 from server_gui.core.fleet.collector import Collector, CollectorReport
-from server_gui.core.fleet.door import NobodyCollects, ask
+from server_gui.core.fleet.control_socket import NobodyCollects, ask
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.spool import Spool
-from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings, Upload
+from server_gui.core.settings.server_file import (
+    RecordingSettings,
+    RobotSettings,
+    ServerSettings,
+    StoreSettings,
+    Upload,
+)
 from tests.fake_robot import FakeRobot
 
 WAIT_S = 30.0

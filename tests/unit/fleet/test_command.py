@@ -11,13 +11,13 @@ import pytest
 
 from gateway import main
 from gateway.client import Address
-from server_gui.commands.collect import status_text
+from server_gui.cli.collect import status_text
 from server_gui.core.fleet.collector import CollectorReport
-from server_gui.core.fleet.statistics import LinkStatistics
+from server_gui.core.fleet.link_statistics import LinkStatistics
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
-from server_gui.core.settings import Upload
-from server_gui.terminal.ending import Ended
+from server_gui.core.settings.server_file import Upload
+from server_gui.processes.ending import Ended
 
 HEAVY = ("PySide6", "pyqtgraph", "sklearn", "duckdb")
 
@@ -63,7 +63,7 @@ def test_what_cannot_be_done_is_a_sentence_and_1(
 
 
 def test_nothing_that_a_window_needs_is_imported() -> None:
-    script = f"import sys, server_gui.commands.collect; print([n for n in {HEAVY} if n in sys.modules])"
+    script = f"import sys, server_gui.cli.collect; print([n for n in {HEAVY} if n in sys.modules])"
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
 
@@ -125,8 +125,8 @@ def test_rows_that_are_lost_and_no_event_tells_are_in_the_exit_status(
         def wait(self, _within_s: float) -> None:
             raise Ended(signal.SIGTERM)
 
-    monkeypatch.setattr("server_gui.commands.collect.Collector", Lossy)
-    monkeypatch.setattr("server_gui.commands.collect._log_to_stderr", lambda: None)
+    monkeypatch.setattr("server_gui.cli.collect.Collector", Lossy)
+    monkeypatch.setattr("server_gui.cli.collect._log_to_stderr", lambda: None)
     monkeypatch.setattr(gc, "freeze", lambda: None)
     file = tmp_path / "server.toml"
     file.write_text(f'[recorder]\nspool = "{tmp_path / "spool"}"\n')

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from server_gui.core.fleet import door as module
-from server_gui.core.fleet.door import NAME, Answers, NobodyCollects, ask, door
-from server_gui.core.network import Network
+from server_gui.core.fleet import control_socket as module
+from server_gui.core.fleet.control_socket import NAME, Answers, NobodyCollects, ask, door
+from server_gui.core.follow.network import Network
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Robot
-from server_gui.core.events import Event, Journalled, Telemetry
+from server_gui.core.follow.events import Event, Journalled, Telemetry
 from tests.fake_robot import FakeRobot
 from tests.unit.fleet.recording import FOLLOWING, Kept, recording
 from tests.unit.gateway.harness import Bench, config, serving
@@ -30,7 +30,7 @@ def start() -> Iterator[Start]:
 def gateway(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
     """The address of a real gateway over fake components."""
     bench = Bench()
-    monkeypatch.setattr("gateway.modules.component.assemble", bench.assemble)
+    monkeypatch.setattr("gateway.modules.component.module.assemble", bench.assemble)
     with serving(config(tmp_path)) as (host, port):
         yield f"{host}:{port}"
 

@@ -7,10 +7,10 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
-from gateway.messages import ComponentInfo, ParameterInfo
-from server_gui.core.events import LinkChanged, Resources, Telemetry
-from server_gui.core.fleet.facts import configuration_hash, facts
-from server_gui.core.fleet.statistics import SECOND_NS, LinkReport, LinkStatistics
+from gateway.wire.messages import ComponentInfo, ParameterInfo
+from server_gui.core.fleet.link_statistics import SECOND_NS, LinkReport, LinkStatistics
+from server_gui.core.fleet.session_facts import configuration_hash, facts
+from server_gui.core.follow.events import LinkChanged, Resources, Telemetry
 from server_gui.core.processing.communication import Health
 from tests.unit.processing.test_resource import look
 from tests.unit.recording.robots import description

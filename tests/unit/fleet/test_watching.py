@@ -10,20 +10,20 @@ from types import SimpleNamespace
 
 import pytest
 
-from server_gui.commands.collect import status_text
-from server_gui.core.desk.news import News
+from server_gui.cli.collect import status_text
 from server_gui.core.desk.recording import By, Recording, Tone
 from server_gui.core.fleet.collector import Collector
-from server_gui.core.prediction.settings import PredictionSettings
+from server_gui.core.follow.news import News
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
-from server_gui.core.settings import (
+from server_gui.core.settings.prediction import PredictionSettings
+from server_gui.core.settings.server_file import (
     RecordingSettings,
     RobotSettings,
     ServerSettings,
     StoreSettings,
 )
-from server_gui.core.watching import STILL_S, Trouble, Watch, Worker
+from server_gui.core.threads.supervision import STILL_S, Trouble, Watch, Worker
 from tests.fake_robot import FakeRobot
 
 WAIT_S = 20.0

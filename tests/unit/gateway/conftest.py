@@ -13,7 +13,7 @@ from tests.unit.gateway.tuned import STEP, Tuned, drives, tuned
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     bench = Bench()
-    monkeypatch.setattr("gateway.modules.component.assemble", bench.assemble)
+    monkeypatch.setattr("gateway.modules.component.module.assemble", bench.assemble)
     return bench
 
 
@@ -32,8 +32,8 @@ def client(connect: Callable[[], Client]) -> Client:
 @pytest.fixture
 def calm(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> Bench:
     """Its drives are off; what could not be taken back is tried again at once."""
-    monkeypatch.setattr("gateway.modules.trials.FIRST_RETRY_S", 0.01)
-    monkeypatch.setattr("gateway.modules.trials.LAST_RETRY_S", 0.05)
+    monkeypatch.setattr("gateway.modules.control.trials.FIRST_RETRY_S", 0.01)
+    monkeypatch.setattr("gateway.modules.control.trials.LAST_RETRY_S", 0.05)
     drives(bench, DISABLED)
     return bench
 

@@ -28,10 +28,10 @@ from drivers.joint.reading import DriveReading
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from gateway.config import RobotConfig, load
+from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
-from gateway.futures import done, gather, then
-from gateway.listeners import listen
-from gateway.modules.assembly import Robot
+from gateway.modules.component.assembly import Robot
+from gateway.process.futures import done, gather, then
 
 DEADLINE_S = 20.0
 Bytes = dict[tuple[int, int], bytes]

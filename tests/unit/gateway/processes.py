@@ -43,7 +43,7 @@ def address(running: "subprocess.Popen[str]") -> tuple[str, int]:
 
 def rests(pid: int) -> bool:
     """Whether it is the small process that waits, and sleeps."""
-    script = b"/gateway/resting.py\0" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    script = b"/gateway/process/resting.py\0" in Path(f"/proc/{pid}/cmdline").read_bytes()
     return script and Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(") ")[2].startswith("S")
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from gateway import notify
-from gateway.listeners import HandoverError, inherited
+from gateway.connections.listeners import HandoverError, inherited
+from gateway.process import notify
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, Client, until
 
@@ -113,7 +113,9 @@ def test_sockets_for_another_process_are_left_alone_and_the_environment_is_clear
 def test_names_that_do_not_fit_are_said(names: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with ExitStack() as stack:
         numbers = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in names.split(":")]
-        monkeypatch.setattr("gateway.listeners._adopted", lambda descriptor: numbers[descriptor - 3])
+        monkeypatch.setattr(
+            "gateway.connections.listeners._adopted", lambda descriptor: numbers[descriptor - 3]
+        )
         environ = {"LISTEN_PID": str(os.getpid()), "LISTEN_FDS": str(len(numbers)), "LISTEN_FDNAMES": names}
         with pytest.raises(HandoverError, match=says):
             inherited(environ)
@@ -124,7 +126,7 @@ def test_what_is_no_listening_socket_is_refused(
     make: "type[socket.socket] | None", says: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = make().detach() if make else os.open(os.devnull, os.O_RDONLY)
-    monkeypatch.setattr("gateway.resting.FIRST", given)
+    monkeypatch.setattr("gateway.process.resting.FIRST", given)
     with pytest.raises(HandoverError, match=says):
         inherited({"LISTEN_PID": str(os.getpid()), "LISTEN_FDS": "1"})
     os.close(given)

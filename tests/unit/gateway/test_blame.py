@@ -11,11 +11,11 @@ import pytest
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
 from gateway.cli.blame import line, summary
-from gateway.messages import Overrun, Overruns, RanInstead
-from gateway.modules import blame as module
-from gateway.modules.blame import BlameModule
-from gateway.modules.overruns import Deadline, Judge, Late, Reason
-from gateway.modules.tasks import Spent, Tasks
+from gateway.modules.resource import blame as module
+from gateway.modules.resource.blame import BlameModule
+from gateway.modules.resource.overruns import Deadline, Judge, Late, Reason
+from gateway.modules.resource.tasks import Spent, Tasks
+from gateway.wire.messages import Overrun, Overruns, RanInstead
 from tests.unit.gateway.harness import HEAD, Bench, Client, config, serving
 from tests.unit.gateway.recorded import Process, Recorded, Thread, single
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from gateway import limits, session
-from gateway.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
-from gateway.sources import Wanted
-from gateway.stop_lines import StopSplitter
-from gateway.wire import BadLine, RpcError, decode_request
+from gateway.connections import limits, session
+from gateway.connections.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
+from gateway.connections.stop_lines import StopSplitter
+from gateway.streaming.sources import Wanted
+from gateway.wire.framing import BadLine, RpcError, decode_request
 from tests.unit.gateway.harness import Answered, Client, config, serving
 
 HTTP = b"POST / HTTP/1.1\r\nHost: robot\r\nContent-Type: text/plain\r\nContent-Length: 200\r\n\r\n"

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from drivers.component import Kind
-from gateway import budget
-from gateway.budget import MOST, OVER_LOOKS, UNDER_LOOKS, Budget
 from gateway.config import ConfigError
-from gateway.loop import Loop
 from gateway.main import main
-from gateway.modules.component import ComponentSource
-from gateway.sources import whole
-from gateway.streams import SampleFeed, TickFeed
+from gateway.modules.component.module import ComponentSource
+from gateway.process.loop import Loop
+from gateway.streaming import budget
+from gateway.streaming.budget import MOST, OVER_LOOKS, UNDER_LOOKS, Budget
+from gateway.streaming.sources import whole
+from gateway.streaming.streams import SampleFeed, TickFeed
 from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, FakeComponent, config, serving, until
 from tests.unit.gateway.test_streams import outlet, rows, taken
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from gateway import acceptor, classic
 from gateway.config import ConfigError
+from gateway.connections import acceptor, classic
+from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
-from gateway.listeners import listen
 from gateway.main import main
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, config, until
 

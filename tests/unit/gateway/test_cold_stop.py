@@ -9,7 +9,7 @@ import pytest
 from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
-from gateway.first_stop import FirstStop
+from gateway.process.first_stop import FirstStop
 from gateway.registry import Context, Spec
 from tests.unit.gateway.harness import DEADLINE_S, Bench, Client, config, serving, until
 
@@ -176,7 +176,7 @@ def test_where_the_stop_s_own_modules_run_nothing_is_sent_beside_them(
 ) -> None:
     with serving(config(tmp_path)) as address, Client(address) as client:
         client.call("robot.describe")
-        monkeypatch.setattr("gateway.first_stop.SHARED", ("virtual",))
+        monkeypatch.setattr("gateway.process.first_stop.SHARED", ("virtual",))
         assert client.call("robot.stop")["held"]
         assert wires.opened == []
 
@@ -185,7 +185,7 @@ def test_what_has_confirmed_is_not_kept_waiting_for_until_its_node_has_booted(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A drive stops as soon as its bus is open; all that is read of it when it comes up takes longer."""
-    monkeypatch.setattr("gateway.modules.component.COLD_S", 1000.0)
+    monkeypatch.setattr("gateway.modules.component.module.COLD_S", 1000.0)
     bench.left.lost = bench.right.lost = "it is being read"
     with serving(config(tmp_path)) as address, Client(address) as client:
         drives = client.call("robot.stop")["drives"]

@@ -59,7 +59,7 @@ def test_a_value_that_is_no_number_is_null(client: Client, bench: Bench) -> None
 def test_a_cold_start_waits_for_the_first_values(
     connect: Callable[[], Client], bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gateway.modules.component.COLD_S", 1000.0)
+    monkeypatch.setattr("gateway.modules.component.module.COLD_S", 1000.0)
     bench.insole.latest.clear()
     slow, other = connect(), connect()
     id_ = slow.request("component.snapshot", channels=["left_insole.*"])
@@ -171,7 +171,7 @@ def test_a_start_and_stop_that_take_long_hold_nobody_up(bench: Bench, tmp_path: 
         stop()
 
     with pytest.MonkeyPatch.context() as patch, serving(config(tmp_path)) as address:
-        patch.setattr("gateway.modules.component.assemble", assemble_slowly)
+        patch.setattr("gateway.modules.component.module.assemble", assemble_slowly)
         patch.setattr(bench.left, "stop", stop_slowly)
         with Client(address) as slow, Client(address) as other:
             id_ = slow.request("component.snapshot", channels=["left_knee.position"])
@@ -196,7 +196,7 @@ def test_a_module_that_cannot_start_says_why_and_is_tried_again(
         def broken(_config: object) -> None:
             raise OSError("no memory")
 
-        patch.setattr("gateway.modules.component.assemble", broken)
+        patch.setattr("gateway.modules.component.module.assemble", broken)
         for method in ("component.snapshot", "status.snapshot", "parameter.list", "robot.stop"):
             error = client.refused(method)
             assert error.kind == "unavailable"

@@ -10,14 +10,14 @@ import pytest
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
-from gateway.budget import Budget
 from gateway.cli.cost import text
 from gateway.cost import Costs
-from gateway.loop import Loop
 from gateway.main import main
-from gateway.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
-from gateway.rates import Rates
-from gateway.streams import Streams
+from gateway.process.loop import Loop
+from gateway.streaming.budget import Budget
+from gateway.streaming.rates import Rates
+from gateway.streaming.streams import Streams
+from gateway.wire.messages import BudgetInfo, BusCost, ClientCost, GatewayCost, StreamCost
 from tests.unit.gateway.harness import Bench, Client, config, serving, until
 
 Connect = Callable[[], Client]

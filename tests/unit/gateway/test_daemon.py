@@ -20,11 +20,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway import daemon, session, wire
-from gateway.futures import done
-from gateway.limits import BAD_LINES, LINE_LIMIT
-from gateway.listeners import listen
+from gateway import daemon
+from gateway.connections import session
+from gateway.connections.limits import BAD_LINES, LINE_LIMIT
+from gateway.connections.listeners import listen
+from gateway.process.futures import done
 from gateway.service import Service
+from gateway.wire import framing
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Answered, Bench, Client, config, serving, until
 
@@ -61,7 +63,7 @@ def test_clock_relates_monotonic_to_utc(client: Client) -> None:
 )
 def test_a_method_that_does_not_exist_is_named(client: Client, method: str) -> None:
     error = client.refused(method)
-    assert (error.code, error.kind) == (wire.METHOD_NOT_FOUND, "unknown_name")
+    assert (error.code, error.kind) == (framing.METHOD_NOT_FOUND, "unknown_name")
     assert repr(method) in str(error)
 
 
@@ -95,21 +97,21 @@ def test_an_answer_that_cannot_be_encoded_is_answered_as_an_error_and_the_next_r
     client.send(CLOCK % 1 + b'{"jsonrpc":"2.0","id":2,"method":"parameter.list"}\n')
     with pytest.raises(Answered, match=r"clock\.read failed inside the gateway: ") as caught:
         client.answer(1)
-    assert caught.value.code == wire.INTERNAL_ERROR
+    assert caught.value.code == framing.INTERNAL_ERROR
     assert client.answer(2)["values"]
 
 
 def test_a_request_that_cannot_even_be_handled_keeps_no_other_waiting(
     client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    decode = wire.decode_request
+    decode = framing.decode_request
 
-    def fail(line: bytes) -> wire.Request:
+    def fail(line: bytes) -> framing.Request:
         if b'"id":1,' in line:
             raise ZeroDivisionError
         return decode(line)
 
-    monkeypatch.setattr(wire, "decode_request", fail)
+    monkeypatch.setattr(framing, "decode_request", fail)
     client.send(CLOCK % 1 + CLOCK % 2)
     assert client.answer(2)["monotonic_ns"] > 0
 
@@ -303,7 +305,7 @@ class TestProcess:
 
 def test_what_a_resource_only_gateway_imports() -> None:
     code = (
-        "import sys, gateway.cli.serve, gateway.modules.resource, gateway.modules.host; "
+        "import sys, gateway.cli.serve, gateway.modules.resource.module, gateway.modules.resource.host; "
         "print([m for m in ('can', 'canopen', 'serial', 'asyncio', 'numpy', 'rich') if m in sys.modules])"
     )
     done = subprocess.run(
@@ -314,7 +316,7 @@ def test_what_a_resource_only_gateway_imports() -> None:
 
 def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards() -> None:
     code = (
-        "import sys; from gateway.lean import without\n"
+        "import sys; from gateway.process.lean import without\n"
         "with without('ssl', 'json'): import asyncio\n"
         "print('ssl' in sys.modules); import ssl; print(ssl.OPENSSL_VERSION_INFO[0] > 0)"
     )
@@ -326,7 +328,8 @@ def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards
 
 def test_an_eds_is_read_without_python_can_which_can_be_imported_afterwards() -> None:
     code = (
-        "import sys; from gateway.modules.assembly import _import_canopen; _import_canopen(with_can=False)\n"
+        "import sys; from gateway.modules.component.assembly import _import_canopen as found\n"
+        "found(with_can=False)\n"
         "import eds; print(eds.load(eds.locate('joint_drive.eds', None), 2).product, 'can' in sys.modules)\n"
         "import can; print(can.Bus.__module__)"
     )

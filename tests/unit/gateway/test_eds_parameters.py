@@ -14,10 +14,10 @@ from eds.datatypes import DATA_TYPES
 from eds.naming import identifier
 from gateway.coding import EXACT_COUNTS, Coding, CodingError, Number
 from gateway.config import ConfigError, DeviceTable, JointTable
-from gateway.messages import ParameterInfo
-from gateway.modules.catalogue import Catalogue, resolve
-from gateway.modules.parameters import Lock, Parameter
-from gateway.wire import RpcError
+from gateway.modules.control.catalogue import Catalogue, resolve
+from gateway.modules.control.parameters import Lock, Parameter
+from gateway.wire.framing import RpcError
+from gateway.wire.messages import ParameterInfo
 from tests.unit.gateway.harness import DISABLED, HEAD, ROBOT, Bench, Client, config, serving
 
 KNEE = """

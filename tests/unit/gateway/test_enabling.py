@@ -9,7 +9,7 @@ import pytest
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import WAY_UP
 from drivers.joint.leading import Led
-from gateway.futures import done
+from gateway.process.futures import done
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving, until
 
 S = DriveState

@@ -17,10 +17,10 @@ import pytest
 from drivers.bus.life import NodeLife
 from drivers.component import Kind
 from gateway.cli.describe import main as describe
+from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.guard import alarms
 from gateway.guard.armings import Armings
-from gateway.listeners import listen
 from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving, until
 
 LIMIT = """
@@ -136,7 +136,7 @@ import sys, threading
 from pathlib import Path
 from gateway.config import load
 from gateway.daemon import Daemon
-from gateway.listeners import listen
+from gateway.connections.listeners import listen
 from tests.unit.gateway.harness import Client
 daemon = Daemon(load(Path({str(tmp_path / "robot.toml")!r})), listen("127.0.0.1", 0))
 thread = threading.Thread(target=daemon.run)
@@ -382,7 +382,7 @@ class TestOpen:
     def test_a_guard_that_cannot_start_is_told_and_tried_again(
         self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("gateway.standing.AGAIN_S", 0.2)
+        monkeypatch.setattr("gateway.always_on.AGAIN_S", 0.2)
         works = False
 
         def start(_armings: Armings) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway.modules.stop.hold_file import HeldStop, HoldFile
+from gateway.modules.stop.hold_record import HeldStop, HoldFile
 from gateway.modules.stop.stop_control import Asked, _newest_of_each
 from gateway.records import durable
 from gateway.records.folder import RecordsFolder

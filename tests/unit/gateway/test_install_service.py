@@ -12,9 +12,9 @@ import msgspec
 import pytest
 
 from gateway.cli import install_service
-from gateway.cli.units import MARK, NotForUnits, Service, folder
+from gateway.cli.systemd_units import MARK, NotForUnits, Service, folder
 from gateway.config import load
-from gateway.listeners import listen
+from gateway.connections.listeners import listen
 from gateway.main import main
 from tests.unit.gateway import processes
 

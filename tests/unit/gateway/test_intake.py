@@ -11,17 +11,18 @@ from typing import Any, cast
 
 import pytest
 
-from gateway import intake, stop_lines, wire
+from gateway.connections import intake, stop_lines
+from gateway.connections.intake import Heard, Inlet, Pace
+from gateway.connections.limits import BAD_LINES, MOST_STOPS, QUEUED_BYTES, QUEUED_LINES
+from gateway.connections.listeners import listen
+from gateway.connections.session import Session
+from gateway.connections.sharing import Sharing
+from gateway.connections.stop_lines import stop_in
 from gateway.daemon import Daemon
-from gateway.intake import Heard, Inlet, Pace
-from gateway.limits import BAD_LINES, MOST_STOPS, QUEUED_BYTES, QUEUED_LINES
-from gateway.listeners import listen
-from gateway.loop import HANGUP, READ, Loop
-from gateway.messages import Stopped
+from gateway.process.loop import HANGUP, READ, Loop
 from gateway.registry import Context, Spec
-from gateway.session import Session
-from gateway.sharing import Sharing
-from gateway.stop_lines import stop_in
+from gateway.wire import framing
+from gateway.wire.messages import Stopped
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config, until
 
@@ -251,7 +252,7 @@ def test_who_sends_without_end_and_takes_nothing_is_bounded_and_can_still_stop(s
     def too_much() -> bool:
         flood.send(lines)
         session = serving.session_of(flood)
-        assert sum(wire.size(line) for _asked_ns, line in session._queue) <= QUEUED_BYTES
+        assert sum(framing.size(line) for _asked_ns, line in session._queue) <= QUEUED_BYTES
         assert len(session._queue) <= QUEUED_LINES
         assert session.waiting_bytes < 3 * 1024 * 1024
         return session._unanswered + session._inlet.unanswered > 0
@@ -425,7 +426,7 @@ def test_stops_beyond_what_may_wait_act_and_are_not_answered(
 ) -> None:
     session = Session(turned.loop, turned.inlet, lambda _session, _request: None, 30.0, Sharing(turned.loop))
     heard = Heard()
-    heard.stops = [wire.StopRequest("x", number) for number in range(MOST_STOPS + 5)]
+    heard.stops = [framing.StopRequest("x", number) for number in range(MOST_STOPS + 5)]
     heard.stop, heard.stopped = heard.stops[-1], Future()
     session.hear(heard)
     assert session._pending == MOST_STOPS
@@ -485,7 +486,7 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(turned: Tu
     assert sum(len(one.refusals) for one in heard) == intake.ON_THE_WAY
     inlet.done(
         QUEUED_LINES + intake.ON_THE_WAY,
-        sum(wire.size(line) for one in heard for _, line in one.lines),
+        sum(framing.size(line) for one in heard for _, line in one.lines),
     )
     assert not inlet._is_full
 

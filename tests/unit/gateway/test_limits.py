@@ -15,9 +15,9 @@ import pytest
 from drivers.joint.cia402 import DriveState
 from gateway import coding
 from gateway.config import ParameterSettings
-from gateway.modules import catalogue, offer, parameters, rules
-from gateway.modules.parameters import Lock, Parameter
-from gateway.wire import Kind, RpcError
+from gateway.modules.control import catalogue, offer, parameters, rules
+from gateway.modules.control.parameters import Lock, Parameter
+from gateway.wire.framing import Kind, RpcError
 from tests.unit.gateway.mutants import Mutant, mutants
 
 UNSIGNED8, INTEGER8, UNSIGNED64, BOOLEAN, REAL32, REAL64 = 0x05, 0x02, 0x1B, 0x01, 0x08, 0x11

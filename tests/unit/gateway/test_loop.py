@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from gateway import loop as loops
-from gateway.loop import HANGUP, READ, WRITE, Loop
+from gateway.process import loop as loops
+from gateway.process.loop import HANGUP, READ, WRITE, Loop
 from tests.unit.gateway.harness import until
 
 

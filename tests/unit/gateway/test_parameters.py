@@ -15,10 +15,10 @@ import eds
 from drivers.component import Kind
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import ParameterSettings
-from gateway.modules import unanswered
-from gateway.modules.catalogue import described
-from gateway.modules.parameters import Parameter
-from gateway.wire import RpcError
+from gateway.modules.control import unanswered
+from gateway.modules.control.catalogue import described
+from gateway.modules.control.parameters import Parameter
+from gateway.wire.framing import RpcError
 from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving, until
 
 STEP, CYCLE, TOE, TORQUE = 0x2001, 0x2002, 0x2003, 0x6072

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from gateway import places, session
-from gateway.limits import CLIENTS_OF_ONE_ADDRESS
+from gateway.connections import places, session
+from gateway.connections.limits import CLIENTS_OF_ONE_ADDRESS
 from tests.unit.gateway.harness import Bench, Client, config, serving, until
 
 Connect = Callable[[], Client]

@@ -14,11 +14,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from gateway.messages import ResourceSnapshotParams
-from gateway.modules.counters import Counters, ProcessTimes
-from gateway.modules.host import Meter
-from gateway.modules.portable import Portable
-from gateway.modules.procfs import SELECTABLE, Procfs
+from gateway.modules.resource.counters import Counters, ProcessTimes
+from gateway.modules.resource.host import Meter
+from gateway.modules.resource.portable import Portable
+from gateway.modules.resource.procfs import SELECTABLE, Procfs
+from gateway.wire.messages import ResourceSnapshotParams
 from tests.unit.gateway.harness import Client, until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="procfs is Linux's")
@@ -373,8 +373,8 @@ def test_without_clients_nothing_is_kept(connect: Callable[[], Client]) -> None:
 
 def test_a_snapshot_needs_no_psutil() -> None:
     code = (
-        "import sys; from gateway.messages import ResourceSnapshotParams as P; "
-        "from gateway.modules.host import Host; host = Host(); "
+        "import sys; from gateway.wire.messages import ResourceSnapshotParams as P; "
+        "from gateway.modules.resource.host import Host; host = Host(); "
         "host.meter().snapshot(P(include=['cmdline'])); host.close(); print('psutil' in sys.modules)"
     )
     done = subprocess.run(

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from gateway.messages import ParameterValue
-from gateway.modules import reads
-from gateway.modules.reads import DEVICES, OBJECTS, Reads
+from gateway.modules.control import reads
+from gateway.modules.control.reads import DEVICES, OBJECTS, Reads
+from gateway.wire.messages import ParameterValue
 
 DEVICE_NAMES = ("left_hip", "left_knee", "right_hip", "right_knee")
 

@@ -12,14 +12,14 @@ from typing import Any
 import psutil
 import pytest
 
-from gateway.loop import Loop
-from gateway.messages import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
-from gateway.modules import extras, host
-from gateway.modules.counters import CoreTimes, ProcessTimes
-from gateway.modules.host import Meter
-from gateway.modules.redact import redact
-from gateway.modules.resource import ResourceModule
+from gateway.modules.resource import extras, host
+from gateway.modules.resource.counters import CoreTimes, ProcessTimes
+from gateway.modules.resource.host import Meter
+from gateway.modules.resource.module import ResourceModule
+from gateway.modules.resource.redact import redact
+from gateway.process.loop import Loop
 from gateway.registry import Context
+from gateway.wire.messages import MemoryUse, ProcessUse, ResourceSnapshot, ResourceSnapshotParams
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, Client, config
 
 MB = 1 << 20

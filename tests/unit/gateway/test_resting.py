@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
-from gateway.listeners import listen
-from gateway.loop import Loop
+from gateway.process.loop import Loop
 from gateway.registry import Registry
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import DEADLINE_S, HEAD, ROBOT, Bench, Client, config, until

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.listeners import listen
+from gateway.connections.listeners import listen
 from gateway.main import main
 from tests.unit.gateway.harness import ROBOT
 

@@ -4,9 +4,9 @@ import contextlib
 
 import pytest
 
-from gateway import sharing
-from gateway.loop import Loop
-from gateway.sharing import Sharing
+from gateway.connections import sharing
+from gateway.connections.sharing import Sharing
+from gateway.process.loop import Loop
 
 
 def test_the_log_tells_of_an_address_that_attacks_but_not_each_time(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway import standing
+from gateway import always_on
 from gateway.registry import Context, Spec
 from tests.unit.gateway.harness import ROBOT, config, serving, until
 
@@ -36,8 +36,8 @@ class Control(Broken):
 def test_what_cannot_begin_is_tried_again_once_at_a_time_and_ever_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(standing, "AGAIN_S", 0.01)
-    monkeypatch.setattr(standing, "LATEST_S", 0.04)
+    monkeypatch.setattr(always_on, "AGAIN_S", 0.01)
+    monkeypatch.setattr(always_on, "LATEST_S", 0.04)
     tried.clear()
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "stop.json").write_bytes(b"{}")  # the last gateway held a stop

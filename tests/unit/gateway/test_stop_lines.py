@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import UNSET
 
-from gateway import wire
-from gateway.limits import LINE_LIMIT, REASON_LENGTH
-from gateway.stop_lines import StopSplitter, stop_in
+from gateway.connections.limits import LINE_LIMIT, REASON_LENGTH
+from gateway.connections.stop_lines import StopSplitter, stop_in
+from gateway.wire import framing
 
 PLAIN = b'{"jsonrpc":"2.0","id":1,"method":"robot.stop","params":{"reason":"fall"}}'
 LONG = b"x" * LINE_LIMIT
@@ -141,16 +141,16 @@ def test_the_longest_line_is_read_in_no_time_whatever_is_in_it(piece: bytes) -> 
 # In pieces, and longer than a line may be
 
 
-def split(data: bytes, cuts: list[int]) -> list[wire.Line]:
+def split(data: bytes, cuts: list[int]) -> list[framing.Line]:
     splitter = StopSplitter()
-    found: list[wire.Line] = []
+    found: list[framing.Line] = []
     for start, end in zip([0, *cuts], [*cuts, len(data)], strict=True):
         found += splitter.feed(data[start:end])
     return found + splitter.end()
 
 
-def shapes(lines: list[wire.Line]) -> list[object]:
-    return ["stop" if isinstance(one, wire.StopRequest) else type(one) for one in lines]
+def shapes(lines: list[framing.Line]) -> list[object]:
+    return ["stop" if isinstance(one, framing.StopRequest) else type(one) for one in lines]
 
 
 LONG_STOP = b'{"method":"robot.stop","id":5,"params":{"reason":"' + LONG + b'"}}'
@@ -167,8 +167,8 @@ LONG_STOP = b'{"method":"robot.stop","id":5,"params":{"reason":"' + LONG + b'"}}
         (b'{"params":"' + LONG + b'","method":"robot.stop"}\nb', ["stop", bytes]),
         (b'{"params":"' + LONG + b'","method" : ' + b" " * 500 + b'"rob\\u006ft.stop"', ["stop"]),
         (b'{"method":"robot.stop",' + LONG + b'"method":"robot.stop"}\n', ["stop"]),
-        (b'{"params":"' + LONG + b'","method":"robot.stopped"}\nb', [wire.BadLine, bytes]),
-        (LONG + b"x\n" + LONG + b"y\n" + PLAIN, [wire.BadLine, wire.BadLine, "stop"]),
+        (b'{"params":"' + LONG + b'","method":"robot.stopped"}\nb', [framing.BadLine, bytes]),
+        (LONG + b"x\n" + LONG + b"y\n" + PLAIN, [framing.BadLine, framing.BadLine, "stop"]),
     ],
 )
 def test_a_stop_is_found_wherever_the_bytes_are_cut(data: bytes, expected: list[object]) -> None:
@@ -182,7 +182,7 @@ def test_a_stop_is_found_wherever_the_bytes_are_cut(data: bytes, expected: list[
 
 def test_of_a_line_that_is_too_long_what_comes_first_can_be_read() -> None:
     (found,) = split(LONG_STOP, [])
-    assert found == wire.StopRequest("x" * REASON_LENGTH, 5)
+    assert found == framing.StopRequest("x" * REASON_LENGTH, 5)
 
 
 def test_a_stop_in_a_line_that_is_too_long_does_not_wait_for_its_end() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config import RobotConfig
-from gateway.modules.storage import STORING
+from gateway.modules.control.storage import STORING
 from gateway.records.journal import Journal
 from tests.unit.gateway.harness import (
     DISABLED,

@@ -11,15 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.component import Kind
-from gateway import limits, streams
-from gateway.budget import Budget
-from gateway.loop import Loop
-from gateway.modules.component import ComponentSource
-from gateway.outlets import Batch, Outlet, encode_batch
-from gateway.session import Session
-from gateway.sources import merge, narrow, whole
-from gateway.streams import SampleFeed, Streams, TickFeed, values_a_second
-from gateway.wire import RpcError
+from gateway.connections import limits
+from gateway.connections.session import Session
+from gateway.modules.component.module import ComponentSource
+from gateway.process.loop import Loop
+from gateway.streaming import streams
+from gateway.streaming.budget import Budget
+from gateway.streaming.outlets import Batch, Outlet, encode_batch
+from gateway.streaming.sources import merge, narrow, whole
+from gateway.streaming.streams import SampleFeed, Streams, TickFeed, values_a_second
+from gateway.wire.framing import RpcError
 from tests.unit.gateway.harness import Bench, Client, FakeComponent, until
 
 MS = 1_000_000

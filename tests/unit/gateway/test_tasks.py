@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from gateway.config import ConfigError
-from gateway.modules.scheduling import Scheduling
-from gateway.modules.tasks import Schedule, Spent, Tasks
+from gateway.modules.resource.scheduling import Scheduling
+from gateway.modules.resource.tasks import Schedule, Spent, Tasks
 from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config, serving, until
 from tests.unit.gateway.recorded import Process, Recorded, Thread, single
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivers.errors import DeviceTimeout
-from gateway.modules.ledger import WriteLedger
+from gateway.modules.control.ledger import WriteLedger
 from tests.unit.gateway.harness import DEADLINE_S, Bench, until
 from tests.unit.gateway.tuned import (
     CYCLE,
@@ -163,7 +163,9 @@ def test_what_could_not_be_taken_back_for_a_failure_of_our_own_is_tried_again_an
 ) -> None:
     write = robot.write({CYCLE_TIME: 1.3}, LONG_S)
     with monkeypatch.context() as failing:
-        failing.setattr("gateway.modules.trial_jobs.Attempt.take_back", lambda _self, _changes: 1 // 0)
+        failing.setattr(
+            "gateway.modules.control.trial_jobs.Attempt.take_back", lambda _self, _changes: 1 // 0
+        )
         assert robot.refused(lambda: robot.tuning.trials.revert(write)).kind == "rollback_failed"
         error = robot.refused(lambda: robot.tuning.trials.confirm(write))
         assert (error.kind, held(bench, CYCLE)) == ("unknown_name", 1300)
@@ -235,7 +237,7 @@ def test_what_was_read_of_a_trial_is_known_no_longer_when_it_has_ended(robot: Tu
 def test_a_dead_node_is_asked_once_in_an_attempt_whatever_is_to_be_taken_back(
     robot: Tuned, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gateway.modules.trials.FIRST_RETRY_S", 100.0)
+    monkeypatch.setattr("gateway.modules.control.trials.FIRST_RETRY_S", 100.0)
     write = robot.write({STEP_LENGTH: 0.42, CYCLE_TIME: 1.1, TOE_HEIGHT: 0.09}, LONG_S)
     bench.gait.node.before_upload = silent_but_for(0)
     bench.gait.node.log.clear()
@@ -268,7 +270,7 @@ def test_what_is_not_waited_for_any_more_is_not_sent_later(
     robot: Tuned, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The device is busy with something urgent for longer than the writer waits."""
-    monkeypatch.setattr("gateway.modules.objects.ANSWER_S", 0.05)
+    monkeypatch.setattr("gateway.modules.control.objects.ANSWER_S", 0.05)
     asked: list[Callable[[], str | None]] = []
 
     def hang(*_given: Any, permitted: Callable[[], str | None], **_named: Any) -> Any:

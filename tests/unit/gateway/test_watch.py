@@ -7,8 +7,6 @@ from typing import Any, cast
 import pytest
 
 from drivers.joint.quick_stop import StopOutcome
-from gateway.futures import done
-from gateway.loop import Loop
 from gateway.modules.stop.authority import Authority
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.machine import Finding, Input
@@ -16,6 +14,8 @@ from gateway.modules.stop.reset import Lowering
 from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Report
 from gateway.modules.stop.watch import AT_LEAST_S, LOOK_S, Watch
+from gateway.process.futures import done
+from gateway.process.loop import Loop
 
 
 class Unseen:

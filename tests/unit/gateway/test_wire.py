@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway import messages, wire
+from gateway.wire import framing, messages
 
 
-def split(data: bytes, at: list[int], limit: int = 16) -> list[wire.Line]:
-    splitter = wire.LineSplitter(limit)
-    found: list[wire.Line] = []
+def split(data: bytes, at: list[int], limit: int = 16) -> list[framing.Line]:
+    splitter = framing.LineSplitter(limit)
+    found: list[framing.Line] = []
     for start, end in zip([0, *at], [*at, len(data)], strict=True):
         found += splitter.feed(data[start:end])
     return found + splitter.end()
 
 
-def plain(lines: list[wire.Line]) -> list[wire.Line | str]:
-    return [str(line) if isinstance(line, wire.BadLine) else line for line in lines]
+def plain(lines: list[framing.Line]) -> list[framing.Line | str]:
+    return [str(line) if isinstance(line, framing.BadLine) else line for line in lines]
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_splitting_never_depends_on_how_bytes_arrive(pieces: list[bytes], data: 
 
 
 def test_a_splitter_holds_no_more_than_its_limit() -> None:
-    splitter = wire.LineSplitter(limit=100)
+    splitter = framing.LineSplitter(limit=100)
     for _ in range(1000):
         splitter.feed(b"x" * 50)
         assert len(splitter._rest) <= 100
@@ -59,31 +59,31 @@ def test_a_splitter_holds_no_more_than_its_limit() -> None:
 @pytest.mark.parametrize(
     ("line", "code", "id_"),
     [
-        (b"{", wire.PARSE_ERROR, None),
-        (b"\xff\xfe", wire.PARSE_ERROR, None),
-        (b'{"jsonrpc":"2.0","id":1,"method":"x","params":{"a":"\xff"}}', wire.PARSE_ERROR, None),
-        (b'{"jsonrpc":"2.0","id":1,"method":"x","params":{"a":NaN}}', wire.PARSE_ERROR, None),
-        (b'{"jsonrpc":"2.0","id":1,"method":"x","params":' + b"[" * 30000 + b"}", wire.PARSE_ERROR, None),
-        (b'[{"jsonrpc":"2.0","id":1,"method":"x"}]', wire.INVALID_REQUEST, None),
-        (b"7", wire.INVALID_REQUEST, None),
-        (b'{"jsonrpc":"1.0","id":1,"method":"x"}', wire.INVALID_REQUEST, 1),
-        (b'{"jsonrpc":"2.0","id":"a","method":5}', wire.INVALID_REQUEST, "a"),
-        (b'{"jsonrpc":"2.0","id":[1],"method":"x"}', wire.INVALID_REQUEST, None),
-        (b'{"jsonrpc":"2.0","id":true,"method":"x"}', wire.INVALID_REQUEST, None),
-        (b'{"jsonrpc":"2.0","id":4,"method":"x","parms":{}}', wire.INVALID_REQUEST, 4),
-        (b'{"id":4,"method":"x"}', wire.INVALID_REQUEST, 4),
+        (b"{", framing.PARSE_ERROR, None),
+        (b"\xff\xfe", framing.PARSE_ERROR, None),
+        (b'{"jsonrpc":"2.0","id":1,"method":"x","params":{"a":"\xff"}}', framing.PARSE_ERROR, None),
+        (b'{"jsonrpc":"2.0","id":1,"method":"x","params":{"a":NaN}}', framing.PARSE_ERROR, None),
+        (b'{"jsonrpc":"2.0","id":1,"method":"x","params":' + b"[" * 30000 + b"}", framing.PARSE_ERROR, None),
+        (b'[{"jsonrpc":"2.0","id":1,"method":"x"}]', framing.INVALID_REQUEST, None),
+        (b"7", framing.INVALID_REQUEST, None),
+        (b'{"jsonrpc":"1.0","id":1,"method":"x"}', framing.INVALID_REQUEST, 1),
+        (b'{"jsonrpc":"2.0","id":"a","method":5}', framing.INVALID_REQUEST, "a"),
+        (b'{"jsonrpc":"2.0","id":[1],"method":"x"}', framing.INVALID_REQUEST, None),
+        (b'{"jsonrpc":"2.0","id":true,"method":"x"}', framing.INVALID_REQUEST, None),
+        (b'{"jsonrpc":"2.0","id":4,"method":"x","parms":{}}', framing.INVALID_REQUEST, 4),
+        (b'{"id":4,"method":"x"}', framing.INVALID_REQUEST, 4),
     ],
 )
-def test_what_is_no_request_is_named_and_keeps_its_id(line: bytes, code: int, id_: wire.Id) -> None:
-    with pytest.raises(wire.BadLine) as caught:
-        wire.decode_request(line)
+def test_what_is_no_request_is_named_and_keeps_its_id(line: bytes, code: int, id_: framing.Id) -> None:
+    with pytest.raises(framing.BadLine) as caught:
+        framing.decode_request(line)
     assert (caught.value.code, caught.value.id) == (code, id_)
 
 
 @given(st.binary(max_size=200))
 def test_no_line_raises_anything_but_bad_line(line: bytes) -> None:
-    with contextlib.suppress(wire.BadLine):
-        wire.decode_request(line)
+    with contextlib.suppress(framing.BadLine):
+        framing.decode_request(line)
 
 
 @pytest.mark.parametrize(
@@ -104,21 +104,21 @@ def test_no_line_raises_anything_but_bad_line(line: bytes) -> None:
     ],
 )
 def test_wrong_parameters_name_the_field_and_what_is_allowed(method: str, params: bytes, says: str) -> None:
-    with pytest.raises(wire.RpcError) as caught:
-        wire.decode_params(msgspec.Raw(params), messages.METHODS[method].params)
-    assert (caught.value.code, caught.value.kind) == (wire.INVALID_PARAMS, wire.Kind.BAD_PARAMS)
+    with pytest.raises(framing.RpcError) as caught:
+        framing.decode_params(msgspec.Raw(params), messages.METHODS[method].params)
+    assert (caught.value.code, caught.value.kind) == (framing.INVALID_PARAMS, framing.Kind.BAD_PARAMS)
     assert says in str(caught.value)
 
 
 @pytest.mark.parametrize("params", [b"", b"null", b'{"reason":7}', b'{"why":"fire"}'])
 def test_a_stop_is_never_refused_for_its_form(params: bytes) -> None:
     raw = msgspec.Raw(params) if params else msgspec.UNSET
-    wire.decode_params(raw, messages.METHODS["robot.stop"].params)
+    framing.decode_params(raw, messages.METHODS["robot.stop"].params)
 
 
 @given(st.one_of(st.none(), st.integers(), st.text()), st.floats())
-def test_messages_are_one_line_and_numbers_that_are_none_are_null(id_: wire.Id, number: float) -> None:
-    line = wire.encode_result(id_, {"x": number})
+def test_messages_are_one_line_and_numbers_that_are_none_are_null(id_: framing.Id, number: float) -> None:
+    line = framing.encode_result(id_, {"x": number})
     assert line.count(b"\n") == 1
     found: dict[str, Any] = json.loads(line)
     assert found["id"] == id_
@@ -127,8 +127,10 @@ def test_messages_are_one_line_and_numbers_that_are_none_are_null(id_: wire.Id, 
 
 
 def test_an_error_carries_kind_code_and_only_what_applies() -> None:
-    error = wire.refuse(wire.Kind.OUT_OF_LIMIT, "too far", component="gait", object="0x2001:0", limit=0.6)
-    found = json.loads(wire.encode_error(3, error))
+    error = framing.refuse(
+        framing.Kind.OUT_OF_LIMIT, "too far", component="gait", object="0x2001:0", limit=0.6
+    )
+    found = json.loads(framing.encode_error(3, error))
     assert found == {
         "jsonrpc": "2.0",
         "id": 3,
@@ -141,5 +143,5 @@ def test_an_error_carries_kind_code_and_only_what_applies() -> None:
 
 
 def test_every_kind_has_a_code_of_its_own() -> None:
-    assert set(wire.CODES) == set(wire.Kind)
-    assert len(set(wire.CODES.values())) == len(wire.CODES)
+    assert set(framing.CODES) == set(framing.Kind)
+    assert len(set(framing.CODES.values())) == len(framing.CODES)

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from gateway.modules.writer import Turn, Writer
-from gateway.wire import RpcError
+from gateway.modules.control.writer import Turn, Writer
+from gateway.wire.framing import RpcError
 from tests.unit.gateway.harness import DEADLINE_S
 
 

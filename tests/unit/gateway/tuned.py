@@ -12,18 +12,18 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from gateway.config import RobotConfig
-from gateway.futures import outcome
-from gateway.loop import Loop
-from gateway.messages import TrialInfo
-from gateway.modules.component import ComponentModule
+from gateway.modules.component.module import ComponentModule
+from gateway.modules.control.tuning import Tuning
 from gateway.modules.stop.authority import Address, Authority
 from gateway.modules.stop.machine import Finding, Input
-from gateway.modules.tuning import Tuning
+from gateway.process.futures import outcome
+from gateway.process.loop import Loop
 from gateway.records.journal import read_verified
 from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoFile
 from gateway.registry import Context
-from gateway.wire import RpcError
+from gateway.wire.framing import RpcError
+from gateway.wire.messages import TrialInfo
 from tests.unit.gateway.harness import DEADLINE_S, ROBOT, Bench, FakeNode, config
 
 LONG_S = 100.0  # a trial that does not end by itself in a test

@@ -19,7 +19,7 @@ from gateway.guard.settings import WATCHES
 from gateway.guard.watcher import Change, Watcher
 from gateway.guard.watcher import State as Found
 from gateway.guard.wiring import Wiring
-from gateway.modules.assembly import Robot
+from gateway.modules.component.assembly import Robot
 
 S = 1_000_000_000
 JOINT = (

@@ -12,9 +12,9 @@ from drivers.bus.bus_state import BusState
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.guard.buses import BusWatcher, SyncWatcher
 from gateway.guard.inputs import AGAIN_NS
-from gateway.guard.making import ASK_S, UNASKED_NS
 from gateway.guard.watcher import GRACE_NS
 from gateway.guard.watcher import State as Found
+from gateway.guard.watchers import ASK_S, UNASKED_NS
 from tests.unit.guard.bench import Bench, S
 
 MS = 1_000_000
@@ -32,7 +32,7 @@ def asked(
 
     def ask(took_s: float, answer: Exception | None = None) -> None:
         stamps = iter((began, began + round(took_s * S)))
-        monkeypatch.setattr("gateway.guard.making.time", SimpleNamespace(monotonic_ns=lambda: next(stamps)))
+        monkeypatch.setattr("gateway.guard.watchers.time", SimpleNamespace(monotonic_ns=lambda: next(stamps)))
         bench.gait.worker.answer = answer
         bench.gait.worker.ask()
 

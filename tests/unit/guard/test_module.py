@@ -13,7 +13,7 @@ from drivers.component import Kind
 from gateway.guard.module import GuardModule
 from gateway.guard.rules import DriftRule, RangeRule, Rule
 from gateway.guard.settings import GuardSettings
-from gateway.modules.assembly import Robot
+from gateway.modules.component.assembly import Robot
 from tests.unit.guard.bench import Bench
 
 

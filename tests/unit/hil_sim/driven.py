@@ -9,7 +9,7 @@ from pathlib import Path
 from drivers.component import Component
 from drivers.samples import Sample, State
 from gateway import config
-from gateway.modules.assembly import assemble
+from gateway.modules.component.assembly import assemble
 from hil_sim import robot_file
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.bus.virtual import VirtualBridge

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from gateway import config
-from gateway.modules.assembly import assemble
+from gateway.modules.component.assembly import assemble
 from hil_sim.cli import sim
 from hil_sim.robot import SimulatedRobot
 from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice

@@ -13,7 +13,7 @@ from drivers.imu.can_device import CanImu
 from drivers.imu.device import Imu
 from drivers.imu.inclinometer import Inclinometer
 from gateway import config as configs
-from gateway.modules.assembly import BUILDERS, assemble
+from gateway.modules.component.assembly import BUILDERS, assemble
 
 BUS = '[robot]\nname = "x"\n[can.main]\ninterface = "virtual"\nchannel = "imu settings"\n[imu.trunk]\n'
 JOINT = """
@@ -129,7 +129,7 @@ from gateway import config
 there = lambda: print(*sorted(name for name in sys.modules if ".formats." in name))
 robot = config.load(pathlib.Path(sys.argv[1]))
 there()
-from gateway.modules.assembly import assemble
+from gateway.modules.component.assembly import assemble
 assemble(robot)
 there()
 """

@@ -14,8 +14,8 @@ from ml.store import Store
 from ml.store.labels import Label, Source
 from ml.store.sessions import Session, find
 from ml.training.recorded import recorded
-from server_gui.core.labelling import BadLabel
-from server_gui.core.labels_found import from_events, from_table, from_truth
+from server_gui.core.archive.label_sources import from_events, from_table, from_truth
+from server_gui.core.archive.labelling import BadLabel
 from server_gui.core.recording import records
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.rows import Layout, Run

@@ -12,15 +12,15 @@ from ml.store.labels import Label, Source, holding
 from ml.store.query import query
 from ml.store.sessions import NoSuchSession, happenings
 from ml.store.tables import LABELS
+from server_gui.core.archive.labelling import AT_ONCE, BadLabel, Kept, Labelling, Where
 from server_gui.core.fleet.collector import Collector
-from server_gui.core.fleet.door import NobodyCollects, ask
-from server_gui.core.labelling import AT_ONCE, BadLabel, Kept, Labelling, Where
+from server_gui.core.fleet.control_socket import NobodyCollects, ask
 from server_gui.core.recording import records
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.records import Facts
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings, Upload
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings, Upload
 
 S = 10**9
 BEGAN = 1_800_000_000 * S
@@ -117,7 +117,7 @@ def test_where_the_store_cannot_be_reached_labels_wait_in_the_spool(
     labelling: Labelling, settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr("server_gui.core.labelling.send", refuse)
+        patch.setattr("server_gui.core.archive.labelling.send", refuse)
         kept = labelling.add_all([label()])
     assert (kept.where, kept.problem) == (Where.SPOOL, "no network")
     assert held(labelling) == [label()]
@@ -160,7 +160,7 @@ def test_a_collector_that_owns_the_spool_keeps_labels_and_uploads_them(
 def test_what_a_collector_cannot_keep_is_an_error(
     labelling: Labelling, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server_gui.core.labelling.ask", lambda *_: b"false\n")
+    monkeypatch.setattr("server_gui.core.archive.labelling.ask", lambda *_: b"false\n")
     with pytest.raises(RecordingError, match="could not keep the labels"):
         labelling.add_all([label()])
 

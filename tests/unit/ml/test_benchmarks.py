@@ -14,7 +14,7 @@ from ml.evaluate import BENCHMARKS, adapt, fall, ipol, metrics, phase, strides
 from ml.evaluate.sisfall import Recording
 from ml.models.falling import FallSettings
 from ml.models.gait_phase import PhaseSettings
-from server_gui.commands.evaluate import main
+from server_gui.cli.evaluate import main
 from tests.unit.ml import recordings
 from tests.unit.ml.recordings import Arrays, saved
 

@@ -9,7 +9,7 @@ import pytest
 from ml.errors import UnusableData
 from ml.evaluate import BENCHMARKS, sim, sim_activity, sim_phase
 from ml.robot import familiar, learn
-from server_gui.commands.evaluate import main
+from server_gui.cli.evaluate import main
 from tests.unit.ml_robot.recorded import written
 
 

@@ -13,16 +13,16 @@ from typing import Any
 from msgspec.structs import replace
 
 from gateway.client import Batch, ClockOffset
-from gateway.messages import ChannelInfo
+from gateway.wire.messages import ChannelInfo
 from ml.registry.card import Card, Source
 from ml.registry.code import features_hash, versions
 from ml.registry.registry import Registry
 from ml.robot.learned import Learned
-from server_gui.core.events import Described, Telemetry
+from server_gui.core.follow.events import Described, Telemetry
 from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
-from server_gui.core.prediction.predicting import Predicting
-from server_gui.core.prediction.settings import PredictionSettings, RuleSettings
-from server_gui.core.settings import ServerSettings, StoreSettings
+from server_gui.core.prediction.service import Predicting
+from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
+from server_gui.core.settings.server_file import ServerSettings, StoreSettings
 from tests.fake_robot import FakeRobot
 from tests.unit.ml.serving.small import CHANNELS, MS, STEP_MS, Floats, hips, learned
 from tests.unit.recording.robots import description

@@ -9,10 +9,10 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Address
-from server_gui.commands import predict
+from server_gui.cli import predict
 from server_gui.core.prediction.live import Live
-from server_gui.core.prediction.settings import Action, RuleSettings
-from server_gui.core.settings import SettingsError
+from server_gui.core.settings.prediction import Action, RuleSettings
+from server_gui.core.settings.server_file import SettingsError
 from server_gui.terminal.predictions import told
 from tests.unit.prediction.robots import SteadyRobot, publish, settings
 

@@ -15,10 +15,10 @@ from ml.registry.registry import Registry
 from ml.serving.predictor import Prediction, Window, judged, replayed
 from ml.store import Store, StoreUnreachable
 from ml.store.objects import Objects
-from server_gui.core.prediction import following, inbox
-from server_gui.core.prediction import predicting as module
+from server_gui.core.prediction import inbox, robot_predictor
+from server_gui.core.prediction import service as module
 from server_gui.core.prediction.news import Serves
-from server_gui.core.prediction.predicting import Predicting
+from server_gui.core.prediction.service import Predicting
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import TrackRecord
 from tests.unit.ml.serving.small import MS, STEP_MS, Floats, hips, learned
@@ -40,7 +40,7 @@ EVERY_NS = 100 * MS
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tests send at once what robots send in seconds: nothing of that is late, or too much to wait."""
-    monkeypatch.setattr(following, "LATE_NS", 3_600_000 * MS)
+    monkeypatch.setattr(robot_predictor, "LATE_NS", 3_600_000 * MS)
     monkeypatch.setattr(inbox, "MOST_NS", 3_600_000 * MS)
 
 
@@ -187,7 +187,7 @@ def test_who_falls_behind_decides_about_the_newest_and_counts_what_was_skipped(
         return judged(model, known, windows)
 
     monkeypatch.setattr(module, "judged", slow)
-    monkeypatch.setattr(following, "LATE_NS", 500 * MS)
+    monkeypatch.setattr(robot_predictor, "LATE_NS", 500 * MS)
     rows = hips(9, walks=True)
     with predicting(settings(folder_url)) as (one, told):
         try:

@@ -14,13 +14,18 @@ from msgspec.structs import replace
 from ml.store import Store, sessions
 from ml.store.labels import Label, utc_ns
 from ml.store.tables import LABELS, PREDICTIONS
-from server_gui.commands import predict
-from server_gui.commands.collect import status_text
+from server_gui.cli import predict
+from server_gui.cli.collect import status_text
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.prediction.replay import Live, replay
-from server_gui.core.prediction.settings import Action, PredictionSettings, RuleSettings
 from server_gui.core.prediction.track_record import TrackRecord
-from server_gui.core.settings import RecordingSettings, RobotSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.prediction import Action, PredictionSettings, RuleSettings
+from server_gui.core.settings.server_file import (
+    RecordingSettings,
+    RobotSettings,
+    ServerSettings,
+    StoreSettings,
+)
 from server_gui.terminal.predictions import replay_told
 from tests.unit.prediction.robots import SteadyRobot, publish
 

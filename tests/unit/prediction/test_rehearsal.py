@@ -8,10 +8,10 @@ import pytest
 from msgspec.structs import replace
 
 from ml.serving.predictor import Prediction
-from server_gui.commands import predict
+from server_gui.cli import predict
 from server_gui.core.prediction.rehearsal import FORESEEN_NS, HOUR_NS, Stretch, rehearse
-from server_gui.core.prediction.settings import RuleSettings
-from server_gui.core.settings import SettingsError
+from server_gui.core.settings.prediction import RuleSettings
+from server_gui.core.settings.server_file import SettingsError
 from tests.unit.ml import recordings
 
 MS = 1_000_000

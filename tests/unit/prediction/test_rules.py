@@ -9,9 +9,9 @@ from msgspec.structs import replace
 
 from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
 from ml.serving.predictor import Prediction
-from server_gui.core.prediction import following
+from server_gui.core.prediction import robot_predictor
 from server_gui.core.prediction.rules import Rule
-from server_gui.core.prediction.settings import EVERY_MS, Action, RuleSettings
+from server_gui.core.settings.prediction import EVERY_MS, Action, RuleSettings
 from tests.unit.ml.serving.small import MS, hips
 from tests.unit.prediction.robots import ROBOT, predicting, publish, served, settings, telemetry
 
@@ -71,7 +71,7 @@ def test_every_task_has_a_time_between_decisions() -> None:
 def test_a_rule_stops_its_robot_once_and_before_anything_is_told(
     folder_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(following, "LATE_NS", 3_600_000 * MS)
+    monkeypatch.setattr(robot_predictor, "LATE_NS", 3_600_000 * MS)
     publish(folder_url)
     walking = RuleSettings("activity", "walk", 0.9, for_ms=300, robot="exo-*", action=Action.STOP)
     alarm = RuleSettings("activity", "stand", 0.9)

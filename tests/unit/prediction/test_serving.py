@@ -12,8 +12,8 @@ import pytest
 from ml.registry.pointers import Pointers
 from ml.registry.registry import CARD, SKOPS, Registry
 from ml.store.objects import Objects
-from server_gui.core.prediction import serving as module
-from server_gui.core.prediction.serving import Serving
+from server_gui.core.prediction import model_loading as module
+from server_gui.core.prediction.model_loading import Serving
 from tests.unit.ml.serving.small import CHANNELS, learned
 from tests.unit.prediction.robots import ROBOT, card, publish
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from gateway.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
+from gateway.wire.messages import CpuUse, GatewayUse, MemoryUse, ProcessUse, ResourceSnapshot
 from server_gui.core.processing.history import COARSE_ROWS, FINE_ROWS
 from server_gui.core.processing.regression import Regression, SessionUse, regressions
 from server_gui.core.processing.resource import PROCESSES, ResourceProcessing, leaking

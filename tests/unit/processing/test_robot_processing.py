@@ -1,8 +1,8 @@
 """The three modules behind one `apply`."""
 
 from gateway.client import Batch, ConnectionState
-from gateway.messages import Clock, Description, GuardInfo, Snapshot, StopInfo
-from server_gui.core.events import Described, Failed, LinkChanged, Looked, Resources, Telemetry
+from gateway.wire.messages import Clock, Description, GuardInfo, Snapshot, StopInfo
+from server_gui.core.follow.events import Described, Failed, LinkChanged, Looked, Resources, Telemetry
 from server_gui.core.processing.communication import Health
 from server_gui.core.processing.gait_events import Leg, Source
 from server_gui.core.processing.robot_processing import RobotProcessing

@@ -5,7 +5,7 @@ import time
 import msgspec
 
 from gateway.client import Batch
-from gateway.messages import Description
+from gateway.wire.messages import Description
 
 CHANNELS = ("left_knee.position", "left_knee.velocity", "trunk.tilt_forward")
 

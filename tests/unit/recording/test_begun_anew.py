@@ -7,13 +7,13 @@ import pytest
 
 from ml.store import Store, StoreError
 from ml.store.tables import TELEMETRY
-from server_gui.core.cloud import work
+from server_gui.core.cloud import actions
 from server_gui.core.cloud.jobs import Job
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader
-from server_gui.core.settings import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from tests.unit.recording.robots import batch
 
 HERE = TELEMETRY.location("exo-01", 1)
@@ -114,6 +114,6 @@ def test_who_uploads_by_hand_is_told_that_the_store_is_another_one(
         said = "is not the same store any more"
     settings = ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool))
     with pytest.raises((StoreError, Damaged), match=said):
-        work.upload(settings)(Job("Upload"))
+        actions.upload(settings)(Job("Upload"))
     with Spool(spool, reserve_bytes=0) as opened:
         assert bool(opened.waiting()) is (by == "nothing")

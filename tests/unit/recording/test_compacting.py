@@ -12,7 +12,7 @@ import pytest
 
 from ml.store import Store
 from ml.store.tables import TELEMETRY
-from server_gui.core.recording.compacting import Compacting
+from server_gui.core.recording.compaction import Compacting
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader

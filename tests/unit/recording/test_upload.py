@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from gateway.messages import ResourceSnapshot
+from gateway.wire.messages import ResourceSnapshot
 from ml.store import Store, StoreError, StoreUnreachable, durable
 from ml.store.labels import Label
 from ml.store.tables import TELEMETRY, Known

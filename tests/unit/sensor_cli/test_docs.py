@@ -6,7 +6,7 @@ from pathlib import Path
 from drivers.cli.decode import FORMATS
 from drivers.imu.canopen import FORMATS as CANOPEN_FORMATS
 from gateway import config
-from gateway.modules.assembly import assemble
+from gateway.modules.component.assembly import assemble
 from hil_sim.sensors.suite import IMUS, INSOLES
 
 ROOT = Path(__file__).parents[3]

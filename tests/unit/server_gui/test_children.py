@@ -12,10 +12,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from server_gui.cli import demo
-from server_gui.terminal import children
-from server_gui.terminal.children import Child, ChildFailed
-from server_gui.terminal.ending import Ended, Ending
+from server_gui.cli.demo import demo
+from server_gui.processes import children
+from server_gui.processes.children import Child, ChildFailed
+from server_gui.processes.ending import Ended, Ending
 
 
 def nothing() -> None:
@@ -100,7 +100,7 @@ def test_wrong_usage_is_2(arguments: list[str], capsys: pytest.CaptureFixture[st
 @pytest.mark.skipif(shutil.which("setpriv") is None, reason="util-linux's setpriv is not here")
 def test_child_ends_where_its_parent_is_killed(tmp_path: Path) -> None:
     program = (
-        "from server_gui.terminal.children import Child\n"
+        "from server_gui.processes.children import Child\n"
         f"print(Child('simulator', ['sim', '--dir', {str(tmp_path)!r}]).pid, flush=True)\n"
         "input()"
     )

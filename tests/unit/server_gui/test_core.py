@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
-from server_gui.core.events import STOP, Event, Failed, LinkChanged, Telemetry
-from server_gui.core.feed import Feed, Following
-from server_gui.core.mailbox import Mailbox
-from server_gui.core.network import Network
-from server_gui.core.robot import HISTORY_ROWS, Robot
-from server_gui.core.summary import Summary
+from server_gui.core.follow.events import STOP, Event, Failed, LinkChanged, Telemetry
+from server_gui.core.follow.feed import Feed, Following
+from server_gui.core.follow.mailbox import Mailbox
+from server_gui.core.follow.network import Network
+from server_gui.core.follow.robot import HISTORY_ROWS, Robot
+from server_gui.terminal.summary import Summary
 from tests.fake_robot import FakeRobot
 
 SECOND_NS = 1_000_000_000

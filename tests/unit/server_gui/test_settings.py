@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from gateway.client import Address
-from server_gui.core.prediction.settings import Action, RuleSettings
-from server_gui.core.settings import RecordingSettings, SettingsError, Upload, add_robots, load
+from server_gui.core.settings.prediction import Action, RuleSettings
+from server_gui.core.settings.server_file import RecordingSettings, SettingsError, Upload, add_robots, load
 
 WHOLE = """
 [robots]

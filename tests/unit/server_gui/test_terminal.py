@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from gateway.client import Batch, ConnectionState
-from gateway.messages import (
+from gateway.wire.messages import (
     Clock,
     ComponentInfo,
     Description,
@@ -25,7 +25,7 @@ from gateway.messages import (
     Stopped,
     Written,
 )
-from server_gui.core.events import (
+from server_gui.core.follow.events import (
     STOP,
     Changed,
     Described,
@@ -35,9 +35,9 @@ from server_gui.core.events import (
     StopAnswered,
     Telemetry,
 )
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait, LegGait
-from server_gui.core.robot import Robot
 from server_gui.terminal import headless, marks
 from server_gui.terminal.controls import Controls, neighbour, step_of
 from server_gui.terminal.dashboard import draw

@@ -129,7 +129,7 @@ def test_a_cluster_that_is_not_there_is_said_so(monkeypatch: pytest.MonkeyPatch)
 
 def test_without_a_cluster_no_dask_is_loaded() -> None:
     script = (
-        "import sys, server_gui.commands.train as t; "
+        "import sys, server_gui.cli.train as t; "
         "from ml.training.extract import extract; assert extract([]) == []; "
         "print([name for name in ('dask', 'distributed') if name in sys.modules])"
     )

@@ -11,7 +11,7 @@ from ml.registry.registry import Registry
 from ml.training import training
 from ml.training.material import Wish
 from ml.training.training import Trained
-from server_gui.commands import train as command
+from server_gui.cli import train as command
 from tests.unit.training.walkers import day, put
 
 

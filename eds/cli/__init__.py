@@ -1,0 +1,1 @@
+"""The `gwrms eds` command."""

@@ -1,0 +1,1 @@
+"""Clients' connections: accepted, read, given turns, answered, and bounded."""

@@ -1,0 +1,429 @@
+"""Where clients' bytes come in: a thread that accepts and receives, and acts on a stop before all else.
+
+Whatever the main loop is doing, hung or busy, a stop goes from here to the drives; every other line goes to
+the loop. Reading never ends because requests wait: beyond what may wait they are refused, and stops act.
+"""
+
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from drivers.urgency import make_urgent
+from gateway.connections.acceptor import Acceptor
+from gateway.connections.limits import BAD_LINES, QUEUED_BYTES, QUEUED_LINES
+from gateway.connections.sharing import TimeSharing
+from gateway.connections.stop_lines import StopSplitter
+from gateway.process.loop import HANGUP, READ, Loop, Timer
+from gateway.registry import StopNow
+from gateway.wire import framing
+
+log = logging.getLogger(__name__)
+
+RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it …
+UNKNOWN_BYTES = 2 * 1024  # … and of whoever has just come, or has cost something just now
+TURN_NS = 500_000  # what these may take together before the others are read
+ON_THE_WAY = 1024  # refusals and stops' answers that may wait for the loop as well; beyond, nobody is told
+PACE_S = 0.005  # how long a client that sends more than may wait is left alone after each read
+COSTLY_NS = 300_000  # what a client's reads may take of the thread at once; beyond, it is left alone …
+PACE_FACTOR = 4  # … for so many times as long as they took, and for each client that is left alone just now.
+LONGEST_REST_S = 1.0  # So they all together leave the thread most of its time
+FLOOD = 8  # stops at once, of a client; who sends more floods the drives with them …
+FLOOD_S = 0.05  # … and is read again so much later: as many more are given to it in twice that time
+LAST_READS = 16  # of a connection that ends: a stop may still be in it …
+LAST_NS = 1_000_000  # … which is looked for so long
+
+_TOO_MANY = framing.refuse(
+    framing.Kind.UNAVAILABLE,
+    "too many requests wait; this one is not done: ask again when some have been answered",
+)
+
+SHORTEST = len(b'{"method":""}')  # of all that could be a request
+FOREIGN = "speaks another protocol: is it a browser, or another program?"
+# What a client of ours begins with, or a stop in an odd form: no method of HTTP, no TLS and no SSH.
+_BEGINNINGS = frozenset(b"{[ \t\"'")
+_NOTHING_YET = b"\r\n\0"  # of these UTF-16 and UTF-32 have the last before the first letter
+
+# Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
+_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
+
+
+class Heard:
+    """What one read has brought, on its way to the loop."""
+
+    __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stop", "stopped", "stops")
+
+    def __init__(self) -> None:
+        self.stamp_ns = time.monotonic_ns()
+        self.stops: list[framing.StopRequest] = []  # which are one stop …
+        self.stop: framing.StopRequest | None = None  # … the newest of them
+        self.stopped: Future[Any] | None = None  # what answers it, or `None` where nobody could act on it yet
+        self.lines: list[tuple[int, bytes | framing.BadLine]] = []  # with when they came in (monotonic, ns)
+        self.refusals: list[bytes] = []  # of what was too much, ready to be sent
+        self.ended = False  # the client will say nothing more
+        self.lost: str | None = None  # why there is nobody any more
+        self.cpu_ns = 0
+
+
+def _may_be_request(line: bytes) -> bool:
+    """As far as that can be seen at once: what is none is counted before it costs more."""
+    return len(line) >= SHORTEST and line.lstrip()[:1] == b"{"
+
+
+class Pace(TimeSharing):
+    """What the clients of an intake share of its thread; those that are not known yet take turns."""
+
+    def __init__(self, front: Loop) -> None:
+        super().__init__(front, TURN_NS)
+        self.resting = 0  # clients that are left alone just now
+        self._known_turn, self._known_until_ns = -1, 0
+
+    def has_time_for_known(self) -> bool:
+        """Of this turn: of its own, so that neither takes it from the others."""
+        now_ns = time.monotonic_ns()
+        if self._known_turn != self._loop.turns:
+            self._known_turn, self._known_until_ns = self._loop.turns, now_ns + TURN_NS
+        return now_ns < self._known_until_ns
+
+    def rest_s(self, spent_ns: int) -> float:
+        """How long who has cost so much is left alone."""
+        return min(LONGEST_REST_S, max(PACE_S, PACE_FACTOR * (self.resting + 1) * spent_ns / 1e9))
+
+
+class Inlet:
+    """One client's incoming bytes, in the intake's thread; `receiver`, `done` and `close` are the loop's."""
+
+    def __init__(
+        self,
+        front: Loop,
+        loop: Loop,
+        connection: socket.socket,
+        peer: str,
+        stop_now: Callable[[], StopNow | None],
+        spent: Callable[[], int],
+        finished: "Callable[[Inlet], None]",
+        pace: Pace,
+    ) -> None:
+        self.socket = connection
+        self.peer = peer
+        self.who = peer  # how the journal calls it
+        self.received_bytes = self.unanswered = 0
+        self.receiver: Callable[[Heard], object] = bool  # in the loop; set before anything is heard
+        self._front = front
+        self._loop = loop
+        self._stop_now = stop_now
+        self._spent = spent
+        self._finished = finished
+        self._pace = pace
+        self._rests = False
+        self._timer: Timer | None = None  # until it is read again
+        self._waits = False  # for its turn
+        self._bad = 0  # lines that are no requests, whatever is in them
+        self._splitter = StopSplitter()
+        self._began = self._ended = self._closed = False
+        # Each is counted by one thread: by the intake what was handed over, by the loop what it has done.
+        self._handed = self._handed_bytes = self._done = self._done_bytes = 0
+        self._cpu_ns = 0
+        self._owed_ns = self._owed_at_ns = 0  # of the thread's time
+        self._stops, self._stops_at_s = 0.0, 0.0  # stops that are not forgotten yet
+        _prepare(connection)
+        front.watch(connection, READ, self._on_ready)
+
+    # In the loop's thread.
+
+    def done(self, count: int, size: int = 0) -> None:
+        """So much of what was handed over does not wait any more."""
+        self._done += count
+        self._done_bytes += size
+
+    def close(self) -> None:
+        """End the connection; a stop that has arrived already still acts."""
+        self._front.post(self.finish)
+
+    # In the intake's thread.
+
+    def finish(self) -> None:
+        """Read what is there, for the stops in it, and close; idempotent."""
+        if self._closed:
+            return
+        if not self._ended:
+            self._read_last()
+        self._closed = True
+        self._wake()
+        self._front.watch(self.socket, 0, self._on_ready)
+        self.socket.close()
+        self._finished(self)
+        self._loop.post(self._forget_receiver)
+
+    def _forget_receiver(self) -> None:
+        """It has heard all; so neither keeps the other in memory."""
+        self.receiver = bool
+
+    def _read_last(self) -> None:
+        """For the stops in it, as far as that takes no long time."""
+        data = self._unread()
+        lines: list[framing.Line] = []
+        if self._splitter.may_stop(data):
+            until_ns = time.monotonic_ns() + LAST_NS
+            for start in range(0, len(data), RECEIVE_BYTES):
+                if time.monotonic_ns() < until_ns:
+                    lines += self._splitter.feed(data[start : start + RECEIVE_BYTES])
+            lines += self._splitter.end()
+        self._hand_over(self._sorted([one for one in lines if isinstance(one, framing.StopRequest)]))
+
+    def _unread(self) -> bytes:
+        data = b""
+        try:
+            for _ in range(LAST_READS):
+                data += (more := self.socket.recv(RECEIVE_BYTES))
+                if not more:
+                    break
+        except OSError:
+            pass  # there is no more
+        return data
+
+    def _on_ready(self, events: int) -> None:
+        if self._ended:
+            if events & HANGUP:
+                self._end("it has gone", Heard())
+        elif self._is_known and self._pace.has_time_for_known():
+            self._receive(RECEIVE_BYTES)
+        else:
+            self._front.watch(self.socket, 0, self._on_ready)
+            if not self._waits:
+                self._waits = True
+                self._pace.add(self.address, self._take_turn)
+
+    @property
+    def address(self) -> str:
+        """Whence it comes, without the port."""
+        return self.peer.rpartition(":")[0]
+
+    @property
+    def _is_known(self) -> bool:
+        """Whether it has said something, and costs little."""
+        self._owe(0)
+        return self._began and not self._owed_ns
+
+    def _take_turn(self) -> None:
+        """Of those that are not known, or had no time: together they keep nobody else waiting."""
+        self._waits = False
+        if not (self._ended or self._closed):
+            self._front.watch(self.socket, READ, self._on_ready)
+            self._receive(UNKNOWN_BYTES)
+
+    def _receive(self, most: int) -> bool:
+        """Read once; false where there was nothing."""
+        self._spent()  # what was worked for others
+        try:
+            data = self.socket.recv(most)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            self._end(str(error), self._sorted(self._splitter.end()))
+            return True
+        if not data:
+            self._end(None, self._sorted(self._splitter.end()))
+            return True
+        if not self._began:
+            self._began = bool(begin := data.lstrip(_NOTHING_YET))
+            if self._began and begin[0] not in _BEGINNINGS and begin[0] < 0x80:
+                self._end(FOREIGN, Heard())
+                return True
+        self.received_bytes += len(data)
+        lines = self._splitter.feed(data)
+        heard = self._sorted(lines)
+        spent_ns = self._spent()
+        self._cpu_ns += spent_ns
+        self._owe(spent_ns)
+        floods = self._floods(sum(isinstance(line, framing.StopRequest) for line in lines))
+        if self._is_full or self._splitter.dropping or self._owed_ns > COSTLY_NS:
+            self._rest(max(self._pace.rest_s(self._owed_ns), FLOOD_S * floods))
+        elif floods:
+            self._rest(FLOOD_S)
+        if self._bad >= BAD_LINES:  # from now on only stops are heard, until the loop has closed it
+            heard.ended = True
+            self._rest(self._pace.rest_s(self._owed_ns))
+        if lines or heard.ended:
+            self._hand_over(heard)
+        return True
+
+    def _owe(self, spent_ns: int) -> None:
+        """Put down what it has cost; while it costs nothing, that is forgotten."""
+        now_ns = time.monotonic_ns()
+        forgotten_ns = (now_ns - self._owed_at_ns) // PACE_FACTOR
+        self._owed_ns, self._owed_at_ns = max(0, self._owed_ns - forgotten_ns) + spent_ns, now_ns
+
+    def _floods(self, stops: int) -> bool:
+        """Whether these are too many, with those just before. All of them act; they are read later."""
+        now_s = time.monotonic()
+        forgotten = (now_s - self._stops_at_s) * FLOOD / (2 * FLOOD_S)
+        self._stops, self._stops_at_s = max(0.0, self._stops - forgotten) + stops, now_s
+        floods = stops > 0 and self._stops > FLOOD
+        self._stops = min(self._stops, FLOOD)
+        return floods
+
+    def _rest(self, seconds: float) -> None:
+        """Leave it alone for a while."""
+        self._front.watch(self.socket, HANGUP, self._on_ready)
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._front.call_later(seconds, self._go_on)
+        self._pace.resting += not self._rests
+        self._rests = True
+
+    def _wake(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._pace.resting -= self._rests
+        self._rests = False
+
+    def _end(self, lost: str | None, heard: Heard) -> None:
+        """The end of what the client says, or of the client: `lost` says why."""
+        self._ended = heard.ended = True
+        self._wake()
+        heard.lost = lost
+        self._front.watch(self.socket, HANGUP if lost is None else 0, self._on_ready)
+        self._hand_over(heard)
+
+    def _go_on(self) -> None:
+        self._wake()
+        if not (self._ended or self._closed or self._waits):
+            self._front.watch(self.socket, READ, self._on_ready)
+
+    def _hand_over(self, heard: Heard) -> None:
+        heard.cpu_ns, self._cpu_ns = self._cpu_ns, 0
+        self._loop.post(lambda: self.receiver(heard))
+
+    # What becomes of the lines
+
+    @property
+    def _is_full(self) -> bool:
+        lines, size = self._handed - self._done, self._handed_bytes - self._done_bytes
+        return lines >= QUEUED_LINES or size >= QUEUED_BYTES
+
+    @property
+    def _has_room(self) -> bool:
+        """Whether the loop keeps up, so that it can be given what is no request."""
+        return self._handed - self._done < QUEUED_LINES + ON_THE_WAY
+
+    def _sorted(self, lines: list[framing.Line]) -> Heard:
+        heard = Heard()
+        newest = next((one for one in reversed(lines) if isinstance(one, framing.StopRequest)), None)
+        if newest is not None:
+            heard.stop, heard.stopped = newest, self._stop(newest)
+        asked_ns = heard.stamp_ns  # before that stop
+        for line in lines:
+            if line is newest:
+                asked_ns = time.monotonic_ns()  # what follows was asked for after it
+            if isinstance(line, framing.StopRequest):
+                if self._has_room:
+                    heard.stops.append(line)
+                    self._handed += 1
+                else:  # it acts; only its answer is lost
+                    self.unanswered += 1
+            elif self._bad >= BAD_LINES:
+                self.unanswered += 1
+            elif not self._is_full:
+                self._bad += isinstance(line, framing.BadLine) or not _may_be_request(line)
+                heard.lines.append((asked_ns, line))
+                self._handed += 1
+                self._handed_bytes += framing.size(line)
+            elif self._has_room:
+                heard.refusals.append(framing.encode_refusal(line, _TOO_MANY))
+                self._handed += 1
+            else:
+                self.unanswered += 1
+        return heard
+
+    def _stop(self, request: framing.StopRequest) -> Future[Any] | None:
+        """Act at once, where somebody can."""
+        stop_now = self._stop_now()
+        if stop_now is None:
+            return None
+        try:
+            return stop_now(self.who, request.reason)
+        except Exception:  # whatever it is, the loop tries the long way
+            log.exception("a stop could not be carried out at once")
+            return None
+
+
+class Intake:
+    """The thread, and the listening socket. `opened` is called in the loop with each client that comes."""
+
+    def __init__(
+        self,
+        loop: Loop,
+        listener: socket.socket,
+        opened: Callable[[Inlet], None],
+        stop_now: Callable[[], StopNow | None],
+    ) -> None:
+        """`stop_now` gives what carries out a stop at once, from any thread, where there is something."""
+        self._loop = loop
+        self._front = Loop()
+        self._opened = opened
+        self._stop_now = stop_now
+        self._inlets: set[Inlet] = set()
+        self._spent_ns = 0
+        self._pace = Pace(self._front)
+        self._acceptor = Acceptor(self._front, listener, self._accepted)
+        self._thread = threading.Thread(target=self._run, name="intake")
+
+    def start(self) -> None:
+        """Begin to accept."""
+        self._acceptor.start()
+        self._thread.start()
+
+    def listen(self, *, on: bool, then: Callable[[], object] = lambda: None) -> None:
+        """Accept, or accept nobody more; `then` runs in the loop once everybody accepted so far is there."""
+
+        def change() -> None:
+            (self._acceptor.start if on else self._acceptor.end)()
+            self._loop.post(then)
+
+        self._front.post(change)
+
+    def end(self) -> None:
+        """Close every connection, and join the thread; the listening socket stays open."""
+        self._front.post(self._finish)
+        self._thread.join()
+        self._front.close()
+
+    def _run(self) -> None:
+        make_urgent()
+        self._front.run()
+
+    def _finish(self) -> None:
+        self._acceptor.end()
+        for inlet in tuple(self._inlets):
+            inlet.finish()
+        self._front.stop()
+
+    def _spent(self) -> int:
+        """What the thread has worked since the last call: for the client it has worked for, in ns."""
+        before_ns, self._spent_ns = self._spent_ns, time.thread_time_ns()
+        return self._spent_ns - before_ns
+
+    def _accepted(self, connection: socket.socket, address: Any) -> None:
+        peer = f"{address[0]}:{address[1]}"
+        stop_now, spent, finished = self._stop_now, self._spent, self._inlets.discard
+        inlet = Inlet(self._front, self._loop, connection, peer, stop_now, spent, finished, self._pace)
+        self._inlets.add(inlet)
+        self._loop.post(lambda: self._opened(inlet))
+
+
+def _prepare(connection: socket.socket) -> None:
+    connection.setblocking(False)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    # What waits in the kernel is old when it arrives: keep it short.
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 256 * 1024)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 128 * 1024)
+    for name, value in _KEEPALIVE.items():
+        option = getattr(socket, name, None)  # not every system has every one
+        if option is not None:
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)

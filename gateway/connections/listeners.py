@@ -1,0 +1,119 @@
+"""The sockets that clients come to: opened here, or handed over by whoever has held them until now.
+
+They are handed over as systemd does it (sd_listen_fds(3)): from descriptor 3 on, their number and names in
+the environment. A gateway that nobody needs hands them to `resting.py` in the same way, and gets them back.
+"""
+
+import fcntl
+import os
+import socket
+import sys
+from collections.abc import MutableMapping
+from dataclasses import dataclass
+
+from gateway.process import resting
+
+BACKLOG = 1024  # who comes while it wakes up; where there is no room, TCP tries again a second later
+PORT, CLASSIC = "port", "classic_port"  # how systemd's units name them
+_NUMBER, _PROCESS, _NAMES, _RESTING = "LISTEN_FDS", "LISTEN_PID", "LISTEN_FDNAMES", "GWRMS_RESTING"
+_SPARE = 64  # above every number that sockets are handed over with
+
+
+class HandoverError(Exception):
+    """What was handed over cannot be served."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listeners:
+    """The gateway's own port, and the paper's where it has one; `woken` where it has rested with them."""
+
+    port: socket.socket
+    classic: socket.socket | None = None
+    woken: bool = False
+
+    @property
+    def all(self) -> list[socket.socket]:
+        return [self.port] if self.classic is None else [self.port, self.classic]
+
+
+def listen(host: str, port: int, setting: str = "--host or --port") -> socket.socket:
+    """A listening TCP socket; port 0 picks one. `setting` is what an error tells to change.
+
+    Raises:
+        OSError: the address is not ours, or the port is in use; the message names both.
+
+    """
+    try:
+        family, _, _, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        return socket.create_server(address[:2], family=family, backlog=BACKLOG)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OSError(
+            error.errno, f"cannot listen on {host}:{port}: {reason}; choose another with {setting}"
+        ) from error
+
+
+def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
+    """The sockets that were handed to this process, `None` where there are none; they are taken only once.
+
+    Raises:
+        HandoverError: what was handed over is no listening TCP socket, or more than one has the same name.
+
+    """
+    number, process = environ.pop(_NUMBER, "0"), environ.pop(_PROCESS, "")
+    names, woken = environ.pop(_NAMES, "").split(":"), environ.pop(_RESTING, "") != ""
+    if process != str(os.getpid()) or not number.isdecimal() or not int(number):
+        return None
+    found: dict[str, socket.socket] = {}
+    for place in range(int(number)):
+        name = CLASSIC if names[place : place + 1] == [CLASSIC] else PORT
+        if name in found:
+            raise HandoverError(
+                f"two sockets were handed over as {name}; name one FileDescriptorName={CLASSIC}"
+            )
+        found[name] = _adopted(resting.FIRST + place)
+    if PORT not in found:
+        raise HandoverError(f"no socket was handed over as {PORT}; give one ListenStream= that name")
+    return Listeners(found[PORT], found.get(CLASSIC), woken)
+
+
+def _adopted(descriptor: int) -> socket.socket:
+    try:
+        adopted = socket.socket(fileno=descriptor)
+        listening = adopted.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+    except OSError as error:
+        raise HandoverError(f"descriptor {descriptor} was handed over and is no socket: {error}") from error
+    if not listening or adopted.type != socket.SOCK_STREAM:
+        adopted.detach()
+        raise HandoverError(f"descriptor {descriptor} was handed over and does not listen for streams")
+    adopted.set_inheritable(False)
+    return adopted
+
+
+def rest(listeners: Listeners) -> None:
+    """Become a small process that waits at the sockets, and this program again when somebody comes.
+
+    Never returns; what is not inheritable is closed. Signals are to be blocked before: what comes meanwhile
+    is then met by the one who waits.
+
+    Raises:
+        OSError: the interpreter cannot be started.
+
+    """
+    # First to high numbers: none of them may stand where another goes to.
+    spare = [fcntl.fcntl(one.fileno(), fcntl.F_DUPFD_CLOEXEC, _SPARE) for one in listeners.all]
+    for place, descriptor in enumerate(spare):
+        os.dup2(descriptor, resting.FIRST + place)
+    environ = {
+        "MALLOC_ARENA_MAX": "1",  # of glibc: the threads of so small a process need no memory of their own
+        **os.environ,
+        _NUMBER: str(len(spare)),
+        _PROCESS: str(os.getpid()),
+        _NAMES: ":".join([PORT, CLASSIC][: len(spare)]),
+        _RESTING: "1",
+    }
+    ourselves = [sys.executable, *sys.orig_argv[1:]]
+    sys.stdout.flush()
+    os.execve(sys.executable, [sys.executable, "-I", "-S", resting.__file__, *ourselves], environ)

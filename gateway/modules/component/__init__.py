@@ -1,0 +1,1 @@
+"""The component module: buses, drives, insoles and IMUs, from first use to last."""

@@ -1,0 +1,119 @@
+"""Builds a robot's buses and components from its file; what cannot be built is named and left out."""
+
+import gc
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar
+
+import eds
+from drivers.bus.bus import CanBus
+from drivers.bus.device import CanDevice
+from drivers.bus.opening import needs_python_can
+from drivers.bus.settings import DeviceSettings
+from drivers.component import Component, Kind
+from drivers.errors import DriverError
+from drivers.imu.build import build_imu
+from drivers.insole.build import build_insole, join_insoles
+from drivers.joint.drive import JointDrive
+from drivers.joint.settings import JointSettings
+from drivers.site import Site
+from gateway.config import RobotConfig
+from gateway.process.lean import standing_in, without
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Robot:
+    """What could be built, and why the rest could not."""
+
+    buses: dict[str, CanBus] = field(default_factory=dict)
+    components: dict[str, Component] = field(default_factory=dict)
+    descriptions: dict[str, eds.Description] = field(default_factory=dict)
+    absent: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # component → kind, why it is not there
+
+
+@dataclass(frozen=True, slots=True)
+class Builder:
+    """How components of one kind are made of their tables, and learn of all others once those are there."""
+
+    build: Callable[[str, Any, Site], Component]
+    join: Callable[[Mapping[str, Component]], None] | None = None
+
+
+def assemble(config: RobotConfig) -> Robot:
+    """Build everything that the file names; nothing is opened yet."""
+    robot = Robot()
+    if config.can:
+        _import_canopen(with_can=any(map(needs_python_can, config.can.values())))
+        gc.freeze()  # so that what is collected below is looked for among little
+    for name, settings in config.can.items():
+        robot.buses[name] = CanBus(name, settings, config.gateway.role, urgent=config.guard is not None)
+    site = Site(config.path, robot.buses, descriptions=robot.descriptions)
+    for kind, builder in BUILDERS.items():
+        for name, settings in getattr(config, kind).items():
+            _add(robot, kind, name, partial(builder.build, name, settings, site))
+    for builder in BUILDERS.values():
+        if builder.join is not None:
+            builder.join(robot.components)
+    return robot
+
+
+def _import_canopen(*, with_can: bool) -> None:
+    """It reads EDS files. Without python-can, where no bus is opened by that: 10 MB, and 40 ms of a stop."""
+    with without("ssl", "_hashlib"):  # OpenSSL: 5 MB
+        if with_can:
+            importlib.import_module("can")
+        with standing_in("can"):
+            importlib.import_module("canopen")
+
+
+def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) -> None:
+    try:
+        robot.components[name] = build()
+    except (DriverError, eds.EdsError, OSError) as error:
+        robot.absent[name] = (kind, str(error))
+    except Exception as error:  # noqa: BLE001 - one device's fault must not take the others with it
+        robot.absent[name] = (kind, f"internal error, {type(error).__name__}: {error}; report it")
+
+
+def _on_can(make: Callable[..., Component]) -> Builder:
+    """The builder of what a vendor's EDS describes."""
+
+    def build(name: str, settings: JointSettings | DeviceSettings, site: Site) -> Component:
+        description = eds.load(eds.locate(settings.eds, site.file), settings.node_id)
+        if all(description.path != known.path for known in site.descriptions.values()):
+            gc.collect()  # what reading a file leaves is larger than what it gives, and would lie there long
+        site.descriptions[name] = description
+        return make(name, settings, site.buses[settings.bus], description)
+
+    return Builder(build)
+
+
+BUILDERS: Mapping[Kind, Builder] = {
+    Kind.JOINT: _on_can(JointDrive),
+    Kind.DEVICE: _on_can(CanDevice),
+    Kind.INSOLE: Builder(build_insole, join_insoles),
+    Kind.IMU: Builder(build_imu),
+}
+
+
+def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
+    """What `robot.describe` tells of a device: what its EDS says, and where it is."""
+    tables: dict[str, Any] = {name: one for kind in BUILDERS for name, one in getattr(config, kind).items()}
+    bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
+    found: dict[str, str | int] = {
+        "eds": description.path.name,
+        "vendor": description.vendor,
+        "product": description.product,
+        "bus": bus,
+        "node_id": tables[name].node_id,
+    }
+    if bitrate is not None:
+        found["bitrate"] = bitrate
+    warnings = [f"{one.where}: {one.text}" for one in description.findings if one.severity == "warning"]
+    if warnings:
+        found["warnings"] = "; ".join(warnings)
+    return found

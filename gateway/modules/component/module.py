@@ -1,0 +1,209 @@
+"""The component module: the robot's buses, drives, insoles and IMUs, from first use to last.
+
+A snapshot of components that have only just been started waits for their first values, at most `COLD_S`.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgspec import UNSET, UnsetType
+
+from drivers.component import Component
+from drivers.latest import Latest, Listener
+from drivers.samples import Channel, State
+from gateway.modules.component.assembly import Robot, assemble, facts
+from gateway.process.futures import done, then
+from gateway.streaming.sources import Selection, Source, channel_info, check_globs, narrow, whole
+from gateway.wire.messages import (
+    ChannelInfo,
+    ComponentInfo,
+    LayoutInfo,
+    QualityInfo,
+    Snapshot,
+    SnapshotParams,
+)
+
+if TYPE_CHECKING:
+    from gateway.connections.session import Answer, Session
+    from gateway.registry import Context
+
+COLD_S = 1.0
+LOOK_S = 0.02  # how often a cold start looks whether the first values are there
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentSource:
+    """A component as a source of samples."""
+
+    component: Component
+
+    @property
+    def name(self) -> str:
+        return self.component.name
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self.component.channels
+
+    @property
+    def latest(self) -> Latest:
+        return self.component.latest
+
+    def subscribe(self, listener: Listener) -> Callable[[], None]:
+        return self.component.latest.subscribe(listener)
+
+
+class ComponentModule:
+    """Everything that moves or measures on the robot."""
+
+    def __init__(self, context: "Context") -> None:
+        self.robot = Robot()
+        self.sources: list[Source] = []  # what is no component and has channels all the same
+        self._context = context
+        self._warm_ns = 0
+        self._waiting: list[tuple[Callable[[], bool], Future[None]]] = []
+        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {"component.snapshot": self._snapshot}
+
+    def start(self) -> None:
+        """Build and start everything; a component that cannot start is left out, and it is said why."""
+        self.robot = assemble(self._context.config)
+        for bus in self.robot.buses.values():
+            bus.start()
+        for name, component in tuple(self.robot.components.items()):
+            try:
+                component.start()
+            except Exception as error:  # noqa: BLE001 - one device's fault must not take the others with it
+                del self.robot.components[name]
+                self.robot.absent[name] = (component.kind, f"cannot start, {type(error).__name__}: {error}")
+        self._warm_ns = time.monotonic_ns() + round(COLD_S * 1e9)
+
+    def stop(self) -> None:
+        """Stop everything, the buses last; every device is tried, and what failed is raised together."""
+        failures: list[Exception] = []
+        components, buses = self.robot.components.values(), self.robot.buses.values()
+        for stop in [*(one.stop for one in components), *(bus.stop for bus in buses)]:
+            try:
+                stop()
+            except Exception as error:  # noqa: BLE001 - raised below, after every device had its turn
+                failures.append(error)
+        if failures:
+            raise ExceptionGroup("some devices did not stop", failures)
+
+    @property
+    def absent(self) -> Mapping[str, str]:
+        return {name: why for name, (_kind, why) in self.robot.absent.items()}
+
+    def selections(self) -> list[Selection]:
+        components = [ComponentSource(one) for one in self.robot.components.values() if one.channels]
+        return [whole(one) for one in (*components, *self.sources)]
+
+    def when_ready(self, names: Iterable[str]) -> "Future[None]":
+        """Done when these components are there, or the time for a cold start is over."""
+        wanted = tuple(names)
+        return self._when(lambda: all(self._is_there(name) for name in wanted))
+
+    def when_known(self, selections: Iterable[Selection]) -> "Future[None]":
+        """Done when these channels have had their first values, or the time for a cold start is over."""
+        wanted = tuple(selections)
+        return self._when(lambda: all(map(_has_values, wanted)))
+
+    def read(self, selections: Iterable[Selection]) -> Snapshot:
+        """The values now, and the quality of their components."""
+        now_ns = time.monotonic_ns()
+        values: dict[str, float | None] = {}
+        stamps_ns: dict[str, int | None] = {}
+        quality: dict[str, QualityInfo] = {}
+        for one in selections:
+            latest, channels = one.source.latest, one.source.channels
+            for index in one.indices:
+                name = channels[index].name
+                values[name], stamps_ns[name] = latest.read(index, now_ns)
+            if one.source.name in self.robot.components:
+                quality[one.source.name] = self.quality(one.source.name, now_ns)
+        return Snapshot(now_ns, values, stamps_ns, quality)
+
+    def quality(self, name: str, now_ns: int) -> QualityInfo:
+        """One component's state, age and counters, and in words what is wrong."""
+        if name in self.robot.absent:
+            return {"state": State.LOST.value, "age_ms": None, "problem": self.robot.absent[name][1]}
+        quality = self.robot.components[name].quality(now_ns)
+        return {
+            **quality.counters,
+            "state": quality.state.value,
+            "age_ms": quality.age_ms,
+            "problem": quality.problem,
+        }
+
+    def components(self) -> list[ComponentInfo]:
+        """Every component of the file, there or not."""
+        now_ns = time.monotonic_ns()
+        found = []
+        kinds = {name: one.kind for name, one in self.robot.components.items()}
+        kinds |= {name: kind for name, (kind, _why) in self.robot.absent.items()}
+        for name, kind in kinds.items():
+            quality = self.quality(name, now_ns)
+            description = self.robot.descriptions.get(name)
+            device = UNSET if description is None else dict(facts(self._context.config, name, description))
+            problem = None if quality["problem"] is None else str(quality["problem"])
+            layout = _layout(self.robot.components.get(name))
+            found.append(ComponentInfo(name, kind.value, str(quality["state"]), problem, device, layout))
+        return found
+
+    def channels(self) -> list[ChannelInfo]:
+        channels = [one.channels for one in self.robot.components.values()]
+        channels += [one.channels for one in self.sources]
+        return [channel_info(channel) for some in channels for channel in some]
+
+    def _snapshot(self, _session: "Session", params: SnapshotParams) -> "Answer":
+        selections = self.selections()
+        names = [name for one in selections for name in one.names]
+        check_globs("channel", names, params.channels, self.absent)
+        chosen = narrow(selections, params.channels)
+        ready = self.when_known(chosen)
+        return then(ready, lambda _none: self._answer(chosen, everything=params.channels is None))
+
+    def _answer(self, chosen: list[Selection], *, everything: bool) -> Snapshot:
+        snapshot = self.read(chosen)
+        if everything:  # also of those without channels, and those that are not there
+            now_ns = snapshot.stamp_ns
+            for name in (*self.robot.components, *self.robot.absent):
+                snapshot.quality.setdefault(name, self.quality(name, now_ns))
+        return snapshot
+
+    def _is_there(self, name: str) -> bool:
+        component = self.robot.components.get(name)
+        return component is None or component.quality(time.monotonic_ns()).state is not State.LOST
+
+    def _when(self, ready: Callable[[], bool]) -> "Future[None]":
+        if self._is_warm() or ready():
+            return done(None)
+        future: Future[None] = Future()
+        self._waiting.append((ready, future))
+        if len(self._waiting) == 1:
+            self._context.loop.call_later(LOOK_S, self._look)
+        return future
+
+    def _is_warm(self) -> bool:
+        return time.monotonic_ns() >= self._warm_ns
+
+    def _look(self) -> None:
+        over = [future for ready, future in self._waiting if self._is_warm() or ready()]
+        self._waiting = [(ready, future) for ready, future in self._waiting if future not in over]
+        if self._waiting:
+            self._context.loop.call_later(LOOK_S, self._look)
+        for future in over:  # last, because whoever waited may begin to wait for something else
+            future.set_result(None)
+
+
+def _has_values(selection: Selection) -> bool:
+    latest, now_ns = selection.source.latest, time.monotonic_ns()
+    return all(latest.read(index, now_ns)[1] is not None for index in selection.indices)
+
+
+def _layout(component: Component | None) -> LayoutInfo | UnsetType:
+    """Where the cells are, of a component that has some."""
+    layout = getattr(component, "layout", None)
+    return UNSET if layout is None else LayoutInfo(layout.name, list(layout.cells))

@@ -1,0 +1,1 @@
+"""The control module: leases, parameters, writes, trials, and what a device stores."""

@@ -1,0 +1,186 @@
+"""The control module: who may write, what is written, and the stop."""
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from gateway.modules.control.lease import RENEWED, TAKEN, Leases
+from gateway.modules.control.storage import RESTORING, STORING, Command
+from gateway.modules.control.tuning import Tuning
+from gateway.modules.stop.authority import Authority
+from gateway.modules.stop.drive import Drive
+from gateway.modules.stop.stop_control import StopControl
+from gateway.process.futures import then
+from gateway.records.journal import Journal, Share
+from gateway.records.records import Records
+from gateway.wire import messages
+
+if TYPE_CHECKING:
+    from gateway.connections.session import Answer, Session
+    from gateway.modules.component.module import ComponentModule
+    from gateway.registry import Context
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """The part of `robot.describe` that comes from the component and control modules."""
+
+    components: list[messages.ComponentInfo]
+    channels: list[messages.ChannelInfo]
+    parameters: list[messages.ParameterInfo]
+    stop: messages.StopInfo
+    trials: list[messages.TrialInfo]
+    records: messages.RecordsInfo
+
+
+class ControlModule:
+    """Everything that changes something on the robot."""
+
+    def __init__(self, context: "Context") -> None:
+        self._context = context
+        self._component = cast("ComponentModule", context.needs["component"])
+        self._leases = Leases(context.loop, self._lease_changed)
+        self._awake: set[str] = set()  # why the bus is kept, clients or not
+        self.armed: Callable[[str], bool] = lambda _name: False  # the guard's, where there is one
+        self.handlers: Mapping[str, Callable[[Session, Any], Answer]] = {
+            "control.acquire": lambda session, params: self._leases.acquire(session, params.ttl_s),
+            "control.release": self._release,
+            "parameter.list": lambda _session, params: self._tuning.listed(params.names),
+            "parameter.read": lambda session, params: self._tuning.read(params.names, session),
+            "parameter.write": self._write,
+            "parameter.confirm": self._confirm,
+            "parameter.revert": self._revert,
+            "parameter.store": lambda session, params: self._store(STORING, session, params.component),
+            "parameter.restore": lambda session, params: self._store(RESTORING, session, params.component),
+            "robot.stop": lambda session, params: self.stop_robot(session.who, str(params.reason)),
+            "robot.reset": lambda session, _params: self._reset(session),
+            "robot.enable": lambda session, params: self._enable(session, params.joints),
+            "journal.tail": lambda _session, params: self._tail(params.n),
+        }
+
+    def start(self) -> None:
+        config, loop = self._context.config, self._context.loop
+        with ExitStack() as opened:  # what was opened before something failed
+            self._records = Records(config.records)
+            opened.callback(self._records.close)
+            self._stop = StopControl(config, self._component, loop, self._records, self._hold_changed)
+            self._tuning = Tuning(
+                config, self._component, loop, self._records, self._stop.authority, self._trials_changed
+            )
+            opened.callback(self._tuning.close)
+            self._stop.claim = self._tuning.claim
+            left = self._tuning.load()
+            self._stop.start()
+            opened.pop_all()
+        loop.post(lambda: self._tuning.resume(left))
+        self._context.stops_by(self.stop_robot)
+        loop.post(self._hold_changed)  # a stop that is held keeps the module from its first moment on
+
+    def stop(self) -> None:
+        self._context.stops_by(None)
+        self._stop.close()
+        self._tuning.close()
+        self._records.close()
+
+    def describe(self) -> "Future[Described]":
+        """Waits for a cold start, so that it says what is there."""
+        ready = self._component.when_ready(self._component.robot.components)
+        return then(ready, lambda _none: self._described())
+
+    def _described(self) -> Described:
+        return Described(
+            components=self._component.components(),
+            channels=self._component.channels(),
+            parameters=self._tuning.infos(),
+            stop=self._stop.info(self.armed),
+            trials=self._tuning.trials.infos(),
+            records=self._records.info,
+        )
+
+    def keep_awake(self, why: str, on: bool) -> None:
+        """Keep the bus, clients or not, as long as there is a reason. In the loop's thread."""
+        (self._awake.add if on else self._awake.discard)(why)
+        self._context.keep(bool(self._awake))
+
+    def revert_trials(self, why: str) -> None:
+        """Take back everything that is on trial. In the loop's thread."""
+        self._tuning.trials.revert_all(why)
+
+    def _hold_changed(self) -> None:
+        self.keep_awake("stop", self._stop.held)
+
+    def _trials_changed(self) -> None:
+        self.keep_awake("trials", self._tuning.trials.pending)
+
+    def _lease_changed(self, session: "Session", what: str) -> None:
+        if what == RENEWED:
+            return
+        self._records.journal.append(session.who, what, Share.ASKED)
+        if what != TAKEN:
+            self._tuning.trials.revert_of(session, what)
+
+    def _tail(self, count: int) -> "Future[messages.JournalEntries]":
+        return then(self._records.journal.tail(count), lambda tail: messages.JournalEntries(*tail))
+
+    def _release(self, session: "Session", params: messages.ReleaseParams) -> messages.Done:
+        self._leases.release(session, params.lease)
+        return messages.Done()
+
+    def _write(self, session: "Session", params: messages.ParameterWriteParams) -> "Future[messages.Written]":
+        self._leases.require(session)
+        return self._tuning.write(params.changes, session, params.trial_s)
+
+    def _confirm(
+        self, session: "Session", params: messages.WriteNumberParams
+    ) -> "Future[messages.Confirmed]":
+        self._leases.require(session)
+        return self._tuning.trials.confirm(params.write)
+
+    def _revert(self, session: "Session", params: messages.WriteNumberParams) -> "Future[messages.Reverted]":
+        self._leases.require(session)
+        return self._tuning.trials.revert(params.write)
+
+    def _store(self, command: Command, session: "Session", component: str) -> "Future[messages.Stored]":
+        self._leases.require(session)
+        return self._tuning.store(command, session, component)
+
+    @property
+    def drives(self) -> Mapping[str, Drive]:
+        """Every joint that is there."""
+        return self._stop.drives
+
+    @property
+    def journal(self) -> Journal:
+        return self._records.journal
+
+    @property
+    def authority(self) -> Authority:
+        """Who knows whether anything may move."""
+        return self._stop.authority
+
+    def stop_robot(self, who: str, reason: str) -> "Future[messages.Stopped]":
+        """Quick stop on every drive, held until it is reset. From any thread."""
+        return self._stop.stop(who, reason)
+
+    def trip(self, who: str, reason: str) -> None:
+        """The same for the guard, whose stop leaves one that is held already as it is. From any thread."""
+        self._stop.trip(who, reason)
+
+    def _reset(self, session: "Session") -> "Future[messages.Reset]":
+        self._leases.require(session)
+        return self._stop.reset(session.who, session.asked_ns)
+
+    def _enable(self, session: "Session", joints: list[str] | None) -> "Future[messages.Enabled]":
+        self._leases.require(session)
+        return self._stop.enable(
+            session.who,
+            session.asked_ns,
+            joints,
+            lambda: self._lost_lease(session),
+            self._tuning.enabling_objection,
+        )
+
+    def _lost_lease(self, session: "Session") -> str | None:
+        return None if self._leases.held_by(session) else "the lease of who asked for it has ended"

@@ -1,0 +1,186 @@
+"""Parameters: which object of which device stands behind a name, its limits, and who may change it.
+
+The limits of the robot's file and of the EDS both count, the stricter wins. What the EDS alone offers is
+read-only until the robot's file releases it.
+"""
+
+import operator
+from dataclasses import dataclass
+from enum import Enum
+
+from drivers.bus.values import size_of
+from eds.datatypes import DATA_TYPES
+from gateway.coding import Coding, CodingError, Number, text
+from gateway.config import ParameterSettings
+from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.messages import ParameterInfo
+
+READABLE = ("rw", "rwr", "rww", "ro", "const")
+WRITABLE = ("rw", "rwr", "rww")
+
+
+class Lock(Enum):
+    """Why a parameter that an EDS offers is read-only: in a word, and what to do about it."""
+
+    UNRELEASED = "not released"
+    COMMANDED = "commanded"
+    STOPPING = "stopping"
+    COMMUNICATION = "communication"
+    STORAGE = "storage"
+    CONTROLWORD = "controlword"
+
+
+_REMEDIES = {
+    Lock.UNRELEASED: 'add "{name}" to release in {table} of the robot\'s file',
+    Lock.COMMANDED: "who leads the bus writes it; to change it all the same, add its whole name "
+    '"{name}" to release in {table} of the robot\'s file: a glob does not reach it',
+    Lock.STOPPING: "it decides how the drive stops; to change it all the same, add its whole name "
+    '"{name}" to release in {table} of the robot\'s file: a glob does not reach it',
+    Lock.COMMUNICATION: "from 1000h to 1FFFh is how the bus works, which belongs to who leads it; release "
+    "does not reach it, only a [parameter] table of its own",
+    Lock.STORAGE: "storing and restoring are commands of their own: gwrms store, gwrms restore",
+    Lock.CONTROLWORD: "it enables drives, and is never written as a parameter",
+}
+_LIMITS = (("min", operator.lt, "below the minimum"), ("max", operator.gt, "above the maximum"))
+
+
+def contradiction(least: Number | None, most: Number | None, where: str) -> str | None:
+    """Why no value can be within limits that contradict each other; `None` where they do not."""
+    if least is None or most is None or least <= most:
+        return None
+    return f"its limits allow nothing: minimum {text(least)} is above maximum {text(most)}; correct {where}"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter, resolved against its device's EDS. `problem` says why it cannot be used.
+
+    `table` is where the robot's file describes its device.
+    """
+
+    name: str
+    component: str
+    settings: ParameterSettings
+    index: int
+    subindex: int
+    data_type: int = 0
+    access: str = ""
+    min: Number | None = None
+    max: Number | None = None
+    store: bool = False
+    problem: str | None = None
+    lock: Lock | None = None
+    table: str = ""
+    default: Number | None = None  # that the EDS gives
+
+    @property
+    def object(self) -> str:
+        return f"0x{self.index:04X}:{self.subindex}"
+
+    @property
+    def coding(self) -> Coding:
+        return Coding(self.data_type, self.settings.scale)
+
+    @property
+    def read_only(self) -> str | None:
+        """In a word, why it cannot be written; `None` where it can, or cannot be used at all."""
+        if self.problem is not None:
+            return None
+        if self.access not in WRITABLE:
+            return f"{self.access} in the EDS"
+        return None if self.lock is None else self.lock.value
+
+    @property
+    def info(self) -> ParameterInfo:
+        """As `robot.describe` shows it."""
+        settings = self.settings
+        known = DATA_TYPES.get(self.data_type)
+        return ParameterInfo(
+            name=self.name,
+            unit=settings.unit,
+            min=self.min,
+            max=self.max,
+            max_step=settings.max_step,
+            live=settings.live,
+            states=None if settings.states is None else list(settings.states),
+            component=self.component,
+            object=self.object,
+            access=self.access,
+            store=self.store,
+            problem=self.problem,
+            read_only=self.read_only,
+            type="" if known is None else known.name,
+            scale=settings.scale,
+            default=self.default,
+        )
+
+    def refusal(self, kind: Kind, text: str, limit: float | None = None) -> RpcError:
+        """An error about this parameter."""
+        return refuse(kind, f"{self.name}: {text}", component=self.component, object=self.object, limit=limit)
+
+    def check_readable(self) -> None:
+        """Raise `RpcError` where it cannot be read."""
+        if self.problem is not None:
+            raise self.refusal(Kind.UNAVAILABLE, self.problem)
+        if self.access not in READABLE:
+            raise self.refusal(
+                Kind.NOT_ALLOWED, f"{self.object} cannot be read, the EDS says {self.access!r}"
+            )
+
+    def check_writable(self) -> None:
+        """Raise `RpcError` where it cannot be written, or not be read back."""
+        self.check_readable()
+        if self.access not in WRITABLE:
+            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only, the EDS says {self.access!r}")
+        if self.lock is not None:
+            remedy = _REMEDIES[self.lock].format(name=self.name.partition(".")[2], table=self.table)
+            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only: {remedy}")
+
+    def encode(self, value: Number) -> bytes:
+        """The bytes to write, checked against access, type and limits.
+
+        Raises:
+            RpcError: read_only, not_allowed or out_of_limit.
+
+        """
+        self.check_writable()
+        unit, is_real = self.settings.unit, self.coding.type.kind == "real"
+        said = f"{text(value)} {unit}"
+        if not is_real:  # of which only what the device makes of it can be compared
+            self._check_limits(value, said)
+        try:
+            data = self.coding.encode(value)
+        except CodingError as error:
+            raise self.refusal(Kind.OUT_OF_LIMIT, str(error)) from error
+        held = self.decode(data)
+        would_hold = f"{text(held)} {unit}, which is what the device would hold of {text(value)},"
+        self._check_limits(held, said if is_real else would_hold)
+        return data
+
+    def accepts(self, data: bytes) -> Number:
+        """The value of bytes that may be written as they are: what a device held before.
+
+        Raises:
+            RpcError: read_only, not_allowed, mismatch or out_of_limit.
+
+        """
+        self.check_writable()
+        if len(data) != size_of(self.data_type):
+            raise self.refusal(Kind.MISMATCH, f"{data.hex(' ')} is no {self.coding.type.name}")
+        value = self.decode(data)
+        self._check_limits(value, f"{text(value)} {self.settings.unit}")
+        return value
+
+    def decode(self, data: bytes) -> Number:
+        """The value that the device's bytes mean; raises `RpcError` (mismatch) where they mean none."""
+        try:
+            return self.coding.decode(data)
+        except CodingError as error:
+            raise self.refusal(Kind.MISMATCH, f"the device holds what is no value: {error}") from error
+
+    def _check_limits(self, value: Number, said: str) -> None:
+        for which, is_beyond, word in _LIMITS:
+            limit: Number | None = getattr(self, which)
+            if limit is not None and is_beyond(value, self.coding.nearest(limit)):
+                text_ = f"{said} is {word} {text(limit)} {self.settings.unit}"
+                raise self.refusal(Kind.OUT_OF_LIMIT, text_, limit)

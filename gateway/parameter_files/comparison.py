@@ -1,0 +1,97 @@
+"""What a file says of parameters beside what a robot holds, one verdict each."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from enum import StrEnum
+
+from msgspec import Struct
+
+from eds.datatypes import DATA_TYPE_BY_NAME
+from gateway.coding import Coding, CodingError, Number, text, too_far
+from gateway.wire.messages import ParameterInfo, ParameterValue
+
+
+class Verdict(StrEnum):
+    """What becomes of one parameter when the file is applied."""
+
+    SAME = "same"
+    DIFFERENT = "different"  # and may be written
+    READ_ONLY = "read-only"  # different, and may not
+    OUT_OF_LIMITS = "out of limits"
+    TOO_FAR = "too far at once"
+    UNREADABLE = "unreadable"
+    NOT_ON_ROBOT = "not on the robot"
+    NOT_IN_FILE = "not in the file"
+
+
+# What a file is no longer the same for, what cannot be brought about, and what no leaving out can help.
+UNLIKE = frozenset(Verdict) - {Verdict.SAME, Verdict.NOT_IN_FILE}
+CANNOT_CHANGE = frozenset({Verdict.READ_ONLY, Verdict.NOT_ON_ROBOT})
+REFUSED = frozenset({Verdict.OUT_OF_LIMITS, Verdict.TOO_FAR, Verdict.UNREADABLE})
+
+
+class Row(Struct, frozen=True):
+    """One parameter: the file's value and the robot's, each as the device would hold it."""
+
+    name: str
+    unit: str
+    file: Number | None
+    robot: Number | None
+    verdict: Verdict
+    why: str = ""
+
+
+def compare(
+    wanted: Mapping[str, Number],
+    infos: Mapping[str, ParameterInfo],
+    held: Mapping[str, ParameterValue],
+) -> list[Row]:
+    """Every parameter of the file in its order, then those of the same components that it does not name."""
+    rows = [_row(name, value, infos.get(name), held.get(name)) for name, value in wanted.items()]
+    return [*rows, *(_not_in_file(info, held.get(info.name)) for info in left_out(wanted, infos.values()))]
+
+
+def _row(name: str, value: Number, info: ParameterInfo | None, held: ParameterValue | None) -> Row:
+    if info is None:
+        return Row(name, "", value, None, Verdict.NOT_ON_ROBOT)
+    if held is None or held.value is None:
+        why = info.problem or (held.problem if held is not None else None) or "it was not read"
+        return Row(name, info.unit, value, None, Verdict.UNREADABLE, why)
+    coding = Coding(DATA_TYPE_BY_NAME[info.type], info.scale)
+    try:
+        data = coding.encode(value)
+    except CodingError as error:
+        return Row(name, info.unit, value, held.value, Verdict.OUT_OF_LIMITS, str(error))
+    stored = coding.decode(data)
+    if data == coding.encode(held.value):
+        return Row(name, info.unit, stored, held.value, Verdict.SAME)
+    verdict, why = next(_objections(info, coding, stored, held.value), (Verdict.DIFFERENT, ""))
+    return Row(name, info.unit, stored, held.value, verdict, why)
+
+
+def _objections(
+    info: ParameterInfo, coding: Coding, stored: Number, held: Number
+) -> Iterator[tuple[Verdict, str]]:
+    """Why the robot would refuse to change it, the most lasting reason first."""
+    if info.read_only is not None:
+        yield Verdict.READ_ONLY, info.read_only
+    if info.min is not None and stored < coding.nearest(info.min):
+        yield Verdict.OUT_OF_LIMITS, f"below {text(info.min)}"
+    if info.max is not None and stored > coding.nearest(info.max):
+        yield Verdict.OUT_OF_LIMITS, f"above {text(info.max)}"
+    if info.max_step is not None and too_far(held, stored, info.max_step):
+        yield Verdict.TOO_FAR, f"at most {text(info.max_step)}"
+
+
+def _not_in_file(info: ParameterInfo, held: ParameterValue | None) -> Row:
+    return Row(info.name, info.unit, None, None if held is None else held.value, Verdict.NOT_IN_FILE)
+
+
+def left_out(wanted: Mapping[str, Number], infos: Iterable[ParameterInfo]) -> list[ParameterInfo]:
+    """What could be changed in the same components, and the file does not name."""
+    infos = tuple(infos)
+    components = {info.component for info in infos if info.name in wanted}
+    return [
+        info
+        for info in infos
+        if info.component in components and info.name not in wanted and info.read_only is None
+    ]

@@ -1,0 +1,64 @@
+"""What all files of parameters have in common: of which robot and device they are, and what they say."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgspec import UNSET
+
+from gateway.coding import Number
+from gateway.streaming.sources import matches
+from gateway.wire.messages import ComponentInfo, Description, ParameterInfo
+
+COMMANDS = ("commanded", "controlword", "storage")  # as `ParameterInfo.read_only` calls them
+
+
+class FileProblem(ValueError):
+    """A file of parameters that cannot be used; the message names file, place and remedy."""
+
+
+class WhichDevice(FileProblem):
+    """A file is for one device, and nothing says for which."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """The robot that a file is made of or compared with; one device of it, where `--component` says so."""
+
+    robot: Description
+    component: str | None = None
+    eds: Path | None = None  # what `--eds` names
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """What a file says: values by the robot's names, and what a person should know before using it."""
+
+    values: Mapping[str, Number]
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """One kind of file."""
+
+    chosen: Callable[
+        [Scope, Sequence[str]], list[ParameterInfo]
+    ]  # what globs mean; without any, what it is for
+    write: Callable[[Path, Scope, Mapping[str, Number]], bytes]
+    read: Callable[[Path, Scope], Saved]
+
+
+def is_configuration(info: ParameterInfo) -> bool:
+    """Whether it can be read and is no command, which the master writes while the robot moves."""
+    return info.problem is None and info.read_only not in COMMANDS
+
+
+def is_meant(info: ParameterInfo, globs: Sequence[str]) -> bool:
+    """Whether one of the names, addresses or globs means the parameter."""
+    return matches(info.name, globs) or f"{info.component}.{info.object}" in globs
+
+
+def device(component: ComponentInfo) -> Mapping[str, str | int]:
+    """What its EDS says and where it is; empty for what is no CANopen device."""
+    return {} if component.device is UNSET else component.device

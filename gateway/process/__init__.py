@@ -1,0 +1,1 @@
+"""The gateway as a process: its loop, memory, rest, start and service manager."""

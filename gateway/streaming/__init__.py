@@ -1,0 +1,1 @@
+"""Streams: sources of samples, batches of rows, and each subscriber's end."""

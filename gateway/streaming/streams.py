@@ -1,0 +1,360 @@
+"""Streams: samples become rows, rows become batches, a batch is encoded once for all who asked for the same.
+
+A feed belongs to everybody with the same channels and rate. Where the gateway has a budget, it is the rate of
+all feeds that gives way.
+"""
+
+import itertools
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+from drivers.samples import Sample
+from gateway.connections.limits import (
+    ALL_VALUES_A_SECOND,
+    OWN_RATE_HZ,
+    ROW_VALUES,
+    SMALL_VALUES_A_SECOND,
+    STREAMS,
+    VALUES_A_SECOND,
+)
+from gateway.connections.session import Session
+from gateway.process.loop import Loop, Timer
+from gateway.streaming.budget import Budget
+from gateway.streaming.outlets import Batch, Outlet, encode_batch
+from gateway.streaming.sources import Selection
+from gateway.wire import framing
+
+BATCH_S = 0.010  # ticks faster than this travel together
+GATHER_S = 0.002  # how long a source's own samples wait for company
+CATCH_UP_S = 1.0  # ticks missed for longer than this are lost, not made up
+TURN_VALUES = 20_000  # of one feed in one turn of the loop: who is late catches up in several
+TAP_SAMPLES = 10_000  # what one source may have waiting; the loop empties it every few milliseconds
+
+
+class Tap:
+    """The samples of one source on their way from its thread to the loop."""
+
+    def __init__(self, selection: Selection, filled: Callable[[], None]) -> None:
+        self.selection = selection
+        self._filled = filled
+        self._samples: list[Sample] = []
+        self._lost = 0
+        self._lock = threading.Lock()
+        self._end = selection.source.subscribe(self._receive)
+
+    def close(self) -> None:
+        self._end()
+
+    def drain(self) -> tuple[list[Sample], int]:
+        """The samples since the last call, oldest first, and how many more were lost."""
+        with self._lock:
+            samples, self._samples = self._samples, []
+            lost, self._lost = self._lost, 0
+        return samples, lost
+
+    def _receive(self, sample: Sample) -> None:
+        with self._lock:
+            first = not self._samples
+            if len(self._samples) < TAP_SAMPLES:
+                self._samples.append(sample)
+            else:
+                self._lost += 1
+        if first:
+            self._filled()
+
+
+class Feed:
+    """What every feed does: taps in, batches out, closed with its last subscriber.
+
+    Of what it is asked for, it gives one row of `shed`, as the gateway's budget allows.
+    """
+
+    def __init__(
+        self, loop: Loop, selections: Sequence[Selection], rate_hz: float, filled: Callable[[], None]
+    ) -> None:
+        self.outlets: list[Outlet] = []
+        self.rate_hz = rate_hz
+        self.channels = sum(len(selection.indices) for selection in selections)
+        self.values_a_second = values_a_second(rate_hz, self.channels)
+        self.shed = 1
+        self._late_ns = 0
+        self._loop = loop
+        self._closed = False
+        self._timer: Timer | None = None
+        self._taps = [Tap(selection, filled) for selection in selections]
+
+    def close(self) -> None:
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+        for tap in self._taps:
+            tap.close()
+
+    def shed_to(self, shed: int) -> None:
+        """Give one row of so many from now on."""
+        self.shed = shed
+
+    def was_late_s(self) -> float:
+        """How late its rows were at most since this was asked last; forgotten by that."""
+        late_ns, self._late_ns = self._late_ns, 0
+        return late_ns / 1e9
+
+    def _spent(self, began_ns: int) -> None:
+        """Put down what the thread has worked since then for all of them together."""
+        share_ns = (time.thread_time_ns() - began_ns) // max(1, len(self.outlets))
+        for outlet in self.outlets:
+            outlet.session.cpu_ns += share_ns
+
+    def _give(self, batch: Batch) -> None:
+        for outlet in tuple(self.outlets):
+            outlet.offer(batch)
+            outlet.session.pump()
+
+    def _lose(self, rows: int) -> None:
+        for outlet in self.outlets:
+            outlet.lose(rows)
+
+
+def values_a_second(rate_hz: float, channels: int) -> float:
+    """What such a stream costs: its values, and what its rows cost beside them."""
+    return (rate_hz or OWN_RATE_HZ) * (ROW_VALUES + channels)
+
+
+class TickFeed(Feed):
+    """Rows at a steady rate. Each cell is the newest sample at its tick, null once stale.
+
+    Samples carry their stamps, so a row is right also when the loop comes to it late.
+    """
+
+    def __init__(self, loop: Loop, selections: Sequence[Selection], rate_hz: float) -> None:
+        super().__init__(loop, selections, rate_hz, filled=lambda: None)
+        self.shed_to(1)
+        self._next_ns = time.monotonic_ns()
+        self._early: list[tuple[int, Sample, dict[int, int]]] = []
+        self._cells: list[tuple[int, float | None] | None] = []
+        self._stale_after_ns: list[int] = []
+        self._names: list[str] = []
+        self._places: list[dict[int, int]] = []  # for each tap: index in its source → cell
+        for selection in selections:
+            self._add(selection)
+        self._timer = loop.call_later(0.0, self._tick)
+
+    def shed_to(self, shed: int) -> None:
+        """Never below a row a second, where more were asked for."""
+        super().shed_to(min(shed, max(1, int(self.rate_hz))))
+        self._period_ns = round(1e9 * self.shed / self.rate_hz)
+        self._ticks_per_batch = max(1, round(BATCH_S * self.rate_hz / self.shed))
+
+    def _add(self, selection: Selection) -> None:
+        latest = selection.source.latest
+        self._places.append({index: len(self._cells) + i for i, index in enumerate(selection.indices)})
+        for index in selection.indices:
+            value, stamp_ns = latest.read(index, self._next_ns)
+            self._cells.append(None if stamp_ns is None else (stamp_ns, value))
+            self._stale_after_ns.append(latest.stale_after_ns)
+        self._names += selection.names
+
+    def _tick(self) -> None:
+        if self._closed:
+            return
+        began_ns, now_ns = time.thread_time_ns(), time.monotonic_ns()
+        self._late_ns = max(self._late_ns, now_ns - self._next_ns)
+        self._skip_what_is_too_old(now_ns)
+        self._early = self._drained()
+        self._forget_what_is_gone()
+        rows: list[list[float | None]] = []
+        stamps: list[int] = []
+        updates = iter(self._early)
+        update = next(updates, None)
+        most_rows = 1 + TURN_VALUES // (1 + len(self._cells))
+        until_ns = min(now_ns, self._next_ns + most_rows * self._period_ns)
+        while self._next_ns <= until_ns:
+            while update is not None and update[0] <= self._next_ns:
+                self._apply(*update)
+                update = next(updates, None)
+            stamps.append(self._next_ns)
+            rows.append(self._row(self._next_ns))
+            self._next_ns += self._period_ns
+        self._early = [] if update is None else [update, *updates]  # newer than the last tick: for the next
+        if rows:
+            columns = dict(zip(self._names, zip(*rows, strict=True), strict=True))
+            batch = encode_batch(stamps, columns, self.shed)
+            self._spent(began_ns)
+            self._give(batch)
+        last_of_batch_ns = self._next_ns + (self._ticks_per_batch - 1) * self._period_ns
+        self._timer = self._loop.call_later((last_of_batch_ns - time.monotonic_ns()) / 1e9, self._tick)
+
+    def _skip_what_is_too_old(self, now_ns: int) -> None:
+        late = (now_ns - self._next_ns - round(CATCH_UP_S * 1e9)) // self._period_ns
+        if late > 0:
+            self._next_ns += late * self._period_ns
+            self._lose(late)
+
+    def _forget_what_is_gone(self) -> None:
+        """What a source has cleared, as after a lost port, is not shown until it is stale."""
+        for tap, places in zip(self._taps, self._places, strict=True):
+            if tap.selection.source.latest.updated_ns is None:
+                self._early = [update for update in self._early if update[2] is not places]
+                for cell in places.values():
+                    self._cells[cell] = None
+
+    def _drained(self) -> list[tuple[int, Sample, dict[int, int]]]:
+        updates = self._early + [
+            (sample.stamp_ns, sample, places)
+            for tap, places in zip(self._taps, self._places, strict=True)
+            for sample in tap.drain()[0]
+        ]
+        updates.sort(key=lambda update: update[0])
+        return updates
+
+    def _apply(self, stamp_ns: int, sample: Sample, places: dict[int, int]) -> None:
+        for index, value in zip(sample.indices, sample.values, strict=True):
+            cell = places.get(index)
+            if cell is not None:
+                self._cells[cell] = (stamp_ns, value)
+
+    def _row(self, tick_ns: int) -> list[float | None]:
+        return [
+            None if cell is None or tick_ns - cell[0] > stale_after_ns else cell[1]
+            for cell, stale_after_ns in zip(self._cells, self._stale_after_ns, strict=True)
+        ]
+
+
+class SampleFeed(Feed):
+    """Every source's own samples, one source a notification, as they come.
+
+    Samples with different channels travel apart, so that no null means "not in this sample".
+    """
+
+    def __init__(self, loop: Loop, selections: Sequence[Selection]) -> None:
+        super().__init__(loop, selections, 0.0, filled=lambda: loop.post(self._filled))
+        self._came: Counter[tuple[int, ...]] = Counter()  # samples of each kind
+
+    def _filled(self) -> None:
+        if self._timer is None and not self._closed:
+            self._timer = self._loop.call_later(GATHER_S, self._flush)
+
+    def _flush(self) -> None:
+        self._timer = None
+        for number, tap in enumerate(self._taps):
+            samples, lost = tap.drain()
+            if lost:
+                self._lose(lost)
+            if self.shed > 1:
+                samples = [sample for sample in samples if self._is_kept((number, *sample.indices))]
+            for indices, group in itertools.groupby(samples, key=lambda sample: sample.indices):
+                self._send(tap.selection, indices, list(group))
+
+    def _is_kept(self, kind: tuple[int, ...]) -> bool:
+        self._came[kind] += 1
+        return self._came[kind] % self.shed == 0
+
+    def _send(self, selection: Selection, indices: tuple[int, ...], samples: list[Sample]) -> None:
+        began_ns, channels = time.thread_time_ns(), selection.source.channels
+        columns: dict[str, Sequence[float | None]] = {
+            channels[index].name: [sample.values[place] for sample in samples]
+            for place, index in enumerate(indices)
+            if index in selection.indices
+        }
+        if columns:
+            batch = encode_batch([sample.stamp_ns for sample in samples], columns, self.shed)
+            self._spent(began_ns)
+            self._give(batch)
+
+
+class Streams:
+    """All streams of the gateway; `buffer_bytes` is what may wait for one client's."""
+
+    def __init__(self, loop: Loop, buffer_bytes: int, budget: Budget) -> None:
+        self._loop = loop
+        self._buffer_bytes = buffer_bytes
+        self._budget = budget
+        budget.shed, budget.late_s = self._shed, self._late_s
+        self._numbers = itertools.count(1)
+        self._feeds: dict[tuple[float, tuple[str, ...]], Feed] = {}
+
+    def start(self, session: Session, selections: Iterable[Selection], rate_hz: float) -> int:
+        """Subscribe a session; its connection's end ends the stream. Returns the stream's number.
+
+        Raises:
+            RpcError: unavailable: it has as many streams as it may, or they cost too much.
+
+        """
+        if len(session.outlets) >= STREAMS:
+            most = f"a client may have {STREAMS} streams; end one, or ask for more channels in one"
+            raise framing.refuse(framing.Kind.UNAVAILABLE, most)
+        chosen = list(selections)
+        key = (rate_hz, tuple(name for selection in chosen for name in selection.names))
+        feed = self._feeds.get(key)
+        self._check_cost(session, values_a_second(rate_hz, len(key[1])), is_new=feed is None)
+        if feed is None:
+            feed = TickFeed(self._loop, chosen, rate_hz) if rate_hz else SampleFeed(self._loop, chosen)
+            self._feeds[key] = feed
+            feed.shed_to(self._budget.factor)
+            self._budget.watch(on=True)
+        outlet = Outlet(next(self._numbers), session, feed, self._buffer_bytes)
+        feed.outlets.append(outlet)
+        if not session.outlets:
+            session.on_close(lambda: self._forget(session), self)
+        session.outlets[outlet.number] = outlet
+        self._share(session)
+        return outlet.number
+
+    def _check_cost(self, session: Session, wanted: float, *, is_new: bool) -> None:
+        """Refuse what one client, or all together, would make the robot work too much for."""
+        own = wanted + sum(outlet.feed.values_a_second for outlet in self.of(session))
+        together = wanted * is_new + sum(feed.values_a_second for feed in self._feeds.values())
+        if own <= SMALL_VALUES_A_SECOND or (own <= VALUES_A_SECOND and together <= ALL_VALUES_A_SECOND):
+            return
+        whose, cost, most = (
+            ("your streams", own, VALUES_A_SECOND)
+            if own > VALUES_A_SECOND
+            else ("the streams of all clients", together, ALL_VALUES_A_SECOND)
+        )
+        raise framing.refuse(
+            framing.Kind.UNAVAILABLE,
+            f"{whose} would cost {cost:,.0f} values a second, and {most:,} is the most (a row counts as its "
+            f"channels and {ROW_VALUES} more): ask for a lower rate, or fewer channels",
+            limit=float(most),
+        )
+
+    def stop(self, session: Session, number: int) -> bool:
+        """End one stream of a session; false where it has no such stream."""
+        if number not in session.outlets:
+            return False
+        del session.outlets[number]
+        self._remove(lambda outlet: outlet.number == number)
+        self._share(session)
+        return True
+
+    def of(self, session: Session) -> list[Outlet]:
+        """A client's streams."""
+        return [one for feed in self._feeds.values() for one in feed.outlets if one.session is session]
+
+    def _share(self, session: Session) -> None:
+        """All streams of a client have its buffer together."""
+        outlets = self.of(session)
+        for outlet in outlets:
+            outlet.most_bytes = self._buffer_bytes // len(outlets)
+
+    def _late_s(self) -> float:
+        """How late the latest feed was since this was asked last."""
+        return max((feed.was_late_s() for feed in self._feeds.values()), default=0.0)
+
+    def _shed(self, factor: int) -> None:
+        for feed in self._feeds.values():
+            feed.shed_to(factor)
+
+    def _forget(self, session: Session) -> None:
+        self._remove(lambda outlet: outlet.session is session)
+
+    def _remove(self, leaving: Callable[[Outlet], bool]) -> None:
+        for key, feed in tuple(self._feeds.items()):
+            feed.outlets = [outlet for outlet in feed.outlets if not leaving(outlet)]
+            if not feed.outlets:
+                del self._feeds[key]
+                feed.close()
+        if not self._feeds:
+            self._budget.watch(on=False)

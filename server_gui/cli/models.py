@@ -1,0 +1,257 @@
+"""`gwrms models`: which models there are, which one serves, and what served before."""
+
+import argparse
+import getpass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Self
+from urllib.parse import urlsplit
+
+import msgspec
+
+from gateway.cli.reach import choose
+from gateway.cli.text import NONE, did_you_mean, say, say_json, table, warn
+from ml.errors import UnusableModel
+from ml.registry.card import Card, age_days
+from ml.registry.pointers import Pointer
+from ml.registry.registry import Registry
+from ml.robot.learned import Learned
+from ml.robot.task import TASKS
+from ml.store import StoreError
+from ml.store.private import private_files
+from ml.store.store import checked_url
+from server_gui.cli.cloud_reach import add_url, parser, url, when
+from server_gui.cli.models_show import told
+from server_gui.core.settings.server_file import load
+
+USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL] [--json]
+
+  ls             every model of the store, and those that come with GWRMS; which one serves
+  show MODEL     from what it was learned, how well it was judged, on whom, and whether it can serve here
+  promote MODEL  let it serve every robot, or with --robot one
+  rollback TASK  let that serve again which did before
+  history TASK   what has served, who said so, and why
+  export MODEL   a model as ONNX, for other programs
+
+A model's name may be cut off where it is unique. gwrms models COMMAND --help says more.
+"""
+PROMOTE_EPILOG: Final = """Servers that run take it within seconds, without a restart. A model that cannot be
+verified is refused, and what serves goes on. `gwrms train --promote` does this where a model is judged
+better. With --instead-of it is refused where meanwhile another one serves than the one that you know of.
+
+examples
+  gwrms models promote activity-5f0c
+  gwrms models promote gait_phase-77aa --robot exo-01 --why "adapted to Ada's walk\""""
+ROLLBACK_EPILOG: Final = """Said again, it goes back further. Before the first model of a robot's own serves
+that for all robots, and before the first of these what comes with GWRMS."""
+EVERY: Final = "every robot"
+NOTHING: Final = "nothing"  # that serves
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms models`."""
+    private_files()
+    return choose(argv, COMMANDS, USAGE)
+
+
+def ls(argv: list[str]) -> int:
+    """Run `gwrms models ls`."""
+    made = _parser("ls", "Every model, oldest first, and which robots it serves.")
+    made.add_argument("--task", choices=TASKS, help="these alone")
+    arguments = made.parse_args(argv)
+    registry = _registry(arguments)
+    cards, damaged = registry.entries(arguments.task), registry.damaged()
+    serving = Serving.of(registry)
+    if arguments.json:
+        say_json({"models": [_fields(card, serving) for card in cards], "damaged": damaged})
+    else:
+        header = ("MODEL", "RECIPE", "FROM", "MADE (UTC)", "DAYS AGO", "JUDGED", "SERVES")
+        say(table(header, [_row(card, serving) for card in cards], right=(4,)))
+    for problem in damaged.values():
+        warn("models", problem)
+    return 1 if damaged else 0
+
+
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """Whom each model serves that was promoted, and which came with GWRMS."""
+
+    whom: Mapping[str, list[str]]
+    shipped: frozenset[str]
+
+    @classmethod
+    def of(cls, registry: Registry) -> Self:
+        whom: dict[str, list[str]] = {}
+        for _, robot, now in registry.served():
+            whom.setdefault(now.model, []).append(robot or EVERY)
+        return cls(whom, registry.shipped())
+
+
+def _row(card: Card, serving: Serving) -> tuple[str, ...]:
+    shipped = card.id in serving.shipped
+    judged = next((f"{name} {value:.3g}" for name, value in card.metrics.figures.items()), NONE)
+    return (
+        card.id,
+        card.recipe,
+        f"shipped, {card.source.value}" if shipped else card.source.value,
+        when(card.made),
+        f"{age_days(card):.0f}",
+        judged,
+        "where no other does" if shipped else ", ".join(serving.whom.get(card.id, ())) or NONE,
+    )
+
+
+def _fields(card: Card, serving: Serving) -> dict[str, Any]:
+    fields: dict[str, Any] = msgspec.to_builtins(card)
+    more = {"shipped": card.id in serving.shipped, "serves": serving.whom.get(card.id, [])}
+    return fields | more | {"age_days": round(age_days(card), 2)}
+
+
+def show(argv: list[str]) -> int:
+    """Run `gwrms models show`."""
+    made = _parser("show", "What is known of a model. Exit status 1: it cannot serve here.")
+    made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
+    arguments = made.parse_args(argv)
+    registry = _registry(arguments)
+    card = registry.card(_named(registry, arguments.model))
+    problem = _problem(registry, card.id)
+    serving = Serving.of(registry)
+    if arguments.json:
+        say_json(_fields(card, serving) | {"problem": problem})
+    else:
+        whom, shipped = serving.whom.get(card.id, []), card.id in serving.shipped
+        say("\n".join(told(card, whom, problem, shipped=shipped)))
+    return 1 if problem else 0
+
+
+def _problem(registry: Registry, model: str) -> str:
+    """Why it cannot serve here; nothing where it can."""
+    try:
+        registry.load(model)
+    except UnusableModel as error:
+        return str(error)
+    return ""
+
+
+def promote(argv: list[str]) -> int:
+    """Run `gwrms models promote`."""
+    made = _parser("promote", "Let a model serve.", PROMOTE_EPILOG)
+    made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
+    made.add_argument(
+        "--instead-of", metavar="MODEL", help=f"only while this one serves; {NOTHING}: only while none does"
+    )
+    _add_who(made, "this robot alone")
+    arguments = made.parse_args(argv)
+    registry = _registry(arguments)
+    model = _named(registry, arguments.model)
+    known = load(arguments.config).robots
+    if arguments.robot and arguments.robot not in known:
+        close = did_you_mean(arguments.robot, known)
+        warn("models", f"the server's file has no robot {arguments.robot!r}{close}")
+    old = arguments.instead_of
+    over = "" if old == NOTHING else old and _named(registry, old)
+    done = registry.promote(model, arguments.robot, who=arguments.who, why=arguments.why, over=over)
+    return _tell(arguments, registry.card(model).task, done)
+
+
+def rollback(argv: list[str]) -> int:
+    """Run `gwrms models rollback`."""
+    made = _parser("rollback", "Let that serve which did before.", ROLLBACK_EPILOG)
+    made.add_argument("task", choices=TASKS)
+    _add_who(made, "this robot's own model")
+    arguments = made.parse_args(argv)
+    done = _registry(arguments).rollback(
+        arguments.task, arguments.robot, who=arguments.who, why=arguments.why
+    )
+    return _tell(arguments, arguments.task, done)
+
+
+def _tell(arguments: argparse.Namespace, task: str, now: Pointer) -> int:
+    if arguments.json:
+        say_json({"task": task, "robot": arguments.robot, "now": now})
+    else:
+        whom = arguments.robot or EVERY
+        gone = f"no {'own ' if arguments.robot else ''}model serves {whom} any more"
+        say(f"{task}: {now.model} serves {whom}\n" if now.model else f"{task}: {gone}\n")
+    return 0
+
+
+def history(argv: list[str]) -> int:
+    """Run `gwrms models history`."""
+    made = _parser("history", "What has served, newest last.")
+    made.add_argument("task", choices=TASKS)
+    made.add_argument("--robot", default="", metavar="NAME", help="its own models (default: those for all)")
+    arguments = made.parse_args(argv)
+    found = _registry(arguments).history(arguments.task, arguments.robot)
+    if arguments.json:
+        say_json(found)
+    else:
+        rows = [(when(now.utc), now.model or NONE, now.who, now.why) for now in found]
+        say(table(("SINCE (UTC)", "MODEL", "BY", "WHY"), rows))
+    return 0
+
+
+def export(argv: list[str]) -> int:
+    """Run `gwrms models export`."""
+    made = _parser("export", "A model as ONNX; both judge the same rows before the file is written.")
+    made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
+    made.add_argument("--onnx", type=Path, required=True, metavar="FILE", help="where to; replaced if there")
+    arguments = made.parse_args(argv)
+    registry = _registry(arguments)
+    card, state = registry.load(_named(registry, arguments.model))
+    from ml.registry.onnx import exported
+
+    data = exported(Learned.restored(state))
+    arguments.onnx.write_bytes(data)
+    if arguments.json:
+        say_json({"model": card.id, "file": str(arguments.onnx), "size_bytes": len(data)})
+    else:
+        say(f"{arguments.onnx}: {card.id}, {', '.join(card.classes)}\n")
+    return 0
+
+
+COMMANDS: Final[dict[str, Callable[[list[str]], int]]] = {
+    "ls": ls,
+    "show": show,
+    "promote": promote,
+    "rollback": rollback,
+    "history": history,
+    "export": export,
+}
+
+
+def _parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser:
+    made = parser(f"models {command}", what, epilog)
+    add_url(made)
+    return made
+
+
+def _add_who(made: argparse.ArgumentParser, whose: str) -> None:
+    made.add_argument("--robot", default="", metavar="NAME", help=f"{whose} (default: that for every robot)")
+    made.add_argument(
+        "--who", default=getpass.getuser(), metavar="WHO", help="who says so (default: %(default)s)"
+    )
+    made.add_argument("--why", default="", metavar="TEXT", help="kept in the history")
+
+
+def _registry(arguments: argparse.Namespace) -> Registry:
+    place = checked_url(url(arguments))
+    if arguments.url is not None and place.startswith("file://") and not Path(urlsplit(place).path).is_dir():
+        raise StoreError(f"there is no store at {place}")
+    return Registry(place)
+
+
+def _named(registry: Registry, text: str) -> str:
+    """The one model whose name this is, or begins so.
+
+    Raises:
+        UnusableModel: there is none, or there are several.
+
+    """
+    known = [card.id for card in registry.entries()] + list(registry.damaged())
+    found = [name for name in known if name == text] or [name for name in known if name.startswith(text)]
+    if len(found) != 1:
+        several = f"{text!r} is how several begin: {', '.join(found)}"
+        raise UnusableModel(several if found else f"{registry.url} has no model {text!r} (gwrms models ls)")
+    return found[0]

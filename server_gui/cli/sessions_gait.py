@@ -1,0 +1,101 @@
+"""`gwrms sessions gait`: how somebody walked in a recording, by the same code as live."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pyarrow as pa
+
+from gateway.cli.text import NONE, say, say_json, table
+from server_gui.cli.cloud_reach import (
+    absolute,
+    add_url,
+    instant_or_seconds,
+    parser,
+    progress,
+    recordings,
+)
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_measures import LegGait
+from server_gui.core.processing.recording import RecordedGait, summarise
+from server_gui.core.processing.wiring import Wiring
+
+EPILOG = """Means over all strides of which nothing is missing; where events come from, and every formula, is
+in docs/processing.md. A minute of recording takes a quarter of a second.
+
+example
+  gwrms sessions gait 20261121T1530 --from 10 --to 70"""
+LEGS = ("LEG", "STRIDES", "STRIDE", "STEP", "STANCE", "SWING", "VARIABILITY")
+
+
+def gait(argv: list[str]) -> int:
+    """Run `gwrms sessions gait`."""
+    made = parser(
+        "sessions gait", "Cadence, step times, symmetry and ranges of motion of a recording.", EPILOG
+    )
+    made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
+    meaning = "a time (UTC), or seconds since the session's first sample"
+    made.add_argument("--from", dest="begin", type=instant_or_seconds, metavar="TIME", help=meaning)
+    made.add_argument("--to", dest="end", type=instant_or_seconds, metavar="TIME", help=meaning)
+    add_url(made)
+    arguments = made.parse_args(argv)
+    known = recordings("sessions", arguments)
+    recorded = known.open(known.find(arguments.session))
+    session = recorded.session
+    names = sorted(Wiring.of([each.name for each in recorded.channels]).channels)
+    begin, end = absolute(session, arguments.begin), absolute(session, arguments.end)
+    parts: list[pa.Table] = []
+    with progress("rows", session.rows) as advance:
+        for part in recorded.telemetry(names, begin, end):
+            parts.append(part)
+            advance(part.num_rows)
+    found = _summary(parts, names)
+    if arguments.json:
+        say_json({"gait": found.gait, "errors": found.errors, "events": len(found.events)})
+    else:
+        say("\n".join(_told(found)) + "\n")
+    return 0
+
+
+def _summary(parts: list[pa.Table], names: list[str]) -> RecordedGait:
+    if not parts:
+        return summarise(np.empty(0, np.int64), {})
+    rows = pa.concat_tables(parts)
+    return summarise(rows["stamp_ns"].to_numpy(), {name: rows[name].to_numpy() for name in names})
+
+
+def _told(found: RecordedGait) -> Iterator[str]:
+    walk = found.gait
+    if not found.strides:
+        yield "no stride was found: is there an insole, a foot IMU, or hips, knees and trunk in it?"
+    else:
+        cadence, both = _number(walk.cadence_spm, 1), _share(walk.double_support)
+        yield f"cadence {cadence} steps a minute, double support {both}"
+        yield table(LEGS, [_leg(leg, walk.legs[leg]) for leg in Leg], right=range(1, len(LEGS)))
+        uneven = ", ".join(
+            f"{name.removesuffix('_s')} {_number(value, 3)}" for name, value in walk.symmetry.items()
+        )
+        yield f"symmetry (left − right, 0 is even): {uneven}"
+    ranges = [(joint, f"{math.degrees(angle):.1f}°") for joint, angle in sorted(walk.ranges.items())]
+    errors = [
+        (joint, f"{math.degrees(error.rms):.2f}°", f"{math.degrees(error.largest):.2f}°")
+        for joint, error in sorted(found.errors.items())
+    ]
+    if ranges:
+        yield "\n" + table(("JOINT", "RANGE OF MOTION"), ranges, right=(1,))
+    if errors:
+        yield "\n" + table(("JOINT", "TRACKING ERROR (RMS)", "LARGEST"), errors, right=(1, 2))
+
+
+def _leg(leg: Leg, found: LegGait) -> tuple[str, ...]:
+    times = (f"{_number(value, 3)} s" for value in (found.stride_s, found.step_s))
+    shares = (_share(value) for value in (found.stance, found.swing, found.variability))
+    return (leg.value, str(found.strides), *times, *shares)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return NONE if value is None else f"{value:.{digits}f}"
+
+
+def _share(value: float | None) -> str:
+    return NONE if value is None else f"{100 * value:.1f} %"

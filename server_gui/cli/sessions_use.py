@@ -1,0 +1,90 @@
+"""`gwrms sessions resources | compare`: what programs on a robot took, and what takes more than it did."""
+
+from collections.abc import Iterator
+
+from gateway.cli.text import NONE, say, say_json, size, table
+from ml.store.sessions import Session
+from ml.store.tables import RESOURCES
+from server_gui.cli.cloud_reach import add_url, parser, recordings
+from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.processing.recorded_use import Looks, ProgramUse, looks, used
+from server_gui.core.processing.regression import Regression, SessionUse, regressions
+
+HEADER = ("PROCESS", "CPU", "MEMORY", "AT MOST", "GROWTH AN HOUR")
+COMPARE_EPILOG = """Several sessions a side are separated by commas: with one alone, a version cannot be told
+from a day. A process is named whose median over the minutes is a tenth more, and at least 1 % of a core or
+2 MiB, if three quarters of the sessions after lie above three quarters of those before, and if chance is
+ruled out (rank-sum test, p < 0.01 over all comparisons together).
+
+example
+  gwrms sessions compare 20261119T09,20261120T09 20261121T09,20261122T09
+
+exit status
+  0 nothing takes more; 1 something does, or it failed; 2 usage"""
+
+
+def resources(argv: list[str]) -> int:
+    """Run `gwrms sessions resources`."""
+    made = parser("sessions resources", "What each program on the robot's computer took, and who leaks.")
+    made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
+    add_url(made)
+    arguments = made.parse_args(argv)
+    known = recordings("sessions", arguments)
+    found = used(_looks(known, known.find(arguments.session)))
+    if arguments.json:
+        say_json(found)
+    else:
+        say(table(HEADER, map(_row, found), right=(1, 2, 3, 4)))
+    return 0
+
+
+def compare(argv: list[str]) -> int:
+    """Run `gwrms sessions compare`."""
+    made = parser(
+        "sessions compare", "Which programs take more in sessions than in earlier ones.", COMPARE_EPILOG
+    )
+    made.add_argument("before", metavar="BEFORE[,…]", help="sessions, each by how its name begins")
+    made.add_argument("after", metavar="AFTER[,…]", help="likewise, of another version")
+    add_url(made)
+    arguments = made.parse_args(argv)
+    known = recordings("sessions", arguments)
+    sides = [[_use(known, name) for name in side.split(",")] for side in (arguments.before, arguments.after)]
+    found = regressions(*sides)
+    if arguments.json:
+        say_json(found)
+    else:
+        say("\n".join(_told(sides, found)) + "\n")
+    return 1 if found else 0
+
+
+def _use(known: Recordings, name: str) -> SessionUse:
+    session = known.find(name)
+    return SessionUse.of(_version(session), _looks(known, session))
+
+
+def _version(session: Session) -> str:
+    """What a session's software is called: the gateway's version, else its own name."""
+    known = session.versions.get("gateway")
+    return f"gateway {known}" if known else session.session
+
+
+def _looks(known: Recordings, session: Session) -> Looks:
+    return looks(known.happenings(session, RESOURCES))
+
+
+def _told(sides: list[list[SessionUse]], found: list[Regression]) -> Iterator[str]:
+    minutes = [sum(use.minutes for use in side) for side in sides]
+    yield f"compared: {minutes[0]} minutes before, {minutes[1]} after"
+    yield from (regression.text for regression in found)
+    if not found:
+        yield "nothing surely takes more"
+
+
+def _row(use: ProgramUse) -> tuple[str, ...]:
+    return (
+        use.name,
+        NONE if use.cpu_percent is None else f"{use.cpu_percent:.1f} %",
+        size(use.memory_bytes),
+        size(use.most_bytes),
+        "" if use.leak is None else f"{use.leak.value / (1 << 20):+.1f} MiB, leaks",
+    )

@@ -1,0 +1,172 @@
+"""`gwrms train`: a model from recorded sessions and their labels, judged before it may serve."""
+
+import argparse
+import getpass
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from gateway.cli.text import NONE, say, say_json, table
+from ml.errors import Overtaken
+from ml.registry.card import Metrics
+from ml.registry.registry import Registry
+from ml.robot.task import TASKS
+from ml.store.private import private_files
+from ml.training.judging import Judged
+from ml.training.material import Wish
+from ml.training.training import Trained, told, train
+from server_gui.cli.cloud_reach import add_url, parser, url
+from server_gui.cli.models import NOTHING
+
+FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
+EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
+hash of their names, or those that --held-out names, are held out to be judged by. A wearer is known by gwrms
+label SESSION --wearer NAME, however that is spelled: P01, p01 and P-1 are one. Where nobody is named each
+session counts as somebody; beside named ones, sessions without a name judge nothing. Sessions of the
+regression set are never learned from, and judge every model.
+
+The model is published (gwrms models ls), and with --promote it serves: where it is better on the held-out
+people than the model that serves now, and nowhere much worse; and where that one still serves at its end.
+gwrms models rollback takes that back.
+
+examples
+  gwrms train activity
+  gwrms train activity --held-out P03 --held-out P07 --promote
+  gwrms train activity --pseudo-labels 0.95       # also from what the serving model is so sure of
+  gwrms train gait_phase --robot exo-01 --session 20261121T1530 --adapt-from gait_phase-0123456789ab --promote
+  gwrms train falling --cluster tcp://192.0.2.9:8786
+
+exit status
+  0 trained (with --promote: and serving); 1 it cannot be trained, or is not better; 2 usage"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms train`."""
+    private_files()
+    arguments = _parser().parse_args(argv)
+    wish = Wish(
+        arguments.task,
+        arguments.robot,
+        tuple(arguments.session),
+        tuple(arguments.held_out),
+        arguments.pseudo_labels,
+        arguments.adapt_from,
+    )
+    registry = Registry(url(arguments))
+    trained = train(registry, wish, arguments.cluster)
+    model = registry.publish(trained.learned.state(), trained.card)
+    promoted, overtaken = _promoted(registry, model, trained, arguments)
+    if arguments.json:
+        say_json(_answer(model, trained, overtaken, promoted=promoted))
+    else:
+        say("\n".join(_text(model, trained, overtaken, arguments, promoted=promoted)))
+    return 0 if promoted or not arguments.promote else 1
+
+
+def _promoted(
+    registry: Registry, model: str, trained: Trained, arguments: argparse.Namespace
+) -> tuple[bool, str]:
+    """Whether it serves now; why not, where it was better but something else serves since it was judged."""
+    if not (arguments.promote and trained.decision.better):
+        return False, ""
+    who, why = getpass.getuser(), "; ".join(trained.decision.why)
+    try:
+        registry.promote(model, arguments.robot, who=who, why=why, over=trained.over)
+    except Overtaken as error:
+        return False, str(error)
+    return True, ""
+
+
+def _text(
+    model: str, trained: Trained, overtaken: str, arguments: argparse.Namespace, *, promoted: bool
+) -> Iterator[str]:
+    card, decision = trained.card, trained.decision
+    yield f"{model}: {card.recipe}, from {len(card.learned)} sessions; {card.notes}"
+    yield f"compared with: {trained.serving or 'nothing, for nothing serves'}"
+    yield from (f"left out: {told(each)}" for each in trained.left_out)
+    yield from (f"note: {remark}" for remark in trained.remarks)
+    for each in (trained.held_out, trained.regression):
+        if each is not None:
+            yield ""
+            yield f"{each.name}, {each.decisions} decisions"
+            yield table(("", "NEW", "SERVING"), _figures(each), right=(1, 2)).rstrip()
+    yield ""
+    yield "better, and nowhere much worse:" if decision.better else "not to be promoted:"
+    yield from (f"  {why}" for why in decision.why)
+    if promoted:
+        yield f"it serves now, for {arguments.robot or 'every robot without a model of its own'}"
+    elif overtaken:
+        yield f"not promoted: {overtaken}"
+    elif decision.better:
+        whom = f" --robot {arguments.robot}" if arguments.robot else ""
+        yield f"let it serve: gwrms models promote {model}{whom} --instead-of {trained.over or NOTHING}"
+    yield ""
+
+
+def _figures(judged: Judged) -> Iterator[tuple[str, str, str]]:
+    new, old = _flat(judged.new), {} if judged.serving is None else _flat(judged.serving)
+    for name, value in new.items():
+        yield name, f"{value:.4g}", f"{old[name]:.4g}" if name in old else NONE
+
+
+def _flat(metrics: Metrics) -> Mapping[str, float]:
+    """The figures that people ask for, then classes and people."""
+    found: dict[str, float] = {name: metrics.figures[name] for name in FIGURES if name in metrics.figures}
+    if metrics.calibration_error is not None:
+        found["calibration_error"] = metrics.calibration_error
+    found |= {f"F1 of {name}": score.f1 for name, score in metrics.per_class.items() if score.support}
+    return found | {f"for {name}": value for name, value in metrics.per_subject.items()}
+
+
+def _answer(model: str, trained: Trained, overtaken: str, *, promoted: bool) -> dict[str, Any]:
+    return {
+        "model": model,
+        "compared_with": trained.serving,
+        "better": trained.decision.better,
+        "promoted": promoted,
+        "overtaken": overtaken or None,
+        "why": trained.decision.why,
+        "held_out": trained.held_out,
+        "regression": trained.regression,
+        "left_out": {each.ask.session: each.why for each in trained.left_out},
+        "remarks": trained.remarks,
+    }
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = parser("train", "A model from recorded sessions and their labels.", EPILOG)
+    made.add_argument("task", choices=TASKS, metavar="TASK", help=f"what it predicts: {', '.join(TASKS)}")
+    add_url(made)
+    made.add_argument("--robot", default="", metavar="NAME", help="learn from it alone, and serve it alone")
+    made.add_argument(
+        "--session", action="append", default=[], metavar="NAME", help="these alone; again for more"
+    )
+    made.add_argument(
+        "--held-out",
+        action="append",
+        default=[],
+        metavar="WHO",
+        help="wearers, or sessions, to be judged by; again for more",
+    )
+    made.add_argument("--promote", action="store_true", help="let it serve, if it is better")
+    made.add_argument(
+        "--pseudo-labels",
+        type=_probability,
+        metavar="P",
+        help="learn also from what the serving model says with at least this probability, where nobody else "
+        "says anything",
+    )
+    made.add_argument(
+        "--adapt-from", default="", metavar="MODEL", help="teach this one a wearer's gait (gait_phase)"
+    )
+    made.add_argument("--cluster", default="", metavar="ADDRESS", help="a Dask scheduler, for many sessions")
+    return made
+
+
+def _probability(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.5 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no probability from 0.5 to 1")
+    return value

@@ -1,0 +1,1 @@
+"""Recorded sessions at the desk: found, played, labelled, and their journals."""

@@ -1,0 +1,91 @@
+"""Everything recorded, as the window works with it: what there is, one session played, its labels, jobs."""
+
+import functools
+from pathlib import Path
+
+from ml.store.sessions import Session
+from server_gui.core.archive.collected_journals import KeptJournals
+from server_gui.core.archive.labels import SessionLabels
+from server_gui.core.archive.library import Library
+from server_gui.core.archive.playback import Playback
+from server_gui.core.archive.recall import said
+from server_gui.core.cloud.jobs import Job, Jobs, JobState
+from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.desk import Desk
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.threads.background import Background
+
+WHO = "recordings"  # what the news name instead of a robot
+
+
+class Archive:
+    """For the window's thread; `close` ends its own. `file` has the settings, and may not be there yet."""
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        desk: Desk,
+        deliver: Deliver,
+        author: str = "",
+        file: Path | None = None,
+    ) -> None:
+        self.settings = settings
+        self.file = file
+        self.library = Library(settings, deliver)
+        self.journals = KeptJournals(settings, self.library.reading.do, deliver)
+        self._reading = Background("playback")
+        self.playback = Playback(self._reading.do, deliver, desk.shown)
+        self.labels = SessionLabels(settings, self._reading.do, deliver, author)
+        self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
+        self.tape: Tape | None = None  # of the session that is chosen
+        self.problem = ""  # why there is none
+        self.chosen: Session | None = None
+        self._desk = desk
+        self.deliver = deliver
+
+    def close(self, within_s: float) -> bool:
+        """End everything; False where something hangs, which only the end of the process ends."""
+        ended = [part.close(within_s) for part in (self.jobs, self.library, self._reading)]
+        return all(ended)
+
+    def choose(self, session: Session | None) -> None:
+        """Look into this session; its tape comes when it has been read."""
+        self.chosen, self.tape, self.problem = session, None, ""
+        if session is not None:
+            when_done(
+                self._reading.do(lambda: Tape.open(self.settings, session)),
+                self.deliver,
+                lambda tape: self._opened(session, tape),
+                lambda error: self._failed(session, error),
+            )
+
+    def play(self) -> bool:
+        """Play the session that is chosen; False where it cannot be."""
+        if self.tape is None:
+            return False
+        recall = functools.partial(said, self.settings, self.tape.session)
+        self.playback.open(self.tape, self._words(self.tape.session.robot), recall)
+        self.labels.open(self.tape.session)
+        return True
+
+    def _words(self, robot: str) -> dict[str, dict[str, str]]:
+        """The words of states, which recordings do not have: of the live robot, if it is there."""
+        named = (station.robot.description for station in self._desk if station.name == robot)
+        described = next((found for found in named if found is not None), None)
+        channels = [] if described is None else described.channels
+        return {channel.name: channel.enum for channel in channels if channel.enum}
+
+    def _opened(self, session: Session, tape: Tape) -> None:
+        if session is self.chosen:
+            self.tape = tape
+
+    def _failed(self, session: Session, error: Exception) -> None:
+        if session is self.chosen:
+            self.problem = str(error)
+
+    def _over(self, job: Job) -> None:
+        kind = NewsKind.STATE if job.state is JobState.DONE else NewsKind.WARNING
+        self._desk.news.add(kind, WHO, f"{job.name} {job.state.value}: {job.said}")
+        self.library.look(now=True)

@@ -1,0 +1,126 @@
+"""What store and spool hold, looked at now and then in a thread; a store that is away is tried again."""
+
+import time
+from collections.abc import Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Final
+
+import msgspec
+
+from ml.store import NoSuchTable, Store, StoreError
+from ml.store.objects import Object
+from ml.store.sessions import UNTOLD, Session, in_order, sessions
+from server_gui.core.cloud import spooled, usage
+from server_gui.core.cloud.usage import Usage
+from server_gui.core.recording.errors import RecordingError
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.threads.background import Background
+
+LOOK_S: Final = 10.0  # between looks, while somebody looks
+AGAIN_S: Final = 5.0  # before a store that was away is tried again
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a look has found; `problem` says why the store's part is missing, in words."""
+
+    sessions: tuple[Session, ...] = ()  # newest first
+    usage: tuple[Usage, ...] = ()
+    size_bytes: int = 0
+    problem: str | None = None
+    is_empty: bool = False  # there is no store yet: nothing was uploaded
+
+
+class Library:
+    """For the window's thread. `revision` rises with every look that has found something else."""
+
+    def __init__(self, settings: ServerSettings, deliver: Deliver) -> None:
+        self.settings = settings
+        self.found = Found()
+        self.revision = 0
+        self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
+        self.reading = Background("store")
+        self._deliver = deliver
+        self._looking = False
+
+    def close(self, within_s: float) -> bool:
+        """Look no more; False where a look under way hangs. Idempotent."""
+        return self.reading.close(within_s)
+
+    @property
+    def is_looking(self) -> bool:
+        """Whether a look is under way."""
+        return self._looking
+
+    def look(self, *, now: bool = False) -> None:
+        """Look again where it is time, or at once."""
+        wait_s = LOOK_S if self.found.problem is None else AGAIN_S
+        due = self.looked_s is None or time.monotonic() - self.looked_s >= wait_s
+        if self._looking or not (now or due):
+            return
+        self._looking = True
+        settings = self.settings
+        when_done(self.reading.do(lambda: look(settings)), self._deliver, self._looked, self._failed)
+
+    def session(self, robot: str, name: str) -> Session | None:
+        """The session of this name, as the newest look has found it."""
+        named = (each for each in self.found.sessions if (each.robot, each.session) == (robot, name))
+        return next(named, None)
+
+    def files(self, folder: str) -> "Future[list[Object]]":
+        """Every object of the store below a folder."""
+        url = self.settings.store.url
+        return self.reading.do(lambda: usage.below(Store.existing(url), folder))
+
+    def _looked(self, found: Found) -> None:
+        self._looking, self.looked_s = False, time.monotonic()
+        if (found.sessions, found.usage, found.problem) != (
+            self.found.sessions,
+            self.found.usage,
+            self.found.problem,
+        ) or self.revision == 0:
+            self.revision += 1
+        self.found = found
+
+    def _failed(self, error: Exception) -> None:
+        self._looked(Found(problem=f"internal error, {type(error).__name__}"))
+
+
+def look(settings: ServerSettings) -> Found:
+    """What there is now; blocks."""
+    waiting = _waiting(settings)
+    try:
+        store = Store.existing(settings.store.url)
+        stored = sessions(store)
+        used = tuple(usage.by_robot(store))
+        size_bytes = sum(each.size_bytes for each in store.objects.listing())
+    except NoSuchTable:
+        return Found(_joined([], waiting), is_empty=True)
+    except StoreError as error:
+        return Found(_joined([], waiting), problem=str(error))
+    return Found(_joined(stored, waiting), used, size_bytes)
+
+
+def _waiting(settings: ServerSettings) -> list[Session]:
+    try:
+        return spooled.sessions(settings.recorder.spool)
+    except RecordingError:
+        return []
+
+
+def _completed(stored: Session, told: Mapping[tuple[str, str], Session]) -> Session:
+    """Of a session of which the store has only the rows, what the spool says."""
+    found = told.get((stored.robot, stored.session))
+    if found is None or stored.notes != UNTOLD:
+        return stored
+    held = {name: getattr(stored, name) for name in ("first", "last", "rows", "size_bytes", "uploaded")}
+    return msgspec.structs.replace(found, **held)
+
+
+def _joined(stored: list[Session], waiting: list[Session]) -> tuple[Session, ...]:
+    """The store knows more of what it has, and the spool whether it has ended; newest first."""
+    told = {(each.robot, each.session): each for each in waiting}
+    known = told | {(each.robot, each.session): _completed(each, told) for each in stored}
+    return tuple(reversed(in_order(known.values())))

@@ -1,0 +1,289 @@
+"""A recorded session played on a desk of its own: never among the live robots, and never taken for one."""
+
+import time
+from bisect import bisect_left
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final, cast
+
+import numpy as np
+from msgspec import UNSET
+
+from gateway.client import Batch, ConnectionState
+from gateway.wire.messages import ChannelInfo, Clock, ComponentInfo, Description, GuardInfo, StopInfo
+from server_gui.core.archive.recall import Said
+from server_gui.core.cloud.tape import Rows, Tape
+from server_gui.core.desk.desk import Desk, Shown
+from server_gui.core.desk.station import Station
+from server_gui.core.desk.ticks import drawable, nullable
+from server_gui.core.follow.events import Described, LinkChanged, Telemetry
+from server_gui.core.follow.robot import STALE_NS, Robot
+from server_gui.core.prediction.current import Recalled
+from server_gui.core.prediction.news import Serves
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.tuning.commands import Commands
+
+PIECE_NS: Final = 20_000_000_000  # that are read at once
+PIECES: Final = 8  # that are kept
+LEAD_NS: Final = 12_000_000_000  # of the past that are shown after a jump
+LATE_S: Final = 0.5  # a frame that took longer does not make the recording jump
+SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+NOT_PREDICTED: Final = "nothing was said then: gwrms predict --session says it now"
+KINDS: Final = {"cell_0": "insole", "force": "insole", "tilt_forward": "imu", "position": "joint"}
+
+
+class IsRecording(Exception):
+    """Something was asked of a robot that is a recording."""
+
+
+class NoRobot:
+    """Takes the place of a robot's commands; every one of them is refused."""
+
+    def __getattr__(self, name: str) -> "Callable[..., Future[Any]]":
+        return _refused
+
+
+def _refused(*_: object) -> "Future[Any]":
+    future: Future[Any] = Future()
+    future.set_exception(IsRecording("this is a recording: there is no robot behind it"))
+    return future
+
+
+@dataclass(slots=True)
+class PlayedRobot(Robot):
+    """Its values are as old as they were at the instant of the recording that is shown."""
+
+    shown_ns: int = 0  # UTC
+    row_ns: int | None = None  # UTC of the newest row
+    stamp_ns: int | None = None  # and on the robot's clock
+    rows_per_s: float = 0.0
+
+    def age_s(self, now_ns: int | None = None) -> float | None:  # noqa: ARG002 - a recording has its own now
+        return None if self.row_ns is None else max(0, self.shown_ns - self.row_ns) / 1e9
+
+    def is_stale(self, now_ns: int | None = None) -> bool:  # noqa: ARG002 - a recording has its own now
+        return self.row_ns is None or self.shown_ns - self.row_ns > STALE_NS
+
+    def rate_hz(self, now_ns: int | None = None) -> float:  # noqa: ARG002 - a recording has its own now
+        return self.rows_per_s
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of a recording: its rows, and what models said of them then, in time's order."""
+
+    rows: Rows
+    said: Sequence[Said]
+
+    def between(self, begin_ns: int, end_ns: int) -> "Piece":
+        """What is from `begin_ns` up to before `end_ns`."""
+        first, last = (bisect_left(self.said, at, key=lambda one: one.utc_ns) for at in (begin_ns, end_ns))
+        return Piece(self.rows.between(begin_ns, end_ns), self.said[first:last])
+
+
+Read = Callable[[Callable[[], Any]], "Future[Any]"]  # does it in a thread
+Recall = Callable[[int, int], Sequence[Said]]  # what was said from one instant up to before another; blocks
+
+
+def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[Said]:
+    """Of a recording without predictions."""
+    return ()
+
+
+class Playback:
+    """For the window's thread; `read` does what it is given in another one.
+
+    `desk` holds the one station that is a recording; views of a desk show it as they show a robot. After a
+    jump it begins anew, some seconds before the instant that was asked for. Times are UTC in ns.
+    """
+
+    def __init__(self, read: Read, deliver: Deliver, shown: Shown) -> None:
+        self.desk = Desk()
+        self.desk.shown = shown
+        self.tape: Tape | None = None
+        self.playing = False
+        self.speed = 1.0
+        self.position_ns = 0
+        self.problem = ""  # why there is nothing to see
+        self._read = read
+        self._deliver = deliver
+        self._robot = PlayedRobot()
+        self._words: Mapping[str, dict[str, str]] = {}
+        self._recall: Recall = nothing_said
+        self._said: dict[str, Said] = {}  # the newest of each task
+        self._pieces: dict[int, Piece] = {}
+        self._reading: int | None = None
+        self._fed_ns: int | None = None  # up to where the station has seen the recording; None: it jumps
+        self._jumps = 0
+        self._stepped_s: float | None = None
+
+    def open(
+        self,
+        tape: Tape,
+        words: Mapping[str, dict[str, str]] = MappingProxyType({}),
+        recall: Recall = nothing_said,
+    ) -> None:
+        """Show this one from its beginning; `words` are those of the channels that are states."""
+        self.close()
+        self.tape, self._words, self._recall = tape, words, recall
+        station = Station(
+            tape.session.robot, "a recording", cast("Commands", NoRobot()), self._deliver, self.desk.news
+        )
+        station.robot = self._robot = PlayedRobot(rows_per_s=_rate(tape))
+        station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns())])
+        self.desk.stations = [station]
+        self.desk.select(station)
+        self.seek(tape.first_ns)
+
+    def close(self) -> None:
+        """Show nothing more."""
+        self.tape, self.playing, self.problem, self.speed = None, False, "", 1.0
+        self._pieces, self._reading, self._fed_ns = {}, None, None
+        self.desk.stations = []
+        self.desk.select(None)
+
+    def play(self, on: bool) -> None:
+        """Go on, or stand still; from the beginning where it had come to the end."""
+        if on and self.tape is not None and self.position_ns >= self.tape.last_ns:
+            self.seek(self.tape.first_ns)
+        self.playing, self.problem, self._stepped_s = on, "", None
+
+    def seek(self, position_ns: int) -> None:
+        """Jump there, or as near as the recording goes."""
+        if self.tape is not None:
+            self.position_ns = min(max(position_ns, self.tape.first_ns), self.tape.last_ns)
+            self._fed_ns, self.problem = None, ""
+
+    @property
+    def is_loading(self) -> bool:
+        """Whether what is to be shown has not been read yet."""
+        return self.tape is not None and not self.problem and self._fed_ns != self.position_ns
+
+    def step(self) -> None:
+        """A frame: go on as far as time has, and show what there was."""
+        if self.tape is None or self.problem:
+            return
+        now_s = time.monotonic()
+        took_s = 0.0 if self._stepped_s is None else min(now_s - self._stepped_s, LATE_S)
+        self._stepped_s = now_s
+        target_ns = self.position_ns
+        if self.playing and self._fed_ns is not None:
+            target_ns = min(target_ns + round(took_s * self.speed * 1e9), self.tape.last_ns)
+        if self._show_until(self.tape, target_ns):
+            self.position_ns = self._robot.shown_ns = target_ns
+            self._show_said(target_ns)
+            self.playing = self.playing and target_ns < self.tape.last_ns
+
+    # --- what is shown
+
+    def _show_until(self, tape: Tape, target_ns: int) -> bool:
+        """Feed what is between; False where that must be read first."""
+        begin_ns = self._fed_ns
+        if begin_ns is None:
+            begin_ns = max(tape.first_ns, target_ns - LEAD_NS)
+        wanted = range(self._place(tape, begin_ns), self._place(tape, target_ns) + 1)
+        missing = [place for place in wanted if place not in self._pieces]
+        ahead = [] if self._place(tape, tape.last_ns) in wanted else [wanted[-1] + 1]
+        self._fetch(tape, next((place for place in [*missing, *ahead] if place not in self._pieces), None))
+        if missing:
+            return False
+        if self._fed_ns is None:
+            self._begin_anew(tape)
+        if target_ns > begin_ns:
+            shown = [self._pieces[place].between(begin_ns, target_ns) for place in wanted]
+            self._feed(Rows.joined([piece.rows for piece in shown]))
+            self._said |= {one.prediction.task: one for piece in shown for one in piece.said}
+        self._fed_ns = target_ns
+        return True
+
+    def _begin_anew(self, tape: Tape) -> None:
+        """To views, a jump is as if the robot's computer had started anew."""
+        self._jumps += 1
+        self._robot.row_ns = self._robot.stamp_ns = None
+        self._said = {}
+        station = self.desk.stations[0]
+        station.take([Described(_description(tape, self._jumps, self._words))])
+        station.predictions.take(Serves(station.name, {}, {"": NOT_PREDICTED}))
+
+    def _show_said(self, now_ns: int) -> None:
+        """What models said last, as far as that was not too old."""
+        recalled = {
+            task: Recalled(one.prediction, (now_ns - one.utc_ns) / 1e9) for task, one in self._said.items()
+        }
+        shown = {task: one for task, one in recalled.items() if not one.is_stale()}
+        self.desk.stations[0].predictions.recalled = shown
+
+    def _feed(self, rows: Rows) -> None:
+        newest = self._robot.stamp_ns
+        if newest is not None:  # UTC may have fallen a little where two pieces meet; this clock never does
+            rows = rows.part(slice(int(np.searchsorted(rows.stamps_ns, newest, "right")), None))
+        if not len(rows):
+            return
+        columns = {name: nullable(column) for name, column in rows.columns.items()}
+        batch = Batch(rows.stamps_ns.tolist(), columns, 0, 0, 0, 1, time.monotonic_ns())
+        self.desk.stations[0].take([Telemetry(1, batch, None)])
+        self._robot.row_ns, self._robot.stamp_ns = int(rows.utc_ns[-1]), int(rows.stamps_ns[-1])
+
+    # --- what is read
+
+    def _place(self, tape: Tape, instant_ns: int) -> int:
+        return (instant_ns - tape.first_ns) // PIECE_NS
+
+    def _fetch(self, tape: Tape, place: int | None) -> None:
+        if place is None or self._reading is not None:
+            return
+        self._reading, recall = place, self._recall
+        begin_ns = tape.first_ns + place * PIECE_NS
+        end_ns = begin_ns + PIECE_NS
+        when_done(
+            self._read(lambda: Piece(drawable(tape.read(begin_ns, end_ns)), recall(begin_ns, end_ns))),
+            self._deliver,
+            lambda piece: self._fetched(tape, place, piece),
+            lambda error: self._failed(tape, error),
+        )
+
+    def _fetched(self, tape: Tape, place: int, piece: Piece) -> None:
+        if tape is not self.tape:
+            return
+        self._reading = None
+        self._pieces[place] = piece
+        here = self._place(tape, self.position_ns)
+        while len(self._pieces) > PIECES:
+            del self._pieces[max(self._pieces, key=lambda known: abs(known - here))]
+
+    def _failed(self, tape: Tape, error: Exception) -> None:
+        if tape is self.tape:
+            self._reading, self.playing, self.problem = None, False, str(error)
+
+
+def _rate(tape: Tape) -> float:
+    """Rows a second, as far as the store knows."""
+    seconds = tape.session.length.total_seconds()
+    return tape.session.rows / seconds if seconds else 0.0
+
+
+def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:
+    """What the robot said it was made of, as far as its channels tell."""
+    channels = []
+    for name, unit in tape.units.items():
+        component, _, quantity = name.rpartition(".")
+        channels.append(ChannelInfo(name, unit, component, quantity, words.get(name, UNSET)))
+    components: dict[str, str] = {}
+    for quantity, kind in KINDS.items():
+        for channel in channels:
+            if channel.quantity == quantity:
+                components.setdefault(channel.component, kind)
+    return Description(
+        robot=tape.session.robot,
+        boot_id=f"jump {jumps}",
+        role="recording",
+        components=[ComponentInfo(name, kind, "ok") for name, kind in components.items()],
+        channels=channels,
+        parameters=[],
+        modules={},
+        clock=Clock(0, 0, f"jump {jumps}"),
+        stop=StopInfo(held=False, reason=None, since_ns=None, stopped_again={}, drives={}),
+        guard=GuardInfo(),
+    )

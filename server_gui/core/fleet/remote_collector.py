@@ -1,0 +1,34 @@
+"""A collector that runs in another process, asked through its door without waiting for it."""
+
+from concurrent.futures import Future
+from pathlib import Path
+
+import msgspec
+
+from server_gui.core.fleet.collector import CollectorReport
+from server_gui.core.fleet.control_socket import ANSWER_S, ask
+from server_gui.core.threads.background import Background
+
+
+class Elsewhere:
+    """Whoever records into this spool; futures fail with `NobodyCollects` where nobody does."""
+
+    def __init__(self, spool: Path) -> None:
+        self._spool = spool
+        self._asking = Background("asking the collector")
+
+    def close(self) -> None:
+        """Ask nothing more. Idempotent."""
+        self._asking.close(2 * ANSWER_S)
+
+    def report(self) -> "Future[CollectorReport]":
+        """How everything goes there."""
+        return self._asking.do(lambda: msgspec.json.decode(ask(self._spool, "status"), type=CollectorReport))
+
+    def mark(self, text: str) -> "Future[int]":
+        """Mark this instant in the recording of every robot there; how many there are."""
+        return self._asking.do(lambda: int(ask(self._spool, "mark", text)))
+
+    def upload(self) -> "Future[int]":
+        """Bring everything that was recorded until now into the store; how many batches waited."""
+        return self._asking.do(lambda: int(ask(self._spool, "upload")))

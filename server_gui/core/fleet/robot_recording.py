@@ -1,0 +1,80 @@
+"""Hands everything that one robot's feed tells to the recorder, whole; begins and ends its sessions."""
+
+import msgspec
+
+from gateway.client import ConnectionState
+from gateway.wire.messages import Description
+from server_gui.core.fleet import session_facts
+from server_gui.core.follow.events import (
+    Described,
+    Event,
+    Journalled,
+    LinkChanged,
+    Looked,
+    Refused,
+    Resources,
+    Telemetry,
+)
+from server_gui.core.recording.batching import EventKind
+from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.records import Facts
+
+
+class Keeping:
+    """One robot's recording, in the network's thread.
+
+    A session lasts over dropped links, for as long as the robot's boot, configuration and software stay the
+    same.
+    """
+
+    def __init__(self, robot: str, recorder: Recorder, operator: str = "", notes: str = "") -> None:
+        self.session = ""
+        self._robot = robot
+        self._recorder = recorder
+        self._operator = operator
+        self._notes = notes
+        self._facts = Facts()
+        self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
+        self._linked = False
+
+    def take(self, event: Event) -> None:
+        """Keep what an event tells; returns at once."""
+        match event:
+            case Telemetry():
+                offset_ns = None if event.clock is None else event.clock.offset_ns
+                self._recorder.record(self._robot, event.stream, event.batch, offset_ns)
+            case Resources():
+                self._recorder.resources(self._robot, event.snapshot)
+                if not isinstance(event.snapshot.kernel, msgspec.UnsetType):
+                    self._learn(versions=self._facts.versions | session_facts.kernel(event.snapshot.kernel))
+            case Journalled():
+                self._recorder.journal(self._robot, event.journal.entries)
+            case Described():
+                self._described(event.description)
+            case Looked() if event.parameters is not None and not self._facts.parameters:
+                values = event.parameters.values.items()
+                self._learn(parameters={name: known.value for name, known in values})
+            case LinkChanged():
+                self._link_changed(event)
+            case Refused():
+                self._recorder.refused(self._robot, event.what, event.reason)
+
+    def _described(self, description: Description) -> None:
+        self._recorder.describe(self._robot, description)
+        found = session_facts.facts(description, self._operator, self._notes)
+        same = (description.boot_id, found.configuration_hash, description.version)
+        if same != self._same:
+            self._same, self._facts = same, found
+            self.session = self._recorder.begin(self._robot, found)
+
+    def _learn(self, **known: object) -> None:
+        """More is known of the session than when it began."""
+        found = msgspec.structs.replace(self._facts, **known)
+        if found != self._facts:
+            self._facts = found
+            self._recorder.amend(self._robot, found)
+
+    def _link_changed(self, event: LinkChanged) -> None:
+        if self._linked and event.state is ConnectionState.WAITING:
+            self._recorder.event(self._robot, EventKind.LINK, f"the link dropped: {event.problem}")
+        self._linked = event.state is ConnectionState.CONNECTED

@@ -1,0 +1,143 @@
+"""What a robot's feed tells: small frozen facts, handed from the network's thread to whoever shows them."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import msgspec
+
+from gateway.client import Batch, ClockOffset, ConnectionState
+from gateway.wire.messages import (
+    Description,
+    GatewayCost,
+    JournalEntries,
+    ParameterValues,
+    ResourceSnapshot,
+    Snapshot,
+    Stopped,
+    Written,
+)
+
+STOP = "STOP"  # what a stop that failed is called
+
+
+@dataclass(frozen=True, slots=True)
+class LinkChanged:
+    """The link went up or down; `problem` says why it is not up."""
+
+    state: ConnectionState
+    problem: str | None
+    at_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """What the robot is made of; comes anew with every link."""
+
+    description: Description
+    calendar_ns: int = 0  # the robot's minus ours when it came
+
+
+@dataclass(frozen=True, slots=True)
+class Telemetry:
+    """A batch of a stream, and what the robot's clock is to ours, None where nobody knows."""
+
+    stream: int
+    batch: Batch
+    clock: ClockOffset | None
+
+    @property
+    def age_ns(self) -> int | None:
+        """How old the newest row was on arrival, None where nobody knows."""
+        if self.clock is None or not self.batch.stamps_ns:
+            return None
+        return max(0, self.batch.received_ns + self.clock.offset_ns - self.batch.stamps_ns[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """Quality of the components, and the parameters, as they were at `at_ns`."""
+
+    quality: Snapshot
+    parameters: ParameterValues | None
+    at_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """CPU, memory and processes at `at_ns`, the round trip to the robot, and all bytes that it has sent."""
+
+    snapshot: ResourceSnapshot
+    round_trip_ns: int | None
+    at_ns: int
+    received_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Journalled:
+    """The newest entries of the robot's journal, oldest first; most have come before."""
+
+    journal: JournalEntries
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """A write was done and read back."""
+
+    written: Written
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """What monitoring costs the robot, client by client."""
+
+    cost: GatewayCost
+
+
+@dataclass(frozen=True, slots=True)
+class StopAnswered:
+    """What the drives said to a stop."""
+
+    stopped: Stopped
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """Something that was asked for did not happen, in words."""
+
+    what: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Refused(Failed):
+    """The robot sent what cannot be kept: it was told to nobody."""
+
+
+Event = (
+    LinkChanged
+    | Described
+    | Telemetry
+    | Looked
+    | Resources
+    | Costs
+    | Journalled
+    | Changed
+    | StopAnswered
+    | Failed
+)
+
+
+def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[float | None]]) -> Telemetry:
+    """The same, with other rows."""
+    return dataclasses.replace(
+        event, batch=dataclasses.replace(event.batch, stamps_ns=stamps_ns, columns=columns)
+    )
+
+
+def without_processes(event: Event) -> Event:
+    """The same, without the table of processes."""
+    if not isinstance(event, Resources):
+        return event
+    return dataclasses.replace(
+        event, snapshot=msgspec.structs.replace(event.snapshot, processes=msgspec.UNSET)
+    )

@@ -1,0 +1,220 @@
+"""Follows one robot in the network's thread and tells what it sees; carries out what it is told."""
+
+import asyncio
+import fnmatch
+import math
+import time
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from msgspec import Struct
+
+from gateway.client import (
+    Address,
+    CallTimeout,
+    Client,
+    ClientError,
+    ConnectionState,
+    LinkLost,
+    LinkSettings,
+    NotConnected,
+    ProtocolError,
+    RemoteError,
+)
+from gateway.client.backoff import Backoff
+from gateway.wire.messages import Description, ResourceSnapshotParams
+from server_gui.core.follow.events import (
+    STOP,
+    Changed,
+    Described,
+    Event,
+    Failed,
+    Journalled,
+    LinkChanged,
+    Looked,
+    Refused,
+    Resources,
+    StopAnswered,
+    Telemetry,
+)
+from server_gui.core.follow.validation import Arriving, Unfit, journal
+
+Tell = Callable[[Event], None]
+
+ONCE: Final = math.inf  # a period: once on every link
+AGAIN_S: Final = 5.0  # before a look that failed is tried again
+LEASE_S: Final = 10.0
+DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
+WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
+COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
+
+
+class Following(Struct, frozen=True):
+    """What is asked of a robot, how often, and in whose name; `channels` and `parameters` are globs.
+
+    What of them this robot does not have is left out. `rate_hz` 0 gives every source's own samples.
+    """
+
+    client: str
+    channels: tuple[str, ...]
+    parameters: tuple[str, ...] = ("*",)
+    rate_hz: float = 50.0
+    look_s: float = 0.5  # quality and parameters
+    resources: ResourceSnapshotParams = ResourceSnapshotParams(limit=8)
+    resources_s: float = 1.0
+    journal_s: float | None = None  # None: it is not asked for
+
+
+class Feed:
+    """One robot, followed from `run` until that is cancelled.
+
+    `tell` is called in the network's thread with every event that may be kept, in order. Writes take the
+    lease for as long as they last.
+    """
+
+    def __init__(self, address: Address, tell: Tell, following: Following) -> None:
+        self._tell = tell
+        self._following = following
+        self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
+        self._backoff = Backoff()
+        self._arriving = Arriving()
+        self._dropped = asyncio.Event()
+        self._newest_entry: dict[str, Any] = {"n": 0}
+
+    async def run(self) -> None:
+        """Follow the robot until cancelled, over every link that there is."""
+        self._client.link.start()
+        try:
+            while True:
+                await self._client.link.connected()
+                # In a task of its own: a group that fails as it is cancelled forgets that it is cancelled.
+                following = asyncio.create_task(self._follow())
+                try:
+                    await asyncio.wait([following])
+                finally:
+                    following.cancel()
+                    await asyncio.wait([following])
+                self._ended(following)
+                await asyncio.sleep(self._backoff.next_s())
+        finally:
+            await self._client.close()
+
+    def _ended(self, following: "asyncio.Task[None]") -> None:
+        try:
+            following.result()
+        except* (NotConnected, LinkLost):
+            pass  # the link has told so itself
+        except* Unfit as unfit:
+            for error in unfit.exceptions:
+                self._tell(Refused("its description is refused", str(error)))
+        except* ClientError as errors:
+            for one in errors.exceptions:
+                self._tell(Failed("following the robot", str(one)))
+
+    async def write(self, changes: Mapping[str, float]) -> None:
+        """Change parameters; the lease is taken and given back around it."""
+        try:
+            async with self._client.writing(LEASE_S):
+                self._tell(Changed(await self._client.write(changes)))
+        except ClientError as error:
+            self._tell(Failed(f"write of {', '.join(changes)}", str(error)))
+
+    async def stop(self, reason: str) -> StopAnswered | Failed:
+        """Quick stop on every drive; what was told of it."""
+        told: StopAnswered | Failed
+        try:
+            told = StopAnswered(await self._client.stop(reason))
+        except ClientError as error:
+            told = Failed(STOP, str(error))
+        self._tell(told)
+        return told
+
+    # --- what goes on by itself
+
+    def _link_changed(self, state: ConnectionState) -> None:
+        if state is ConnectionState.CONNECTED:
+            self._backoff.reset()
+        else:
+            self._dropped.set()
+        problem = self._client.link.problem
+        self._tell(LinkChanged(state, None if problem is None else str(problem), time.monotonic_ns()))
+
+    async def _follow(self) -> None:
+        """Everything that goes on while one link lasts; ends by raising why it cannot go on."""
+        following = self._following
+        self._dropped.clear()
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._until_dropped())
+            description = await self._client.describe()
+            self._admit(Described(description, description.clock.utc_ns - time.time_ns()))
+            group.create_task(self._stream(self._channels(description)))
+            changeable = (known.name for known in description.parameters if known.read_only is None)
+            parameters = _matching(following.parameters, changeable)
+            group.create_task(self._repeat(following.look_s, lambda: self._look(parameters)))
+            group.create_task(self._repeat(following.resources_s, self._resources))
+            if following.journal_s is not None:
+                group.create_task(self._repeat(following.journal_s, self._journal))
+
+    def _admit(self, event: Event) -> None:
+        """Tell what the robot has sent, where it may be kept; raises `Unfit` where not."""
+        self._arriving.check(event)
+        self._tell(event)
+
+    async def _until_dropped(self) -> None:
+        """Another link may be to another robot, or to one that has changed: then everything begins anew."""
+        await self._dropped.wait()
+        raise LinkLost("the link dropped")
+
+    def _channels(self, description: Description) -> list[str]:
+        known = (channel.name for channel in description.channels if channel.component != COMPUTER)
+        return _matching(self._following.channels, known)
+
+    async def _stream(self, channels: Sequence[str]) -> None:
+        if not channels:
+            globs = ", ".join(self._following.channels)
+            self._tell(Failed("the stream", f"the robot has no channel {globs} (gwrms describe lists them)"))
+            return
+        rate_hz, clock = self._following.rate_hz, self._client.link.clock
+        async with self._client.subscribe(*channels, rate_hz=rate_hz, depth=DEPTH) as stream:
+            async for batch in stream:
+                try:
+                    self._admit(Telemetry(stream.stream or 0, batch, clock.offset))
+                except Unfit as error:
+                    self._tell(Refused("its rows are refused", str(error)))
+
+    async def _look(self, parameters: Sequence[str]) -> None:
+        quality = await self._client.components()
+        values = await self._client.read(*parameters) if parameters else None
+        self._admit(Looked(quality, values, time.monotonic_ns()))
+
+    async def _resources(self) -> None:
+        snapshot = await self._client.resources(self._following.resources)
+        link = self._client.link
+        self._admit(Resources(snapshot, link.clock.round_trip_ns, time.monotonic_ns(), link.received_bytes))
+
+    async def _journal(self) -> None:
+        """Tell the newest entries when there are new ones, without a hole as far as the robot has them."""
+        found = await self._client.journal()
+        journal(found.entries)
+        if found.entries and found.entries[0]["n"] > self._newest_entry["n"] + 1:
+            found = await self._client.journal(WHOLE_JOURNAL)
+        if found.entries and found.entries[-1] != self._newest_entry:
+            self._admit(Journalled(found))
+            self._newest_entry = found.entries[-1]
+
+    async def _repeat(self, period_s: float, look: Callable[[], Awaitable[None]]) -> None:
+        while True:
+            wait_s = period_s
+            try:
+                await look()
+            except Unfit as error:
+                self._tell(Refused("a look at it is refused", str(error)))
+                wait_s = min(period_s, AGAIN_S)
+            except (RemoteError, CallTimeout, ProtocolError) as error:
+                self._tell(Failed("a look at the robot", str(error)))
+                wait_s = min(period_s, AGAIN_S)
+            await asyncio.sleep(wait_s)
+
+
+def _matching(globs: Sequence[str], names: Iterable[str]) -> list[str]:
+    return [name for name in names if any(fnmatch.fnmatchcase(name, glob) for glob in globs)]

@@ -1,0 +1,184 @@
+"""What is known of one robot now, as plain state: events go in, views read it. No Qt, no threads."""
+
+import collections
+import time
+from dataclasses import dataclass, field
+
+from gateway.client import ConnectionState
+from gateway.wire.messages import Description, ParameterValue, QualityInfo, ResourceSnapshot
+from server_gui.core.follow.events import (
+    STOP,
+    Changed,
+    Described,
+    Event,
+    Failed,
+    LinkChanged,
+    Looked,
+    Resources,
+    StopAnswered,
+    Telemetry,
+)
+
+STALE_NS = 500_000_000  # older than this is shown as old
+HISTORY_ROWS = 240
+RATE_WINDOW_NS = 2_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One component as it was last seen."""
+
+    name: str
+    kind: str
+    state: str
+    age_ms: float | None
+    problem: str | None
+
+
+@dataclass(slots=True)
+class LinkStatus:
+    """How the robot is reached, and how well."""
+
+    state: ConnectionState = ConnectionState.IDLE
+    problem: str | None = None
+    since_ns: int = 0
+    links: int = 0
+    missed: int = 0  # notifications
+    dropped: int = 0  # rows
+    round_trip_ns: int | None = None
+
+
+@dataclass(slots=True)
+class Robot:
+    """The newest facts of one robot, for one thread; `apply` is the only writer.
+
+    Values are those of the last row. They stay when the link drops, and `age_s` says how old they are: a
+    view shows nothing as live when `is_stale`. `history` holds the latest rows of each channel, at most
+    `HISTORY_ROWS`.
+    """
+
+    link: LinkStatus = field(default_factory=LinkStatus)
+    description: Description | None = None
+    values: dict[str, float | None] = field(default_factory=dict)
+    history: dict[str, collections.deque[float | None]] = field(default_factory=dict)
+    parts: dict[str, Part] = field(default_factory=dict)
+    parameters: dict[str, ParameterValue] = field(default_factory=dict)
+    parameters_at_ns: int | None = None
+    resources: ResourceSnapshot | None = None
+    resources_at_ns: int | None = None
+    last_change: Changed | None = None
+    last_stop: StopAnswered | Failed | None = None
+    last_failure: Failed | None = None
+    _newest_ns: int | None = None  # when the newest row was taken, on our clock
+    _arrivals: collections.deque[tuple[int, int]] = field(
+        default_factory=lambda: collections.deque(maxlen=4096)
+    )
+    _dropped_seen: int = 0
+    _words: dict[str, dict[str, str]] = field(default_factory=dict)
+
+    def apply(self, event: Event) -> None:
+        """Take one fact."""
+        match event:
+            case Telemetry():
+                self._telemetry(event)
+            case Looked():
+                self._looked(event)
+            case Resources():
+                self.resources, self.resources_at_ns = event.snapshot, event.at_ns
+                self.link.round_trip_ns = event.round_trip_ns
+            case LinkChanged():
+                self._link_changed(event)
+            case Described():
+                self._described(event)
+            case Changed():
+                self.last_change, self.last_failure = event, None
+            case StopAnswered():
+                self.last_stop = event
+            case Failed(what=what) if what == STOP:
+                self.last_stop = event
+            case Failed():
+                self.last_failure = event
+
+    # --- what views ask
+
+    def age_s(self, now_ns: int | None = None) -> float | None:
+        """Seconds since the newest row was taken; None before the first."""
+        if self._newest_ns is None:
+            return None
+        return max(0, (time.monotonic_ns() if now_ns is None else now_ns) - self._newest_ns) / 1e9
+
+    def is_stale(self, now_ns: int | None = None) -> bool:
+        """Whether the values are too old to be called live."""
+        age_s = self.age_s(now_ns)
+        return age_s is None or age_s * 1e9 > STALE_NS
+
+    def rate_hz(self, now_ns: int | None = None) -> float:
+        """Rows a second over the last two seconds."""
+        now_ns = time.monotonic_ns() if now_ns is None else now_ns
+        recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
+        return recent / (RATE_WINDOW_NS / 1e9)
+
+    def names(self, kind: str) -> list[str]:
+        """The components of one kind, in the robot's order."""
+        return [part.name for part in self.parts.values() if part.kind == kind]
+
+    def not_ok(self) -> list[Part]:
+        """The components whose values cannot be trusted now."""
+        return [part for part in self.parts.values() if part.state != "ok"]
+
+    def word(self, channel: str) -> str | None:
+        """A state's word, None where there is none."""
+        value = self.values.get(channel)
+        words = self._words.get(channel)
+        if value is None or words is None:
+            return None
+        return words.get(str(int(value)), str(int(value)))
+
+    # --- what events do
+
+    def _link_changed(self, event: LinkChanged) -> None:
+        link = self.link
+        link.links += event.state is ConnectionState.CONNECTED
+        link.state, link.problem, link.since_ns = event.state, event.problem, event.at_ns
+
+    def _described(self, event: Described) -> None:
+        self.description = event.description
+        self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
+        self.parts = {
+            part.name: Part(part.name, part.kind, part.state, None, part.problem)
+            for part in event.description.components
+        }
+
+    def _telemetry(self, event: Telemetry) -> None:
+        batch = event.batch
+        rows = len(batch.stamps_ns)
+        if not rows:
+            return
+        for name, column in batch.columns.items():
+            self.values[name] = column[-1]
+            self.history.setdefault(name, collections.deque(maxlen=HISTORY_ROWS)).extend(column)
+        self._newest_ns = batch.received_ns - (event.age_ns or 0)
+        self._arrivals.append((batch.received_ns, rows))
+        self.link.missed += batch.missed
+        self.link.dropped += max(0, batch.dropped - self._dropped_seen)
+        self._dropped_seen = batch.dropped
+
+    def _looked(self, event: Looked) -> None:
+        for name, found in event.quality.quality.items():
+            if name in self.parts:
+                self.parts[name] = _part(self.parts[name], found)
+        if event.parameters is not None:
+            self.parameters = event.parameters.values
+            self.parameters_at_ns = event.at_ns
+
+
+def _part(known: Part, found: QualityInfo) -> Part:
+    age_ms = found.get("age_ms")
+    problem = found.get("problem")
+    return Part(
+        known.name,
+        known.kind,
+        str(found.get("state", "unknown")),
+        age_ms if isinstance(age_ms, int | float) else None,
+        None if problem is None else str(problem),
+    )

@@ -1,0 +1,81 @@
+"""Turns what a robot's state does into news: links, components, drive states, error codes."""
+
+from collections.abc import Callable
+from typing import Final
+
+from gateway.client import ConnectionState
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.robot import Robot
+
+Tell = Callable[[NewsKind, str], None]
+
+LINK_WORDS: Final = {
+    ConnectionState.CONNECTED: "connected",
+    ConnectionState.WAITING: "no link",
+    ConnectionState.CLOSED: "closed",
+}
+
+
+class Watch:
+    """Compares a robot with how it was at the last look; says each change once."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell = tell
+        self._link: ConnectionState | None = None
+        self._parts: dict[str, str] = {}
+        self._drives: dict[str, str] = {}
+        self._errors: dict[str, float] = {}
+        self._failure: object = None
+
+    def look(self, robot: Robot) -> None:
+        """Tell what has changed."""
+        self._look_at_link(robot)
+        self._look_at_parts(robot)
+        if not robot.is_stale():
+            self._look_at_drives(robot)
+        if robot.last_failure is not self._failure:
+            self._failure = robot.last_failure
+            if robot.last_failure is not None:
+                self._tell(NewsKind.WARNING, f"{robot.last_failure.what}: {robot.last_failure.reason}")
+
+    def _look_at_link(self, robot: Robot) -> None:
+        state = robot.link.state
+        if state is self._link or state not in LINK_WORDS:
+            return
+        self._link = state
+        why = f": {robot.link.problem}" if robot.link.problem else ""
+        kind = NewsKind.STATE if state is ConnectionState.CONNECTED else NewsKind.LINK
+        self._tell(kind, f"{LINK_WORDS[state]}{why}")
+
+    def _look_at_parts(self, robot: Robot) -> None:
+        for part in robot.parts.values():
+            before = self._parts.get(part.name, "ok")
+            if part.state != before:
+                why = f": {part.problem}" if part.problem else ""
+                kind = {"ok": NewsKind.STATE, "fault": NewsKind.FAULT}.get(part.state, NewsKind.WARNING)
+                self._tell(kind, f"{part.name} {part.state}{why}")
+            self._parts[part.name] = part.state
+
+    def _look_at_drives(self, robot: Robot) -> None:
+        changed: dict[tuple[str, str], list[str]] = {}
+        for joint in robot.names("joint"):
+            word = robot.word(f"{joint}.state")
+            before = self._drives.get(joint)
+            if word is None or word == before:
+                continue
+            self._drives[joint] = word
+            if before is not None:
+                changed.setdefault((before, word), []).append(joint)
+        for (before, word), joints in changed.items():
+            kind = NewsKind.FAULT if "fault" in word else NewsKind.STATE
+            self._tell(kind, f"{', '.join(joints)}: {before} → {word}")
+        self._look_at_errors(robot)
+
+    def _look_at_errors(self, robot: Robot) -> None:
+        for joint in robot.names("joint"):
+            code = robot.values.get(f"{joint}.error_code")
+            if code is None or code == self._errors.get(joint, 0.0):
+                continue
+            self._errors[joint] = code
+            if code:
+                self._tell(NewsKind.FAULT, f"{joint}: error code 0x{int(code):04X}")

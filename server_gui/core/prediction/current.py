@@ -1,0 +1,112 @@
+"""What models say of one robot, as the window shows it: the newest of each task, and the rules that hold."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from ml.serving.predictor import Prediction
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled, Serves
+from server_gui.core.settings.prediction import RuleSettings
+
+STALE_S: Final = 2.0  # what is older is no longer so
+NOT_YET: Final = "models are looked for"
+OFF: Final = "prediction is off: write enabled = true into [prediction] of the server's file"
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """The newest prediction of a task, and when it came."""
+
+    predicted: Predicted
+    came_ns: int  # our monotonic clock
+
+    @property
+    def prediction(self) -> Prediction:
+        """What the model says."""
+        return self.predicted.prediction
+
+    def age_s(self, now_ns: int | None = None) -> float:
+        """Seconds since the newest sample that it is about."""
+        waited_ns = (time.monotonic_ns() if now_ns is None else now_ns) - self.came_ns
+        return max(0, waited_ns + (self.predicted.took_ns or 0)) / 1e9
+
+    def is_stale(self, now_ns: int | None = None) -> bool:
+        """Whether it is too old to be called live."""
+        return self.age_s(now_ns) > STALE_S
+
+
+@dataclass(frozen=True, slots=True)
+class Recalled:
+    """What a model said when a recording was made, so long before the instant of it that is shown."""
+
+    prediction: Prediction
+    old_s: float
+
+    def age_s(self) -> float:
+        """Seconds since the newest sample that it is about."""
+        return self.old_s
+
+    def is_stale(self) -> bool:
+        """Whether it was too old to be called live then."""
+        return self.old_s > STALE_S
+
+
+Told = Shown | Recalled
+
+
+@dataclass(slots=True)
+class StationPredictions:
+    """For one thread; `take` and `clear` are the only writers, and `revision` rises with each.
+
+    `why` says of each task without a model, or without the newest one, why that is so and what to do.
+    `recalled` belongs to who plays a recording; of a robot there is nothing in it.
+    """
+
+    by_task: dict[str, Shown] = field(default_factory=dict)
+    recalled: dict[str, Recalled] = field(default_factory=dict)
+    why: dict[str, str] = field(default_factory=dict)
+    off: bool = False
+    revision: int = 0
+    _rules: dict[RuleSettings, Ruled] = field(default_factory=dict)
+    _looked: bool = False
+
+    @property
+    def problem(self) -> str:
+        """Why nothing is predicted, as a sentence; empty while a model serves."""
+        if self.off:
+            return OFF
+        if self.told:
+            return ""
+        return "; ".join(self.why.values()) if self._looked else NOT_YET
+
+    @property
+    def told(self) -> Mapping[str, Told]:
+        """What is shown of each task: of a robot what is said live, of a recording what was said then."""
+        return {**self.by_task, **self.recalled}
+
+    @property
+    def rules(self) -> tuple[Ruled, ...]:
+        """Those that hold now, the newest last."""
+        return tuple(self._rules.values())
+
+    def take(self, news: Foreseen) -> None:
+        """Take one fact."""
+        self.revision += 1
+        match news:
+            case Predicted():
+                self.by_task[news.prediction.task] = Shown(news, time.monotonic_ns())
+            case Ruled(began=True):
+                self._rules[news.rule] = news
+            case Ruled():
+                self._rules.pop(news.rule, None)
+            case Serves():
+                self.why, self._looked = dict(news.why), True
+                for task in self.by_task.keys() - news.models.keys():
+                    del self.by_task[task]
+
+    def clear(self) -> None:
+        """The link has dropped, or the robot has booted: nothing is known of it now."""
+        self.revision += 1
+        self.by_task.clear()
+        self._rules.clear()

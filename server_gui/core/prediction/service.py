@@ -1,0 +1,202 @@
+"""A thread that predicts the status of every robot, of all together; nobody ever waits for it."""
+
+import collections
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final, Self, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from ml.robot.task import TASKS
+from ml.serving.predictor import judged
+from server_gui.core.follow.events import Event
+from server_gui.core.prediction.inbox import Inbox
+from server_gui.core.prediction.model_loading import Model, Serving
+from server_gui.core.prediction.news import Foreseen, Predicted, Ruled
+from server_gui.core.prediction.robot_predictor import Following, Watched
+from server_gui.core.prediction.state import PredictingState, TaskReport
+from server_gui.core.prediction.track_record_updates import Tracking
+from server_gui.core.settings.prediction import Action
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.core.threads.supervision import BEAT_S, Worker
+
+log = logging.getLogger(__name__)
+
+Thing = TypeVar("Thing")
+
+STILL_S: Final = 1.0  # what is due of one model, and the rows of all robots, take less
+BROKEN: Final = "it cannot be used: internal error, "
+
+
+class Predicting:
+    """Predicts from entering to leaving; use it as a context manager, which joins its threads.
+
+    `take` gets everything that the robots' feeds tell. `tell` gets the news, and before that `stop` what asks
+    for a stop: both are called in the thread that predicts, and must return at once. Without `stop` a rule
+    only says that it would.
+    """
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        tell: Callable[[Sequence[Foreseen]], None],
+        stop: Callable[[Ruled], None] | None = None,
+    ) -> None:
+        self._settings = settings
+        self._tell = tell
+        self._stop = stop
+        self._serving = Serving(settings.store.url, settings.prediction.poll_s)
+        self._tracking = Tracking(settings.store.url, lambda: {robot for robot, _ in self._serving.models})
+        self._inbox = Inbox()
+        self._robots: dict[str, Following] = {}
+        self._broken: dict[str, str] = {}  # models, and why
+        self._judged = 0
+        self._skipped = 0
+        self._worker = Worker("prediction", self._run, STILL_S)
+
+    def __enter__(self) -> Self:
+        self._serving.__enter__()
+        self._tracking.__enter__()
+        self._worker.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._inbox.close()
+        self._worker.join()
+        self._tracking.__exit__(*exc)
+        self._serving.__exit__(*exc)
+
+    @property
+    def workers(self) -> tuple[Worker, ...]:
+        """Its threads, to be watched over."""
+        return self._worker, self._serving.worker, self._tracking.worker
+
+    def take(self, robot: str, event: Event) -> None:
+        """Take what a robot's feed tells; from any thread, returns at once."""
+        self._inbox.put(robot, event)
+
+    @property
+    def models(self) -> Mapping[tuple[str, str], Model]:
+        """What serves, by robot and task; from any thread."""
+        return self._serving.models
+
+    @property
+    def state(self) -> PredictingState:
+        """How it goes now; from any thread."""
+        problems = [one for one in (self._serving.problem, self._tracking.problem) if one is not None]
+        problems += [f"{robot}: {task}: {why}" for (robot, task), why in self._serving.problems.items()]
+        robots = {robot: _reports(known) for robot, known in self._robots.copy().items()}
+        return PredictingState(
+            robots,
+            (*problems, *self._broken.copy().values()),
+            self._tracking.figures,
+            self._judged,
+            self._skipped + self._inbox.lost,
+        )
+
+    # --- the thread that predicts
+
+    def _run(self) -> None:
+        with threadpool_limits(limits=1):  # small batches gain nothing from more, and the cores are others'
+            while (taken := self._inbox.take(BEAT_S)) is not None:
+                self._worker.beat()
+                try:
+                    self._turn(taken)
+                except Exception:
+                    log.exception("internal error; prediction goes on")
+
+    def _turn(self, taken: "Mapping[str, collections.deque[Event]]") -> None:
+        for robot, events in taken.items():
+            self._follow(robot, events)
+        for model, due in self._due():
+            self._worker.beat()
+            news = self._judge(model, due)
+            for one in news:
+                if self._stop and isinstance(one, Ruled) and one.began and one.rule.action is Action.STOP:
+                    self._stop(one)
+            if news:
+                self._tell(news)
+
+    def _follow(self, robot: str, events: "collections.deque[Event]") -> None:
+        known = self._robots.get(robot)
+        if known is None:
+            known = Following(robot, self._settings.prediction, self._settings.rules)
+            self._robots[robot] = known
+        self._serve(known)
+        try:
+            known.take(events)
+        except Exception:  # what a robot sends wrongly disturbs no other
+            log.exception("%s sent what nothing can be predicted from; begun anew", robot)
+            known.restart()
+        if known.units:
+            self._serving.robot(robot, known.units)
+
+    def _serve(self, robot: Following) -> None:
+        """Give a robot the models that serve it now, but for those that broke."""
+        models, why = _of(robot.robot, self._serving.models), _of(robot.robot, self._serving.why)
+        broken = {
+            task: self._broken[model.card.id]
+            for task, model in models.items()
+            if model.card.id in self._broken
+        }
+        whole = {task: model for task, model in models.items() if task not in broken}
+        news = robot.serve(whole, why | broken)
+        if news is not None:
+            self._tracking.wake()
+        if news is not None and (whole or news.why):
+            self._tell([news])
+
+    def _due(self) -> Iterator[tuple[Model, list[tuple[Following, Watched]]]]:
+        """What is due, by model: robots that have the same one are judged together."""
+        found: dict[str, tuple[Model, list[tuple[Following, Watched]]]] = {}
+        for robot in self._robots.values():
+            for watched in robot.tasks.values():
+                if watched.due:
+                    self._skipped += watched.skip_late()
+                    model = watched.model
+                    found.setdefault(model.card.id, (model, []))[1].append((robot, watched))
+        yield from found.values()
+
+    def _judge(self, model: Model, due: Sequence[tuple[Following, Watched]]) -> list[Foreseen]:
+        """What a model says of everything that is due; a model that breaks ends nothing but itself."""
+        windows = [window for _, watched in due for window in watched.due]
+        try:
+            predictions = iter(judged(model.card.id, model.learned, windows))
+        except Exception as error:
+            log.exception("the model %s breaks; it serves no more", model.card.id)
+            self._broken[model.card.id] = f"{model.card.id}: {BROKEN}{type(error).__name__}"
+            return []
+        news: list[Foreseen] = []
+        for robot, watched in due:
+            own = [next(predictions) for _ in watched.due]
+            quality = self._tracking.quality(robot.robot, model.card)
+            news += watched.predicted(robot.robot, robot.clock, quality, own)
+        self._judged += len(windows)
+        return news
+
+
+def _of(robot: str, found: Mapping[tuple[str, str], Thing]) -> dict[str, Thing]:
+    """What is of this robot, by task."""
+    return {task: found[robot, task] for task in TASKS if (robot, task) in found}
+
+
+def _reports(robot: Following) -> dict[str, TaskReport]:
+    newest = {task: watched.newest for task, watched in robot.tasks.copy().items()}
+    return {task: _report(known) for task, known in newest.items() if known is not None}
+
+
+def _report(known: Predicted) -> TaskReport:
+    prediction, trust = known.prediction, known.trust
+    return TaskReport(
+        prediction.model,
+        known.card.made,
+        prediction.label,
+        prediction.probability,
+        known.utc_ns / 1e9,
+        None if known.took_ns is None else known.took_ns / 1e9,
+        trust.level.value,
+        trust.novelty,
+        trust.abnormal,
+        trust.unknown,
+        trust.drifted,
+    )

@@ -1,0 +1,1 @@
+"""The server's file, `server.toml`: read, checked, and edited line by line."""

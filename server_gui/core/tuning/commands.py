@@ -1,0 +1,47 @@
+"""What a window can ask of one robot; tests bring their own."""
+
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import Protocol
+
+from gateway.wire.messages import Confirmed, Lease, Reset, Reverted, Stopped, Stored, Written
+
+
+class Commands(Protocol):
+    """Every call returns at once; its future is done in the network's thread, or fails with `ClientError`."""
+
+    def stop(self, reason: str) -> "Future[Stopped]":
+        """Quick stop on every drive; needs nothing and waits for nothing."""
+        ...
+
+    def take_control(self) -> "Future[Lease]":
+        """Become the one writer, or stay it."""
+        ...
+
+    def release_control(self) -> "Future[None]":
+        """Let others write; what is on trial goes back."""
+        ...
+
+    def write(self, changes: Mapping[str, float], trial_s: float | None) -> "Future[Written]":
+        """One transaction, read back; takes control first."""
+        ...
+
+    def confirm(self, write: int) -> "Future[Confirmed]":
+        """Keep what is on trial."""
+        ...
+
+    def revert(self, write: int) -> "Future[Reverted]":
+        """Take back what is on trial."""
+        ...
+
+    def store(self, component: str) -> "Future[Stored]":
+        """Make a device keep its parameters over a reset; takes control first."""
+        ...
+
+    def reset(self) -> "Future[Reset]":
+        """End a held stop; takes control first. Enables nothing."""
+        ...
+
+    def show_processes(self, wanted: bool) -> None:
+        """Ask for the process table from now on, or no more."""
+        ...

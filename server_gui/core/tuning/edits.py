@@ -1,0 +1,110 @@
+"""Edits that are staged and not sent: the difference to the robot, exactly as it would be written."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gateway.wire.messages import Number, ParameterInfo, ParameterValue
+from server_gui.core.processing.units import Unit, Units
+
+Values = Mapping[str, ParameterValue]
+
+
+@dataclass(frozen=True, slots=True)
+class Staged:
+    """A value to be written, and what the robot held when it was typed; both SI, every digit kept."""
+
+    value: float
+    base: Number | None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One line of a review: what is there now, and what would be written."""
+
+    name: str
+    unit: Unit
+    old: Number | None
+    new: float
+    elsewhere: bool  # somebody else has changed it since this edit was begun
+    problem: str | None = None  # why the robot would refuse it
+
+
+@dataclass(slots=True)
+class Edits:
+    """The staged edits of one robot; `revision` rises with every change."""
+
+    staged: dict[str, Staged] = field(default_factory=dict)
+    revision: int = 0
+
+    def stage(self, name: str, value: float, held: ParameterValue | None) -> None:
+        """Stage a value; what the robot holds anyway is no edit."""
+        self.revision += 1
+        current = None if held is None else held.value
+        if current is not None and value == current:
+            self.staged.pop(name, None)
+            return
+        known = self.staged.get(name)
+        self.staged[name] = Staged(value, current if known is None else known.base)
+
+    def drop(self, *names: str) -> None:
+        """Forget edits; without names, all of them."""
+        self.revision += 1
+        for name in names or tuple(self.staged):
+            self.staged.pop(name, None)
+
+    def rebase(self, names: Values) -> None:
+        """What is seen now is agreed to be written over."""
+        self.revision += 1
+        for name, staged in self.staged.items():
+            if name in names:
+                self.staged[name] = Staged(staged.value, names[name].value)
+
+    def vanished(self, known: Mapping[str, ParameterInfo]) -> list[str]:
+        """Drop edits of parameters that the robot no longer has, or no longer lets write; their names."""
+        gone = [name for name in self.staged if name not in known or known[name].read_only is not None]
+        if gone:
+            self.drop(*gone)
+        return gone
+
+    def difference(
+        self, held: Values, known: Mapping[str, ParameterInfo], units: Units
+    ) -> tuple[Change, ...]:
+        """What would be written, and nothing else, in the robot's order of parameters."""
+        order = {name: place for place, name in enumerate(known)}
+        names = sorted(self.staged, key=lambda name: order.get(name, len(order)))
+        changes = (self._change(name, held.get(name), known.get(name), units) for name in names)
+        return tuple(change for change in changes if change.old is None or change.old != change.new)
+
+    def _change(
+        self, name: str, held: ParameterValue | None, info: ParameterInfo | None, units: Units
+    ) -> Change:
+        staged = self.staged[name]
+        old = None if held is None else held.value
+        unit = unit_of(name, "" if info is None else info.unit, units)
+        return Change(
+            name=name,
+            unit=unit,
+            old=old,
+            new=staged.value,
+            elsewhere=old != staged.base,
+            problem=refusal(staged.value, old, info, unit),
+        )
+
+
+def unit_of(name: str, si: str, units: Units) -> Unit:
+    """The unit that a parameter `component.quantity` is shown in."""
+    return units.unit(name.partition(".")[2], si)
+
+
+def refusal(value: float, old: Number | None, info: ParameterInfo | None, unit: Unit) -> str | None:
+    """Why a robot would refuse this value (SI), in words and `unit`; None where nothing speaks against it."""
+    if info is None:
+        return "the robot has no such parameter any more"
+    if info.min is not None and value < info.min:
+        return f"below the smallest allowed, {unit.editable(info.min)} {unit.symbol}"
+    if info.max is not None and value > info.max:
+        return f"above the largest allowed, {unit.editable(info.max)} {unit.symbol}"
+    if info.max_step is not None and old is not None and abs(value - old) > info.max_step * (1 + 1e-9):
+        step = f"{unit.editable(info.max_step)} {unit.symbol}"
+        return f"further than one write may go, {step}: take two steps"
+    return None

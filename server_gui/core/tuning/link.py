@@ -1,0 +1,121 @@
+"""Commands to one robot over a link of its own: no telemetry is ever before a STOP."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import Final
+
+from gateway.client import Address, Client, ClientError, ConnectionState, LinkSettings
+from gateway.wire.messages import (
+    Confirmed,
+    Lease,
+    Reset,
+    ResourceSnapshotParams,
+    Reverted,
+    Stopped,
+    Stored,
+    Written,
+)
+from server_gui.core.follow.events import Costs, Failed, Resources
+from server_gui.core.follow.feed import Tell
+from server_gui.core.follow.network import Network
+from server_gui.core.follow.validation import Arriving
+
+LEASE_S: Final = 300.0  # the longest that a robot gives; every write begins it anew
+PROCESSES_S: Final = 1.0  # between looks at the process table, while it is shown
+PROCESSES: Final = ResourceSnapshotParams(include=["disk", "network", "thermal"])
+
+
+class Link:
+    """One robot's commands; `run` keeps the link until it is cancelled. Implements `Commands`.
+
+    `tell` gets the process table, and what monitoring costs, while that is wanted; `dropped` is called when
+    the link has gone, and with it the lease: both in the network's thread.
+    """
+
+    def __init__(self, network: Network, address: Address, tell: Tell, dropped: Callable[[], None]) -> None:
+        self._network = network
+        self._tell = tell
+        self._dropped = dropped
+        self._client = Client(address, LinkSettings(client="gwrms gui"), self._state_changed)
+        self._arriving = Arriving()
+        self._processes_wanted = asyncio.Event()
+
+    async def run(self) -> None:
+        """Hold the link, and ask for processes while they are wanted."""
+        self._client.link.start()
+        try:
+            while True:
+                await self._processes_wanted.wait()
+                await self._look()
+                await asyncio.sleep(PROCESSES_S)
+        finally:
+            await self._client.close()
+
+    # --- Commands
+
+    def stop(self, reason: str) -> "Future[Stopped]":
+        return self._network.run(self._client.stop(reason))
+
+    def take_control(self) -> "Future[Lease]":
+        return self._network.run(self._client.acquire(LEASE_S))
+
+    def release_control(self) -> "Future[None]":
+        return self._network.run(self._client.release())
+
+    def write(self, changes: Mapping[str, float], trial_s: float | None) -> "Future[Written]":
+        return self._network.run(self._write(changes, trial_s))
+
+    def confirm(self, write: int) -> "Future[Confirmed]":
+        return self._network.run(self._client.confirm(write))
+
+    def revert(self, write: int) -> "Future[Reverted]":
+        return self._network.run(self._client.revert(write))
+
+    def store(self, component: str) -> "Future[Stored]":
+        return self._network.run(self._store(component))
+
+    def reset(self) -> "Future[Reset]":
+        return self._network.run(self._reset())
+
+    def show_processes(self, wanted: bool) -> None:
+        self._network.run(self._show_processes(wanted))
+
+    # --- in the network's thread
+
+    async def _write(self, changes: Mapping[str, float], trial_s: float | None) -> Written:
+        await self._client.acquire(LEASE_S)
+        return await self._client.write(changes, trial_s)
+
+    async def _store(self, component: str) -> Stored:
+        await self._client.acquire(LEASE_S)
+        return await self._client.store(component)
+
+    async def _reset(self) -> Reset:
+        await self._client.acquire(LEASE_S)
+        return await self._client.reset()
+
+    async def _show_processes(self, wanted: bool) -> None:
+        if wanted:
+            self._processes_wanted.set()
+        else:
+            self._processes_wanted.clear()
+
+    async def _look(self) -> None:
+        try:
+            snapshot = await self._client.resources(PROCESSES)
+            found = Resources(snapshot, self._client.link.clock.round_trip_ns, time.monotonic_ns())
+            self._arriving.check(found)
+        except ClientError as error:
+            if self._client.link.state is ConnectionState.CONNECTED:
+                self._tell(Failed("the process table", str(error)))
+            return
+        self._tell(found)
+        with contextlib.suppress(ClientError):  # an older gateway does not know it
+            self._tell(Costs(await self._client.cost()))
+
+    def _state_changed(self, state: ConnectionState) -> None:
+        if state in (ConnectionState.WAITING, ConnectionState.CLOSED):
+            self._dropped()

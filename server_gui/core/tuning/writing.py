@@ -1,0 +1,122 @@
+"""Writes under way, what came of them, trials that count down, and what undo would write."""
+
+import collections
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final
+
+from gateway.client import NotConnected, RemoteError
+from gateway.wire.messages import Number, Written
+from server_gui.core.tuning.edits import Change
+
+UNDO: Final = 100  # writes that can be taken back one after another
+UNSURE: Final = (
+    "device_timeout",
+    "mismatch",
+    "rollback_failed",
+)  # refusals after which a device may hold anything
+OUTCOMES: Final = "outcome"  # what a refusal says became of each parameter
+
+
+class WriteState(Enum):
+    """Where the latest write stands."""
+
+    IDLE = "nothing was written"
+    WRITING = "writing"
+    DONE = "written and read back"
+    FAILED = "not written"
+    NOT_STORED = "not stored"
+    UNKNOWN = "NOT KNOWN"  # the link or the answer was lost: it may have been written
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A write that the robot takes back by itself at `until_ns` (our monotonic clock)."""
+
+    write: int
+    values: Mapping[str, Number]
+    before: Mapping[str, Number]
+    until_ns: int
+
+    def left_s(self, now_ns: int | None = None) -> float:
+        """Seconds until it reverts, never below 0."""
+        return max(0, self.until_ns - (time.monotonic_ns() if now_ns is None else now_ns)) / 1e9
+
+
+@dataclass(slots=True)
+class Writing:
+    """One robot's writes; `rows` says of each parameter what came of the latest write to it."""
+
+    state: WriteState = WriteState.IDLE
+    text: str = ""
+    rows: dict[str, str] = field(default_factory=dict)
+    trial: Trial | None = None
+    undo: collections.deque[Mapping[str, Number]] = field(
+        default_factory=lambda: collections.deque(maxlen=UNDO)
+    )
+    revision: int = 0
+
+    def began(self, changes: tuple[Change, ...]) -> None:
+        """These were sent."""
+        self._set(WriteState.WRITING, f"writing {_count(len(changes))} …")
+        for change in changes:
+            self.rows.pop(change.name, None)
+
+    def done(self, written: Written) -> None:
+        """The robot has written and read back."""
+        if written.trial_s is None:
+            self.undo.append(written.before)
+            self._set(WriteState.DONE, f"{_count(len(written.after))} written and read back")
+        else:
+            until_ns = time.monotonic_ns() + round(written.trial_s * 1e9)
+            self.trial = Trial(written.write, written.after, written.before, until_ns)
+            self._set(WriteState.DONE, "on trial: read back, and in force until it is taken back")
+
+    def storing(self, component: str) -> None:
+        """A device was asked to store."""
+        self._set(WriteState.WRITING, f"{component} is storing to its flash …")
+
+    def failed(self, changes: tuple[Change, ...], error: Exception) -> None:
+        """It was refused or rolled back, or nobody knows; what is known of a row stands on it."""
+        self._refused(WriteState.FAILED, error)
+        said = error.data.get(OUTCOMES) if isinstance(error, RemoteError) else None
+        for change in changes:
+            told = said.get(change.name) if isinstance(said, Mapping) else None
+            self.rows[change.name] = str(told) if told is not None else str(error)
+
+    def not_stored(self, error: Exception) -> None:
+        """A device was not asked to store, or has refused, or nobody knows."""
+        self._refused(WriteState.NOT_STORED, error)
+
+    def kept(self) -> None:
+        """What was on trial stays."""
+        if self.trial is not None:
+            self.undo.append(self.trial.before)
+            self._end_trial("kept: the trial's values stay")
+
+    def reverted(self, how: str) -> None:
+        """What was on trial has gone back."""
+        self._end_trial(how)
+
+    def say(self, state: WriteState, text: str) -> None:
+        """What else is to be told."""
+        self._set(state, text)
+
+    def _refused(self, state: WriteState, error: Exception) -> None:
+        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
+        nothing_done = refused or isinstance(error, NotConnected)
+        self._set(state if nothing_done else WriteState.UNKNOWN, str(error))
+
+    def _end_trial(self, text: str) -> None:
+        self.trial = None
+        self._set(WriteState.DONE, text)
+
+    def _set(self, state: WriteState, text: str) -> None:
+        self.state, self.text = state, text
+        self.revision += 1
+
+
+def _count(number: int) -> str:
+    return f"{number} parameter" if number == 1 else f"{number} parameters"

@@ -1,0 +1,1 @@
+"""Processes that the desk starts and ends: the simulated robot, its gateway, a collector."""

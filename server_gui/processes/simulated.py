@@ -1,0 +1,55 @@
+"""A simulated robot on this computer: simulator and gateway as processes that end together."""
+
+import contextlib
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from gateway.client import Address
+from server_gui.processes.children import Child
+
+START_S: Final = 60.0  # for a simulator or a gateway to become ready, on a slow machine
+
+
+@contextlib.contextmanager
+def simulated_robot(
+    folder: Path, scenario: str, give_up: Callable[[], None]
+) -> Iterator[tuple[Address, Callable[[], None]]]:
+    """Where its gateway listens, and how to check that all is well; `give_up` may raise while it starts.
+
+    Raises:
+        ChildFailed: simulator or gateway ended, or never became ready.
+
+    """
+    with Child("simulator", ["sim", "--dir", str(folder), "--scenario", scenario]) as simulator:
+        config = simulator.wait_ready(_config_in, START_S, give_up)
+
+        def check_simulator() -> None:
+            give_up()
+            simulator.check()
+
+        with Child("gateway", ["gateway", config, "--port", "0"]) as gateway:
+            address = gateway.wait_ready(_address_in, START_S, check_simulator)
+
+            def check() -> None:
+                check_simulator()
+                gateway.check()
+
+            yield address, check
+
+
+def _config_in(line: str) -> str | None:
+    """The simulator says `{"ready": true, "config": …}`."""
+    try:
+        said = json.loads(line)
+    except ValueError:
+        return None
+    return str(said["config"]) if isinstance(said, dict) and said.get("ready") else None
+
+
+def _address_in(line: str) -> Address | None:
+    """The gateway says `listening on HOST:PORT`."""
+    said = re.fullmatch(r"listening on (\S+)", line.strip())
+    return Address.parse(said[1]) if said else None
