@@ -105,9 +105,11 @@ def _unit(world: World, s: int, r: int, unit: int) -> None:
     with world.alive(SERVERS[s]) as server:
         robot = server.robots[ROBOTS[r]]
         robot.unit = UNITS[unit]
-        for each in world.servers.values():
-            for name in [name for name, known in each.robots.items() if known is robot and each.runs]:
-                each.link(name)
+    for other, each in world.servers.items():
+        if names := [name for name, known in each.robots.items() if known is robot and each.runs]:
+            with world.alive(other):  # by its own clock
+                for name in names:
+                    each.link(name)
 
 
 def _rename(world: World, s: int, r: int, other: int) -> None:

@@ -32,12 +32,10 @@ def data_of(line: Line) -> dict[str, Any]:
 
 def is_of_a_batch(line: Line, server: Server) -> bool:
     """Whether an event tells that a batch of this server is lost as a whole."""
-    spool, _, name = line["spool"].rpartition("/")
-    return (
-        line["kind"] == EventKind.LOST.value
-        and name == "lost"
-        and spool.partition("/")[0] == identity(server)
-    )
+    spool, _, name = str(line["spool"]).rpartition("/")
+    if line["kind"] != EventKind.LOST.value or name != "lost":
+        return False
+    return spool.partition("/")[0] == identity(server)
 
 
 def spoilt(world: World, server: Server, there: There, blamed: Collection[int]) -> None:
