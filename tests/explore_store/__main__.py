@@ -57,7 +57,7 @@ def _search(seconds: float, seed: int, words: list[str], saying: str) -> int:
     _say(
         f"{found.plays} plays of {found.steps} steps, {found.points} points where a program might have ended"
         + (
-            f"; {found.known} plays ended in what is not mended yet (KNOWN in searching.py)"
+            f"; {found.known} plays had in them what is not mended yet (KNOWN in searching.py)"
             if found.known
             else ""
         )
@@ -81,7 +81,7 @@ def _replay(text: str) -> int:
         return 2
     try:
         with S3() as s3:
-            points = played(script, s3)
+            points = played(script, s3).disk.points
     except Exception as error:  # noqa: BLE001 - that is what it is for
         _say(told(error))
         return 1

@@ -1,6 +1,6 @@
 """What somebody may do to a store whose rows are all there: `gwrms cloud verify` must find each."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from pathlib import Path
 from typing import Final
 
@@ -13,43 +13,45 @@ from server_gui.core.recording.receipts import RECEIPTS, Receipt, Receipts
 from tests.explore_store.robots import COUNT
 
 
-def _removed(table: DeltaTable, folder: Path) -> None:
+def _removed(table: DeltaTable, folder: Path, number: int) -> None:
     _files(table, folder)[0].unlink()
 
 
-def _cut_off(table: DeltaTable, folder: Path) -> None:
+def _cut_off(table: DeltaTable, folder: Path, number: int) -> None:
     file = _files(table, folder)[-1]
     file.write_bytes(file.read_bytes()[:-10])
 
 
-def _emptied(table: DeltaTable, folder: Path) -> None:
+def _emptied(table: DeltaTable, folder: Path, number: int) -> None:
     _files(table, folder)[0].write_bytes(b"")
 
 
-def _row_gone(table: DeltaTable, folder: Path) -> None:
-    table.delete(f'"{COUNT}" = {_count(table)}')
+def _row_gone(table: DeltaTable, folder: Path, number: int) -> None:
+    table.delete(f'"{COUNT}" = {number}')
 
 
-def _row_altered(table: DeltaTable, folder: Path) -> None:
-    table.update(updates={f'"{COUNT}"': f'"{COUNT}" + 0.5'}, predicate=f'"{COUNT}" = {_count(table)}')
+def _row_altered(table: DeltaTable, folder: Path, number: int) -> None:
+    table.update(updates={f'"{COUNT}"': f'"{COUNT}" + 0.5'}, predicate=f'"{COUNT}" = {number}')
 
 
-def _row_renamed(table: DeltaTable, folder: Path) -> None:
-    table.update(updates={"stamp_ns": "stamp_ns + 1"}, predicate=f'"{COUNT}" = {_count(table)}')
+def _row_renamed(table: DeltaTable, folder: Path, number: int) -> None:
+    table.update(updates={"stamp_ns": "stamp_ns + 1"}, predicate=f'"{COUNT}" = {number}')
 
 
-def _doubled(table: DeltaTable, folder: Path) -> None:
-    write_deltalake(table, table.to_pyarrow_table().slice(0, 1), mode="append")
+def _doubled(table: DeltaTable, folder: Path, number: int) -> None:
+    rows = table.to_pyarrow_table()
+    place = rows[COUNT].to_pylist().index(number)
+    write_deltalake(table, rows.slice(place, 1), mode="append")
 
 
-def _rolled_back(table: DeltaTable, folder: Path) -> None:
+def _rolled_back(table: DeltaTable, folder: Path, number: int) -> None:
     newest = max((folder / "_delta_log").glob("*.json"))
     for left in (folder / "_delta_log").glob(f"{newest.stem}*"):
         left.unlink()
     (folder / "_delta_log" / "_last_checkpoint").unlink(missing_ok=True)
 
 
-DAMAGES: Final[tuple[Callable[[DeltaTable, Path], None], ...]] = (
+DAMAGES: Final[tuple[Callable[[DeltaTable, Path, int], None], ...]] = (
     _removed,
     _cut_off,
     _emptied,
@@ -89,8 +91,11 @@ def _pinned_gone(store: Store) -> bool:
 NAMES: Final = (*(each.__name__ for each in DAMAGES), "_receipts_cut_off", "_pinned_gone")
 
 
-def do(store: Store, which: int, spools: Sequence[Path]) -> bool:
-    """Damage its telemetry or what else proves it; False where there is nothing to do this to."""
+def do(store: Store, which: int, spools: Sequence[Path], proven: Set[int], *, all_proven: bool) -> bool:
+    """Damage its telemetry or what else proves it; False where there is nothing to do this to.
+
+    Of rows only such as are `proven`: that they are there is known to a receipt.
+    """
     assert store.folder is not None
     if which >= len(DAMAGES):
         return _receipts_cut_off(spools) if which == len(DAMAGES) else _pinned_gone(store)
@@ -100,9 +105,11 @@ def do(store: Store, which: int, spools: Sequence[Path]) -> bool:
         except NoSuchTable:
             continue
         rows = table.to_pyarrow_table()
+        numbers = rows[COUNT].to_pylist() if COUNT in rows.column_names else []
+        number = next((int(each) for each in numbers if each in proven), None)
         added = '"txn"' in max((store.folder / location / "_delta_log").glob("*.json")).read_text()
-        if rows.num_rows and COUNT in rows.column_names and (added or DAMAGES[which] is not _rolled_back):
-            DAMAGES[which](table, store.folder / location)
+        if number is not None and ((added and all_proven) or DAMAGES[which] is not _rolled_back):
+            DAMAGES[which](table, store.folder / location, number)
             return True
     return False
 
@@ -110,8 +117,3 @@ def do(store: Store, which: int, spools: Sequence[Path]) -> bool:
 def _files(table: DeltaTable, folder: Path) -> list[Path]:
     paths = table.get_add_actions(flatten=True).column("path").to_pylist()
     return sorted(folder / path for path in paths)
-
-
-def _count(table: DeltaTable) -> float:
-    """That of some row."""
-    return float(table.to_pyarrow_table()[COUNT][0].as_py())

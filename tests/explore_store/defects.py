@@ -68,7 +68,7 @@ _DEFECTS: Final[dict[str, Defect]] = {
     "amended-by-utc": Defect(
         "amended parameters are ignored when the clock was set back",
         "amend amend clock clock clock turn",
-        "a session says not",
+        "a session says not|a session is over",
     ),
     "control-dropped": Defect(
         "a full queue drops sessions, labels and events",
@@ -123,6 +123,106 @@ _DEFECTS: Final[dict[str, Defect]] = {
         "a promotion race lets a model serve over another than it was judged against",
         "teach teach train train train promote promote promote",
         "serves over another",
+    ),
+    "head-off-by-one": Defect(
+        "the newest entry of a journal that was recorded is recorded again",
+        "journal journal journal turn",
+        "twice|never seen|a journal's gap",
+    ),
+    "session-end-lost": Defect(
+        "where a session begins its robot's one before does not end",
+        "rows turn reboot reboot",
+        "is over",
+    ),
+    "unit-stale": Defect(
+        "a robot's rows go on in the unit that it has given up",
+        "rows rows turn unit unit",
+        "another unit",
+    ),
+    "label-back-in-sql": Defect(
+        "SQL has a label again that was removed in a later batch",
+        "label label label label send send",
+        "SQL has other labels",
+    ),
+    "retain-one-more": Defect(
+        "retention removes the row at its limit, too",
+        "rows send send retain retain",
+        "not there|verify|lacks rows",
+    ),
+    "only-last-pin-kept": Defect(
+        "vacuum keeps one pinned version of each table",
+        "rows send send pin pin pin pin pin compact compact vacuum vacuum vacuum vacuum",
+        "pinned",
+    ),
+    "lost-says-no-rows": Defect(
+        "an event of a loss says that no rows were lost",
+        "rows rows turn",
+        "more rows were lost|no event",
+    ),
+    "lost-told-to-another": Defect(
+        "a loss is told in the recording of another robot",
+        "rows rows turn",
+        "no event of their robot",
+    ),
+    "lost-told-of-first-robot": Defect(
+        "of several robots' losses the first one's alone is told",
+        "rows rows rows turn",
+        "more rows were lost|no event",
+    ),
+    "gap-behind-link-untold": Defect(
+        "nobody is told of notifications that waited too long behind the link",
+        "rows turn turn miss miss miss miss miss miss",
+        "a gap is told",
+    ),
+    "event-by-wall-clock": Defect(
+        "an event has the wall clock's time and not that of its robot's rows",
+        "rows rows clock clock mark mark turn",
+        "another time than its robot",
+    ),
+    "streams-share-offset": Defect(
+        "a stream's rows are moved by what another stream was late",
+        "rows rows second second second turn",
+        "a time that no clock|moved against",
+    ),
+    "waiting-label-without-number": Defect(
+        "of what waits of a label the last word does not count",
+        "label label label turn clock clock clock export export",
+        "a label holds",
+    ),
+    "export-off-by-one": Defect(
+        "what waits of a session in one row alone is not exported",
+        "rows rows turn cut export export",
+        "other rows|lacks rows",
+    ),
+    "export-angles-zero": Defect(
+        "an export has no values of some channels",
+        "rows rows turn send export",
+        "another value",
+    ),
+    "exports-always-refused": Defect(
+        "whoever has something in the spool can export nothing",
+        "rows turn export export",
+        "an export fails",
+    ),
+    "compaction-always-fails": Defect(
+        "a compaction fails each time",
+        "rows send send compact",
+        "a command fails",
+    ),
+    "query-always-fails": Defect(
+        "a query fails each time",
+        "rows send send query query query",
+        "a command fails|the query|no",
+    ),
+    "retention-forgives-all": Defect(
+        "after a retention verify misses no row whatever",
+        "rows turn send send retain retain retain damage damage damage",
+        "does not find a damage",
+    ),
+    "wrong-shard": Defect(
+        "what one robot has recorded is looked for among the others' rows",
+        "rows rows send export",
+        "lacks|other rows",
     ),
     "pointers-by-size": Defect(
         "model pointers are skipped or overwritten by size alone when a store is copied",

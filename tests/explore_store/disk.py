@@ -51,6 +51,9 @@ class Disk:
         self.left: Left | None = None  # since the program has ended
         self.power = False  # it ended by a power cut
         self.points = 0
+        self.refusals = 0  # writes that have failed
+        self.cuts = 0  # of power
+        self.ends = 0  # of programs
         self._quiet = False  # we ourselves are at work
         self._nodes: dict[int, Node] = {}
         self._names: dict[str, Node | None] = {}  # that last; None: a folder
@@ -95,6 +98,7 @@ class Disk:
     def check(self, what: Callable[[int], Exception]) -> None:
         """Raises where this write is to fail."""
         if self._failing:
+            self.refusals += 1
             raise what(self._failing.pop(0))
 
     def fsync(self, descriptor: int) -> None:
@@ -128,6 +132,8 @@ class Disk:
         """Be what was left, once nobody has anything open; of a killed program only its spool had that."""
         left, self.left = self.left, None
         if left is not None:
+            self.ends += 1
+            self.cuts += self.power
             with self.unseen():
                 self._become(left, "" if self.power else f"{self._name(spool)}/")
 

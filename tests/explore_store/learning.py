@@ -28,7 +28,7 @@ from ml.training import choosing, dataset, training
 from ml.training.dataset import Part
 from ml.training.material import Wish
 from tests.explore_store.disk import Ended
-from tests.explore_store.judging import check, rows_of_version
+from tests.explore_store.judging import rows_of_version
 from tests.explore_store.ledger import Promoted
 from tests.explore_store.robots import ANGLE
 from tests.explore_store.server import PEOPLE
@@ -99,15 +99,17 @@ def _create(self: Pointers, world: World, number: int, pointer: Pointer) -> bool
 
 def train(world: World, who: int) -> None:
     """Train on what is there now, and publish; whoever fails has changed nothing that serves."""
-    before = serving(world)
+    before, faults = serving(world), world.faults
     registry, split = Registry(world.url, NOTHING), None
     try:
         trained = training.train(registry, Wish(TASK, held_out=HELD_OUT[who]))
         split = world.classes.split
         model = registry.publish(trained.learned.state(), trained.card)
     except UnusableModel as error:
-        check(False, "a model that serves or was published cannot be used", error)
-    except (UnusableData, StoreError, OSError, Ended):
+        world.check(False, "a model that serves or was published cannot be used", error)
+    except (StoreError, OSError) as error:
+        world.check(world.explains(str(error), faults), "a training fails without cause", error)
+    except (UnusableData, Ended):
         pass
     else:
         world.classes.trained[who] = (model, trained.over)
@@ -117,7 +119,7 @@ def train(world: World, who: int) -> None:
             rows = rows_of_version(store, each.location, each.version)
             world.pinned.append((each.location, each.version, rows))
     if world.disk.left is None:
-        check(serving(world) == before, "a training has changed what serves", before)
+        world.check(serving(world) == before, "a training has changed what serves", before)
     if split is not None:
         _look_at_lessons(world, trained.card, split)
 
@@ -139,10 +141,10 @@ def _look_at_lessons(world: World, card: Card, split: Split) -> None:
             and _activities(said)
             and _in_rad(world, rows[whose])
         ):
-            check(whose in there, "a labelled session is neither learned from nor judged by", whose)
+            world.check(whose in there, "a labelled session is neither learned from nor judged by", whose)
     sides = [{who for part in side for who in _people(labels[part.ask.robot, part.ask.session])}
              for side in (lessons, judges)]  # fmt: skip
-    check(not sides[0] & sides[1], "a wearer is on both sides of what is held out", *sides)
+    world.check(not sides[0] & sides[1], "a wearer is on both sides of what is held out", *sides)
 
 
 def _look_at_part(world: World, part: Part, rows: list[Row], said: list[dict[str, Any]]) -> None:
@@ -154,22 +156,24 @@ def _look_at_part(world: World, part: Part, rows: list[Row], said: list[dict[str
         part.stamps_ns.tolist(), part.features.tolist(), part.truth.tolist(), strict=True
     ):
         at = bisect.bisect_right(stamps, at_ns) - 1
-        check(
+        world.check(
             at >= 0 and at_ns - stamps[at] <= OLDEST_NS, "a model learns from a row that is not there", value
         )
-        check(rows[at][2] == value, "a model learns another value than the row has", value, rows[at])
+        world.check(rows[at][2] == value, "a model learns another value than the row has", value, rows[at])
         row = known[int(value)]
-        check(
+        world.check(
             (row.robot, row.session) == (part.ask.robot, part.ask.session),
             "a model learns from another's row",
             row,
         )
-        check(row.unit != "deg", "a model learns degrees as radians", row)
+        world.check(row.unit != "deg", "a model learns degrees as radians", row)
         near = {_activity(said, utc) for _, utc, _ in rows[at : at + 2]}
-        check(not in_order or truth in near, "a model learns another label than was given", truth, near, row)
+        world.check(
+            not in_order or truth in near, "a model learns another label than was given", truth, near, row
+        )
         taught.add(value)
     lacks = [value for _, utc, value in rows[:-1] if value not in taught and _activity(said, utc)]
-    check(not in_order or not lacks, "labelled rows are not learned from", lacks)
+    world.check(not in_order or not lacks, "labelled rows are not learned from", lacks)
 
 
 def _rows(store: Store, versions: dict[str, int]) -> dict[tuple[str, str], list[Row]]:
@@ -223,7 +227,7 @@ def promote(world: World, who: int, robot: str, meanwhile: Callable[[], None] | 
     """Let the model that somebody has trained serve in the place of that which it was judged against."""
     if who not in world.classes.trained:
         return
-    (model, over), name = world.classes.trained[who], f"person {who}"
+    (model, over), name, faults = world.classes.trained[who], f"person {who}", world.faults
     before, world.classes.written = serving(world), []
     world.classes.meanwhile = meanwhile
     try:
@@ -231,14 +235,16 @@ def promote(world: World, who: int, robot: str, meanwhile: Callable[[], None] | 
     except Overtaken:
         others = _after(before, [each for each in world.classes.written if each[1] != name])
         now = serving(world)
-        check(
+        world.check(
             _whom(now, robot) == _whom(others, robot),
             "a promotion that was refused has changed what serves",
             now,
         )
     except UnusableModel as error:
-        check(False, "a model that was published cannot be promoted", error)
-    except (StoreError, OSError, Ended):
+        world.check(False, "a model that was published cannot be promoted", error)
+    except (StoreError, OSError) as error:
+        world.check(world.explains(str(error), faults), "a promotion fails without cause", error)
+    except Ended:
         pass
     else:
         _look_at_promotion(world, Promoted(robot, model, over), before, name)
@@ -252,9 +258,9 @@ def _look_at_promotion(world: World, done: Promoted, before: dict[str, str], nam
     place = next((at for at, each in enumerate(written) if each[1:] == (name, done.model)), None)
     served = _after(before, written if place is None else written[:place])
     if place is None:
-        check(served.get(done.robot) == done.model, "a promotion has done nothing", done)
+        world.check(served.get(done.robot) == done.model, "a promotion has done nothing", done)
         return
-    check(_whom(served, done.robot) == done.over,
+    world.check(_whom(served, done.robot) == done.over,
           "a model serves over another than it was judged against", done, served)  # fmt: skip
     world.classes.promoted[written[place][0]] = done
 
@@ -285,7 +291,7 @@ def _pointers(world: World) -> Iterator[tuple[str, str]]:
             try:
                 yield path, json.decode(objects.read(path) or b"", type=Pointer).model
             except ValueError as error:
-                check(False, "what says which model serves is damaged", path, error)
+                world.check(False, "what says which model serves is damaged", path, error)
 
 
 # --- at the end
@@ -299,16 +305,16 @@ def look(world: World, store: Store) -> None:
         try:
             registry.load(model)
         except UnusableModel as error:
-            check(False, "a model is not whole", error)
-    check(
+            world.check(False, "a model is not whole", error)
+    world.check(
         set(filter(None, served.values())) <= world.classes.published,
         "what serves was never published",
         served,
     )
     for path, done in world.classes.promoted.items():
-        check(served.get(path) == done.model, "a promotion is not in the history", path, done)
-    check(not registry.damaged(), "models are damaged", registry.damaged())
+        world.check(served.get(path) == done.model, "a promotion is not in the history", path, done)
+    world.check(not registry.damaged(), "models are damaged", registry.damaged())
     pinned = {(pin.location, pin.version, pin.by) for pin in upkeep.pins(store)}
     for model in world.classes.published:
         wanted = {(each.location, each.version, model) for each in registry.card(model).tables}
-        check(wanted <= pinned, "a published model's data is not pinned", wanted - pinned)
+        world.check(wanted <= pinned, "a published model's data is not pinned", wanted - pinned)

@@ -8,18 +8,21 @@ import msgspec
 from gateway.client import Batch
 from gateway.wire.robot import Description
 
-COUNT, ANGLE = "x.count", "knee.angle"
+COUNT, ANGLE, RATIO = "x.count", "knee.angle", "drive.load"
+NO_DIMENSION = ""  # the unit of the last one
 EVERY_NS = 10_000_000  # between rows
-STREAM = 1
+STREAM, SECOND = 1, 2  # that has no angle
+LATE_NS = 25_000_000  # that the second one comes
 TAIL = 6  # entries of its journal that a robot gives
 
 
 @dataclass(slots=True)
 class Robot:
-    """One machine; `unit` is what it means by its angle."""
+    """One machine; `unit` is what it means by its angle. Some nobody `can_be_asked` for their clock."""
 
     name: str
     unit: str | None
+    can_be_asked: bool = True
     began_ns: int = 0  # its clock
     boots: int = 1
     called: str = ""
@@ -36,9 +39,10 @@ class Robot:
 
     @property
     def description(self) -> Description:
-        channels = [
+        channels: list[dict[str, Any]] = [
             {"name": COUNT, "unit": None, "component": "x", "quantity": "count"},
             {"name": ANGLE, "unit": self.unit, "component": "knee", "quantity": "angle"},
+            {"name": RATIO, "unit": NO_DIMENSION, "component": "drive", "quantity": "load"},
         ]
         found = {
             "robot": self.called or self.name,
@@ -57,20 +61,26 @@ class Robot:
 
 @dataclass(slots=True)
 class Link:
-    """A server's link to a robot."""
+    """A server's link to a robot; `seqs` are the next numbers of its streams."""
 
     robot: Robot
     number: int = 0
-    seq: int = 0
+    seqs: dict[int, int] = field(default_factory=dict)
+    begun: set[int] = field(default_factory=set)  # streams of which something has come
 
     def again(self) -> None:
-        self.number, self.seq = self.number + 1, 0
+        self.number, self.seqs, self.begun = self.number + 1, {}, set()
 
     def batch(
-        self, counts: list[int], angles: list[float | None], stamps_ns: list[int], now_ns: int
+        self, stream: int, stamps_ns: list[int], columns: dict[str, list[float | None]], now_ns: int
     ) -> Batch:
-        found = Batch(
-            stamps_ns, {COUNT: [*map(float, counts)], ANGLE: angles}, self.seq, 0, 0, self.number, now_ns
-        )
-        self.seq += 1
-        return found
+        """The next one of the stream. What was missed before the first one the client has counted."""
+        seq = self.seqs.setdefault(stream, 0)
+        missed = 0 if stream in self.begun else seq
+        self.seqs[stream] += 1
+        self.begun.add(stream)
+        return Batch(stamps_ns, columns, seq, 0, missed, self.number, now_ns)
+
+    def miss(self, stream: int, count: int) -> None:
+        """So many notifications never come."""
+        self.seqs[stream] = self.seqs.get(stream, 0) + count

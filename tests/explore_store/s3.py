@@ -35,6 +35,7 @@ class S3:
         self.objects: dict[str, bytes] = {}
         self.dead = False  # whoever asks has ended: nothing of theirs arrives any more
         self.on_write: Callable[[], None] = lambda: None  # before each request that writes
+        self.failed = 0  # requests, in this play
         self.lock = threading.RLock()
         self._faults: list[tuple[int, Fault]] = []
         self._writes = 0
@@ -71,6 +72,7 @@ class S3:
         """Be as new."""
         with self.lock:
             self.objects.clear()
+            self.failed = 0
             self.disarm()
 
     def disarm(self) -> None:
@@ -87,6 +89,7 @@ class S3:
         if not due:
             return None
         self._faults.remove(due[0])
+        self.failed += 1
         if due[0][1] is Fault.LATE and key is not None:
             self._hidden[key] = self._requests + 4
         return due[0][1]

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -15,15 +15,16 @@ import hypothesis
 from hypothesis import strategies as st
 
 from tests.explore_store.disk import Ended
-from tests.explore_store.judging import Wrong
 from tests.explore_store.s3 import S3
 from tests.explore_store.steps import KINDS, Place, Script, Step, play
+from tests.explore_store.world import World
+from tests.explore_store.wrong import Wrong
 
 ROUND: Final = 40  # plays that one seed gives
 PLACES: Final = (*[Place.FOLDER] * 14, *[Place.SHARDS] * 5, Place.S3)  # S3 takes ten times as long
 SHRINK_S: Final = 60.0
 MEMORY: Final = Path("/dev/shm")  # a disk that costs nothing; ours says itself what a power cut leaves
-# What is not mended yet, and why: what a violation says, as a regular expression.
+# What is not mended yet: what is wrong, and what a violation says then, as a regular expression.
 KNOWN: Final[dict[str, str]] = {}
 
 
@@ -34,7 +35,7 @@ class Found:
     plays: int = 0
     steps: int = 0
     points: int = 0
-    known: int = 0  # plays that end in what is known
+    known: int = 0  # plays with what is known in them
     wrong: Script | None = None
     error: Exception | None = None
     seed: str = ""
@@ -60,11 +61,11 @@ def plays(words: Sequence[str]) -> st.SearchStrategy[Script]:
     return st.builds(Script, st.sampled_from(PLACES), all_steps)
 
 
-def played(script: Script, s3: S3) -> int:
-    """Play it in a folder of its own; how many points there were where a program might have ended."""
+def played(script: Script, s3: S3, known: Collection[str] = ()) -> World:
+    """Play it in a folder of its own, which is no more after that; raises `Wrong`, but of what is `known`."""
     folder = Path(tempfile.mkdtemp(dir=MEMORY if MEMORY.is_dir() else None))
     try:
-        return play(script, folder, s3).disk.points
+        return play(script, folder, s3, known)
     except Ended as error:
         raise Wrong("a program ended where none was at work") from error
     finally:
@@ -112,9 +113,11 @@ def _round(found: Found, words: Sequence[str], until_s: float, saying: str, s3: 
 def tried(script: Script, saying: str, found: Found, s3: S3) -> Exception | None:
     """What went wrong, if it says this."""
     try:
-        found.points += played(script, s3)
+        world = played(script, s3, KNOWN.values())
+        found.points += world.disk.points
+        found.known += world.known_wrong > 0
     except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
-        if any(re.search(pattern, str(error)) for pattern in KNOWN):
+        if any(re.search(pattern, str(error)) for pattern in KNOWN.values()):
             found.known += 1
             return None
         return error if re.search(saying, str(error)) else None

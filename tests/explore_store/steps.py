@@ -3,20 +3,22 @@
 import contextlib
 import errno
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import Enum
 from pathlib import Path
 from typing import Final, Self
 
-from ml.store import NoSuchTable, Store, StoreError, upkeep
+from ml.store import NoSuchTable, Store, StoreError, reading, upkeep
 from ml.store.query import query
 from ml.store.tables import TELEMETRY
 from server_gui.core.cloud import spooled
-from tests.explore_store import judging
+from tests.explore_store import exporting, judging
 from tests.explore_store.damages import NAMES
 from tests.explore_store.disk import Ended
+from tests.explore_store.ledger import Begun
+from tests.explore_store.robots import COUNT, SECOND, STREAM
 from tests.explore_store.s3 import S3, Fault
 from tests.explore_store.server import PEOPLE, flip
 from tests.explore_store.world import World
@@ -26,6 +28,7 @@ ROBOTS: Final = ("exo-0", "exo-1")
 UNITS: Final = ("rad", "deg", None)
 CLOCK_S: Final = (-3600.0, -0.05, 0.05, 10.0, -86_400.0, 86_400.0)
 LABELS: Final = ("walk", "wearer P01")
+EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class Place(Enum):
@@ -53,6 +56,17 @@ def _rows(world: World, s: int, r: int, count: int) -> None:
         server.rows(ROBOTS[r], count + 1, world.number(count + 1))
 
 
+def _second(world: World, s: int, r: int, count: int) -> None:
+    with world.alive(SERVERS[s]) as server:
+        server.rows(ROBOTS[r], count + 1, world.number(count + 1), SECOND)
+
+
+def _miss(world: World, s: int, r: int, count: int) -> None:
+    """Notifications of the robot's first stream never come."""
+    with world.alive(SERVERS[s]) as server:
+        server.links[ROBOTS[r]].miss(STREAM, count + 1)
+
+
 def _turn(world: World, s: int, *_: int) -> None:
     with world.alive(SERVERS[s]) as server:
         server.turn()
@@ -65,8 +79,11 @@ def _cut(world: World, s: int, *_: int) -> None:
 
 def _send(world: World, s: int, *_: int) -> None:
     with world.alive(SERVERS[s]) as server:
+        faults = world.faults
         server.cut()
-        server.upload()
+        if not server.upload():
+            problem = server.uploader.state.problem
+            world.check(world.explains(problem, faults), "an upload fails without cause", problem)
 
 
 def _reboot(world: World, s: int, r: int, _: int) -> None:
@@ -88,9 +105,11 @@ def _unit(world: World, s: int, r: int, unit: int) -> None:
     with world.alive(SERVERS[s]) as server:
         robot = server.robots[ROBOTS[r]]
         robot.unit = UNITS[unit]
-        for each in world.servers.values():
-            for name in [name for name, known in each.robots.items() if known is robot and each.runs]:
-                each.link(name)
+    for other, each in world.servers.items():
+        if names := [name for name, known in each.robots.items() if known is robot and each.runs]:
+            with world.alive(other):  # by its own clock
+                for name in names:
+                    each.link(name)
 
 
 def _rename(world: World, s: int, r: int, other: int) -> None:
@@ -105,8 +124,17 @@ def _clock(world: World, s: int, step: int, _: int) -> None:
 
 def _say(world: World, s: int, r: int, what: int) -> None:
     with world.alive(SERVERS[s]) as server:
-        if server.keeping[ROBOTS[r]].session:
-            server.say(ROBOTS[r], world.number(), LABELS[what % 2], removed=what >= 2)
+        if session := server.keeping[ROBOTS[r]].session:
+            server.say(ROBOTS[r], session, world.number(), LABELS[what % 2], removed=what >= 2)
+
+
+def _relabel(world: World, s: int, back: int, what: int) -> None:
+    """Of an earlier session, as somebody does who looks at what was recorded."""
+    begun = [each for each in world.ledger.all_of(Begun) if each.server == SERVERS[s]]
+    if len(begun) > back:
+        with world.alive(SERVERS[s]) as server:
+            of = begun[-1 - back]
+            server.say(of.robot, of.session, world.number(), LABELS[what % 2], removed=what >= 2)
 
 
 def _teach(world: World, s: int, one: int, other: int) -> None:
@@ -160,7 +188,7 @@ def _journal(world: World, s: int, r: int, count: int) -> None:
 def _bad_journal(world: World, s: int, r: int, how: int) -> None:
     bad = ({"n": 1, "hash": {}}, {"n": 2**63 + 5, "hash": "x"}, {"n": 1, "hash": None})[how]
     with world.alive(SERVERS[s]) as server:
-        server.recorder.journal(ROBOTS[r], [bad])
+        server.bad_journal(ROBOTS[r], bad)
 
 
 def _stop(world: World, s: int, *_: int) -> None:
@@ -197,8 +225,9 @@ def _flip(world: World, s: int, file: int, seed: int) -> None:
     files = sorted(path for path in server.folder.glob("0*") if not path.name.endswith("-shm"))
     files = [path for path in files if ".uploaded" not in path.name]
     if files:
-        flip(files[file % len(files)], seed)
-        server.damaged = True
+        flipped = files[file % len(files)]
+        flip(flipped, seed)
+        server.damage(int(flipped.name[:8]))
 
 
 def _spoil(world: World, s: int, file: int, how: int) -> None:
@@ -217,7 +246,7 @@ def _spoil(world: World, s: int, file: int, how: int) -> None:
         else:
             spoilt.write_bytes(spoilt.read_bytes()[: how * spoilt.stat().st_size // 2])
         world.disk.sync()
-    server.damaged = True
+    server.damage(int(spoilt.stem))
     server.spoilt.add(int(spoilt.stem))
 
 
@@ -227,6 +256,7 @@ def _copy(world: World, s: int, *_: int) -> None:
     world.end(SERVERS[s], 0, power=False)
     if server.folder.is_dir():
         server.copied = {path.name: path.read_bytes() for path in server.folder.iterdir()}
+        server.copied_damaged = set(server.damaged)
 
 
 def _roll_back(world: World, s: int, *_: int) -> None:
@@ -235,8 +265,6 @@ def _roll_back(world: World, s: int, *_: int) -> None:
     world.end(SERVERS[s], 0, power=False)
     if not server.folder.is_dir():
         return
-    server.rolled_back = True
-    server.spoilt.clear()
     judging.roll_back(world, server)
     with world.disk.unseen():
         for path in server.folder.iterdir():
@@ -257,11 +285,16 @@ def _s3(world: World, fault: int, writes: int, _: int) -> None:
 
 
 def _kept_up(work: Callable[[Store], object]) -> Play:
-    """Somebody else keeps the store in order; that may end too, and fail."""
+    """Somebody else keeps the store in order; that may end too, and fail where there is a cause."""
 
     def play(world: World, *_: int) -> None:
-        with contextlib.suppress(StoreError, OSError, Ended):
+        faults = world.faults
+        try:
             work(Store.existing(world.url))
+        except (StoreError, OSError) as error:
+            world.check(world.explains(str(error), faults), "a command fails without cause", error)
+        except Ended:
+            pass
         _buried(world)
 
     return play
@@ -274,11 +307,13 @@ def _buried(world: World) -> None:
 
 
 def _retain(world: World, age: int, *_: int) -> None:
-    before_ns = world.times.time_ns() - age * 50_000_000
-    before = datetime.fromtimestamp(before_ns / 1e9, UTC)
-    judging.retire(world, before)
-    world.retained = True
-    _kept_up(lambda store: upkeep.retain(store, [TELEMETRY], before))(world, 0, 0, 0)
+    """Up to some row, which stays."""
+    times = sorted(row.utc_ns(row.walls_ns[-1]) for row in world.ledger.rows())
+    if times:
+        before_ns = times[max(0, len(times) - 1 - 3 * age)]
+        before = EPOCH + timedelta(microseconds=before_ns // 1000)
+        judging.retire(world, before_ns)
+        _kept_up(lambda store: upkeep.retain(store, [TELEMETRY], before))(world, 0, 0, 0)
 
 
 def _pin(world: World, back: int, *_: int) -> None:
@@ -286,31 +321,33 @@ def _pin(world: World, back: int, *_: int) -> None:
 
     def pin(store: Store) -> None:
         location = TELEMETRY.locations(store.about.shards)[0]
-        version = max(0, store.table(location).version() - back)
-        upkeep.pin(store, location, version, "model")
-        world.pinned.append((location, version, judging.rows_of_version(store, location, version)))
+        with contextlib.suppress(NoSuchTable):  # no such version, or vacuum has removed files of it
+            version = max(0, store.table(location).version() - back)
+            upkeep.pin(store, location, version, "model")
+            world.pinned.append((location, version, judging.rows_of_version(store, location, version)))
 
     _kept_up(pin)(world, 0, 0, 0)
 
 
 def _query(world: World, *_: int) -> None:
     def ask(store: Store) -> None:
+        if COUNT not in reading.dataset(store, TELEMETRY).schema.names:
+            return
         with query(store, 'SELECT "x.count" AS n, count(*) AS c FROM telemetry GROUP BY 1') as found:
-            for batch in found.batches:
-                assert set(batch["c"].to_pylist()) <= {1}, "a query finds rows twice"
+            counts = [count for batch in found.batches for count in batch["c"].to_pylist()]
+            world.check(set(counts) <= {1}, "a query finds rows twice", counts)
 
-    try:
-        _kept_up(ask)(world, 0, 0, 0)
-    except NoSuchTable:
-        return
+    _kept_up(ask)(world, 0, 0, 0)
 
 
 def _export(world: World, s: int, *_: int) -> None:
-    judging.exports(world, world.servers[SERVERS[s]])
+    exporting.exports(world, world.servers[SERVERS[s]])
 
 
 KINDS: Final = {
     "rows": Kind(_rows, (2, 2, 8), 10),
+    "second": Kind(_second, (2, 2, 3), 3),
+    "miss": Kind(_miss, (2, 2, 3), 1),
     "turn": Kind(_turn, (2,), 5),
     "cut": Kind(_cut, (2,), 2),
     "send": Kind(_send, (2,), 5),
@@ -320,12 +357,13 @@ KINDS: Final = {
     "rename": Kind(_rename, (2, 2, 3), 1),
     "clock": Kind(_clock, (2, 6), 2),
     "label": Kind(_say, (2, 2, 4), 3),
+    "relabel": Kind(_relabel, (2, 4, 4), 2),
     "teach": Kind(_teach, (2, len(PEOPLE), len(PEOPLE)), 2),
     "train": Kind(_train, (2,), 1),
     "promote": Kind(_promote, (2, 2, 2), 1),
     "mark": Kind(_mark, (2, 2), 2),
     "amend": Kind(_amend, (2, 2), 2),
-    "journal": Kind(_journal, (2, 2, 5), 2),
+    "journal": Kind(_journal, (2, 2, 9), 2),
     "bad-journal": Kind(_bad_journal, (2, 2, 3), 1),
     "stop": Kind(_stop, (2,), 1),
     "kill": Kind(_kill, (2,), 2),
@@ -344,7 +382,7 @@ KINDS: Final = {
     "retain": Kind(_retain, (6,), 1),
     "pin": Kind(_pin, (6,), 2),
     "query": Kind(_query, (), 1),
-    "export": Kind(_export, (2,), 1),
+    "export": Kind(_export, (2,), 3),
 }
 
 
@@ -401,11 +439,11 @@ def _nothing(_: World) -> None:
 BETWEEN_NS: Final = 1_234_567  # two steps
 
 
-def play(script: Script, folder: Path, s3: S3) -> World:
-    """Play these steps, come to rest, and judge; raises `judging.Wrong`."""
+def play(script: Script, folder: Path, s3: S3, known: Collection[str] = ()) -> World:
+    """Play these steps, come to rest, and judge; raises `Wrong`, but of what is `known` already."""
     shards = 2 if script.place is Place.SHARDS else 1
     prepare = _learning() if any(step.word == "train" for step in script.steps) else _nothing
-    with World(folder, shards, s3 if script.place is Place.S3 else None) as world:
+    with World(folder, shards, s3 if script.place is Place.S3 else None, known) as world:
         prepare(world)
         for step in script.steps:
             world.times.now_ns += BETWEEN_NS

@@ -2,19 +2,23 @@
 
 import concurrent.futures
 import contextlib
+import functools
+import importlib.metadata
 import os
 import random
+import re
 import sqlite3
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final, Self
 
 import msgspec
 
-from ml.store import Store, durable, objects, store, writing
-from ml.store.store import About
+from ml.store import Store, objects, store
+from ml.store.objects import Objects
+from ml.store.store import ABOUT, About
 from server_gui.core.recording import recorder
 from server_gui.core.recording.errors import SpoolUnusable
 from tests.explore_store.disk import Disk, Ended, changes, watching
@@ -23,14 +27,20 @@ from tests.explore_store.robots import Robot
 from tests.explore_store.s3 import BUCKET, S3
 from tests.explore_store.server import Server
 from tests.explore_store.times import Names, Times, ours
+from tests.explore_store.wrong import Wrong, sentence
 
+TORN: Final = ("was never acknowledged: the next upload", "is being written, or is cut off")
+CLAIMED: Final = "is being compacted by another"  # which was killed, and S3 knows nothing of that
+NO_STORE: Final = "there is no store at"
 AGAIN: Final = 5  # attempts on a disk that refuses; one refuses less often
 
 
 class World:
     """A context manager, in which the path stands on our time, names and disk."""
 
-    def __init__(self, folder: Path, shards: int = 1, s3: S3 | None = None) -> None:
+    def __init__(
+        self, folder: Path, shards: int = 1, s3: S3 | None = None, known: Collection[str] = ()
+    ) -> None:
         self.times = Times()
         self.disk = Disk(folder)
         self.ledger = Ledger()
@@ -40,9 +50,11 @@ class World:
         self.s3 = s3
         self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
         self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
-        self.retained = False  # rows may be gone because they were old: then nobody can tell them from others
+        self.retained_ns: int | None = None  # rows that are older may be gone
+        self.known = known  # what may be wrong, as regular expressions
+        self.known_wrong = 0  # and how often it was
         self.damage: int | None = None  # what is done to the store at the end
-        both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg")
+        both, mine, other = Robot("p0", "rad"), Robot("p1", "rad"), Robot("p2", "deg", can_be_asked=False)
         self.robots = [both, mine, other]
         self.servers = {
             "A": self._server("A", {"exo-0": both, "exo-1": mine}),
@@ -62,8 +74,9 @@ class World:
                 for name, value in list(vars(module).items()):
                     if value is theirs:
                         put(module, name, ours_)
-        for module in (durable, writing):
+        for module in [module for module in ours() if hasattr(module, "ThreadPoolExecutor")]:
             put(module, "ThreadPoolExecutor", _AtOnce)
+        put(importlib.metadata, "version", _version)
         put(recorder, "COMMIT_S", 0.0)
         put(sqlite3, "connect", watching(self.disk))
         for name, stand_in in changes(self.disk).items():
@@ -150,8 +163,45 @@ class World:
             self.disk.end(seed, power=power)
             self.bury(name)
 
+    @property
+    def faults(self) -> int:
+        """What has gone wrong outside of the path until now, as its programs see it."""
+        return self.disk.refusals + (self.s3.failed if self.s3 is not None else 0)
+
+    def explains(self, problem: str | None, faults: int) -> bool:
+        """Whether something outside is why somebody could not do what he was to do, since `faults`."""
+        problem = problem or ""
+        return (
+            self.disk.left is not None
+            or self.faults > faults
+            or (self.disk.cuts > 0 and any(each in problem for each in TORN))
+            or (self.s3 is not None and self.disk.ends > 0 and CLAIMED in problem)
+            or (NO_STORE in problem and not self._is_there())
+        )
+
+    def _is_there(self) -> bool:
+        with self.disk.unseen():
+            return Objects(self.url).read(ABOUT) is not None
+
+    def check(self, holds: bool, what: str, *found: object) -> None:
+        """Raises `Wrong` where this does not hold, and that is not known."""
+        if holds:
+            return
+        told = sentence(what, *found)
+        if not any(re.search(pattern, told) for pattern in self.known):
+            raise Wrong(told)
+        self.known_wrong += 1
+
+    @property
+    def lived(self) -> list[Server]:
+        """The servers that have ever run."""
+        return [server for server in self.servers.values() if server.life]
+
     def safe(self) -> Iterable[Any]:
         return (thing for thing in self.ledger.things if thing.fate is Fate.SAFE)
+
+
+_version: Final = functools.cache(importlib.metadata.version)  # of what is installed: it looks on the disk
 
 
 class _AtOnce:

@@ -114,14 +114,14 @@ def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> 
 def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
     """Whether its rows are as they were sent, as far as retention has left them."""
     problem = _problem(claim, values=values)
-    missing = claim.expected[0] - claim.there[0]
+    missing = max(claim.expected[0] - claim.there[0], 0)
     if not problem:
         proof.rows += claim.found.rows
         proof.retained += claim.part.rows - claim.found.rows
     else:
         proof.problems.append(f"{store.url}/{claim.part.location}: {problem}")
     if is_of_batch(claim.batch[0]):  # all else no second copy brings
-        if problem and missing > 0:
+        if problem and (missing or (not values and _is_renamed(claim))):
             proof.lacking.add(claim.batch)
             proof.missing.append((claim.batch, claim.part, missing))
         if claim.went and not claim.is_all:
@@ -229,9 +229,15 @@ def _problem(claim: Claim, *, values: bool) -> str | None:
         return f"{rows - sent} rows more than the {sent} that were sent: doubled ({whose})"
     if values and found != total:
         return f"the {sent} rows are not as they were sent: altered ({whose})"
-    if not values and part.names and rows == part.rows and sums.told(claim.found.names) != part.names:
+    if not values and _is_renamed(claim):
         return f"of the {sent} rows some are missing and as many others doubled or renamed ({whose})"
     return None
+
+
+def _is_renamed(claim: Claim) -> bool:
+    """Whether there are as many rows as were sent, and others; where values are not looked at."""
+    part, found = claim.part, claim.found
+    return bool(part.names) and found.rows == part.rows and sums.told(found.names) != part.names
 
 
 def _time(us: int) -> datetime:

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.dataset
 
 from gateway.cli.text import counted
+from ml.store import upkeep
 from ml.store.errors import NoSuchTable, translated
 from ml.store.store import Store
 from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
@@ -113,11 +114,20 @@ def _append(spool: Spool, store: Store, lost: "_Lost", writer: str, number: int,
     now_ns = Moment.now().utc_ns
     rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
     new = _bring(store, rows, f"{writer}.{named}")
-    if not new and (gone := missing_rows.of_rows(store, EVENTS, rows)).num_rows:
-        new = _bring(store, gone, f"{writer}.{named}.{uuid.uuid4().hex[:12]}")
+    if not (new or _is_retained(spool, store, writer, number)):
+        gone = missing_rows.of_rows(store, EVENTS, rows)
+        new = gone.num_rows > 0 and _bring(store, gone, f"{writer}.{named}.{uuid.uuid4().hex[:12]}")
     if new:
         spool.receipts.add(Receipt(writer, number, store.url, (_told(store, writer, number),), (lost.text,)))
     return new
+
+
+def _is_retained(spool: Spool, store: Store, writer: str, number: int) -> bool:
+    """Whether such events were removed because they were old."""
+    until = upkeep.retained(store, EVENTS.name)
+    sent = (each for each in spool.receipts.whole() if (each.writer, each.batch) == (writer, number))
+    ends_us = [part.end_us for each in sent for part in each.parts if part.end_us is not None]
+    return until is not None and bool(ends_us) and max(ends_us) < until.timestamp() * 1e6
 
 
 def _bring(store: Store, rows: pa.Table, named: str) -> bool:

@@ -621,6 +621,14 @@ def test_a_loss_whose_event_has_gone_is_told_again(place: Place) -> None:
     assert events["kind"].to_pylist().count("lost") == 2
 
 
+def test_a_loss_whose_event_retention_has_removed_is_not_told_again(place: Place) -> None:
+    segment_removed(place)
+    place.told("upload")
+    retain(Store(place.url), [TABLES["events"]], datetime.now(UTC))
+    place.told("upload")
+    assert len(Store(place.url).dataset("events").to_table()) == 0
+
+
 def test_where_the_spool_is_gone_nobody_can_judge_and_files_alone_are_looked_at_by_url(place: Place) -> None:
     shutil.rmtree(place.spool)
     status, problems = place.verify()

@@ -19,7 +19,7 @@ from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import counting
 from server_gui.core.recording.receipts import RECEIPTS
 from tests.unit.cloud.recordings import record
-from tests.unit.cloud.test_damages import Place, altered, of_file
+from tests.unit.cloud.test_damages import Place, altered, of_file, rewrite
 from tests.unit.cloud.test_mend import file_cut_off, rows
 
 LATER: tuple[type[StoreError], ...] = (StoreUnreachable, StoreRefused)
@@ -216,6 +216,15 @@ def test_beside_an_altered_value_everything_else_is_brought_and_that_is_told(pla
     brought = told.partition(" brought again")[0].splitlines()[-1]
     assert str(number) not in brought
     assert len(place.verify()[1].splitlines()) == 1
+
+
+def test_a_row_in_whose_place_another_is_twice_is_brought(place: Place) -> None:
+    before = rows(place.url)
+    rewrite(place.files()[0], lambda found: found.take(pa.array([0, 0, *range(2, len(found))])))
+    told = place.told("mend")
+    assert "has 1 rows of this batch twice" in told
+    assert sorted({*rows(place.url)}) == before
+    assert "doubled" in place.verify()[1]
 
 
 def test_a_damaged_note_of_what_went_stops_what_would_bring_it_back(place: Place) -> None:

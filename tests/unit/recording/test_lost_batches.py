@@ -146,6 +146,20 @@ def test_a_loss_under_a_number_whose_loss_was_told_before_a_roll_back_is_told_to
     assert told(store) == [("exo-01", 5), ("exo-01", 5)]
 
 
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe"])
+def test_a_damaged_name_of_a_loss_keeps_nothing_from_the_store(
+    tmp_path: Path, folder_url: str, content: bytes
+) -> None:
+    recorded(tmp_path)
+    (tmp_path / "00000002.db").unlink()
+    (tmp_path / "00000002.lost").write_bytes(content)
+    with Spool(tmp_path, reserve_bytes=0) as opened:
+        uploader = Uploader(opened, lambda: Store(folder_url))
+        assert uploader._empty(asked=True)
+        assert opened.waiting() == []
+    assert told(Store(folder_url)) == [("exo-01", 2)]
+
+
 def test_a_batch_that_is_closed_while_somebody_looks_is_not_gone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
