@@ -22,6 +22,18 @@ Series = list[tuple[int, float]]
 
 def test_a_gateway_sees_the_recorded_walk_again(tmp_path: Path) -> None:
     walk = record(tmp_path)
+    found_n: list[float] = []
+
+    def at_the_same_times() -> bool:
+        """A computer that is too busy plays late, and not every line as late as the other."""
+        found_n.append(statistics.median(errors(walk)))
+        return found_n[-1] < A_LITTLE_N
+
+    until(at_the_same_times, lambda: found_n)
+
+
+def errors(walk: Recording) -> list[float]:
+    """How far each force is from what was true when the position was recorded that came with it."""
     position, force = watched(walk)
     recorded = [message for message in walk.messages if is_frame(message, TPDO_OF_KNEE)]
     counts = [int.from_bytes(message.data[2:6], "little", signed=True) for message in recorded]
@@ -33,9 +45,9 @@ def test_a_gateway_sees_the_recorded_walk_again(tmp_path: Path) -> None:
         return recorded[(at + number) % len(recorded)].timestamp
 
     truth = {round(row["simulated_ns"] / 1e7): row["left_foot.force"] for row in walk.truth}
-    errors = [abs(newton - truth[round(recorded_s(stamp_ns) * 100)]) for stamp_ns, newton in force]
-    assert len(errors) > SAMPLES / 2
-    assert statistics.median(errors) < A_LITTLE_N
+    found = [abs(newton - truth[round(recorded_s(stamp_ns) * 100)]) for stamp_ns, newton in force]
+    assert len(found) > SAMPLES / 2
+    return found
 
 
 def watched(walk: Recording) -> tuple[Series, Series]:
