@@ -138,9 +138,9 @@ def batch(spool: Path, number: int) -> Batch:
 
 def _records(spool: Path, batch: int) -> list[tuple[int, Record]]:
     """With their numbers; without those that are damaged."""
-    found = _read(spool, batch, "SELECT * FROM record ORDER BY number")  # older ones have no checksums
+    found = _read(spool, batch, "SELECT rowid, * FROM record ORDER BY rowid")  # older ones have no checksums
     return [
-        (number - 1, _decoder.decode(content)) for number, content, *crc in found if unaltered(content, *crc)
+        (rowid - 1, _decoder.decode(content)) for rowid, _, content, *crc in found if unaltered(content, *crc)
     ]
 
 

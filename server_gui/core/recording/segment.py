@@ -303,7 +303,7 @@ class Segment:
             return [DamagedRecord(number, self._whose(content)) for number, content in found]
 
     def _contents(self) -> Iterator[tuple[int, Any, int | None]]:
-        return self._database.execute("SELECT number - 1, content, crc FROM record ORDER BY number")
+        return self._database.execute("SELECT rowid - 1, content, crc FROM record ORDER BY rowid")
 
     def robots(self) -> set[str]:
         """Every robot that something is of, or was before."""

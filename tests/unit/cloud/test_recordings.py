@@ -224,3 +224,15 @@ def test_a_name_that_is_nowhere_and_a_damaged_batch_are_told(folder_url: str, tm
     file.write_bytes(b"x" * 20_000)
     with pytest.raises(SpoolUnusable, match=r"00000001\.db is damaged.*gwrms cloud upload"):
         Recordings(folder_url, tmp_path / "spool").find(recorded.session)
+
+
+def test_records_are_read_also_where_the_column_of_their_numbers_has_lost_its_type(
+    folder_url: str, tmp_path: Path
+) -> None:
+    """By one flipped bit: what is no INTEGER PRIMARY KEY is no name of the rowid, and reads as null."""
+    record(folder_url, tmp_path / "spool", sent=False)
+    [file] = [each for each in (tmp_path / "spool").glob("0*.db") if b"marker" in each.read_bytes()]
+    file.write_bytes(file.read_bytes().replace(b"number INTEGER", b"number INTEFER"))
+    known = Recordings(folder_url, tmp_path / "spool")
+    assert [row["kind"] for row in known.happenings(sole(known).session)] == ["gap", "marker"]
+    assert [row["label"] for row in known.labels(sole(known).session)] == ["walk"]
