@@ -264,7 +264,7 @@ def damage(file: Path, part: str) -> None:
         file.write_bytes(b"x" * 10_000)
         return
     if part == "schema":  # a column's name, as one flipped bit leaves it
-        file.write_bytes(file.read_bytes().replace(b"    number INTEGER", b"    nulber INTEGER"))
+        file.write_bytes(file.read_bytes().replace(b"content BLOB", b"contemt BLOB"))
         return
     column = {"record": "content", "run": "data"}[part]
     with contextlib.closing(sqlite3.connect(file)) as database, database:
