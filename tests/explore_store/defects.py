@@ -151,7 +151,7 @@ _DEFECTS: Final[dict[str, Defect]] = {
     ),
     "only-last-pin-kept": Defect(
         "vacuum keeps one pinned version of each table",
-        "rows send send pin pin pin pin pin compact compact vacuum vacuum vacuum vacuum",
+        "rows send send pin pin pin pin compact compact compact vacuum vacuum vacuum vacuum vacuum vacuum",
         "pinned",
     ),
     "lost-says-no-rows": Defect(
@@ -260,7 +260,7 @@ def _looked_for(name: str, seconds: float) -> str:
     done = _run(name, "--seconds", str(seconds), "--words", *defect.steps.split(), "--saying", defect.saying)
     found = re.search(r"--replay '(.*)'", done.stdout)
     if done.returncode not in (0, 1):
-        return f"cannot be put back: {done.stderr[-300:]}"
+        return f"cannot be put back (status {done.returncode}): {done.stderr[-300:]}"
     return found[1] if found else ""
 
 

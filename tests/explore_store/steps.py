@@ -380,7 +380,7 @@ KINDS: Final = {
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
     "vacuum": Kind(_kept_up(lambda store: upkeep.vacuum(store, grace=timedelta(0))), (), 1),
     "retain": Kind(_retain, (6,), 1),
-    "pin": Kind(_pin, (6,), 2),
+    "pin": Kind(_pin, (4,), 2),
     "query": Kind(_query, (), 1),
     "export": Kind(_export, (2,), 3),
 }
