@@ -16,8 +16,7 @@ from server_gui.core.cloud import mend, verify
 from server_gui.core.cloud.again import Again
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.recording.spool import Spool
-from tests.unit.cloud.recordings import record
-from tests.unit.cloud.test_damages import (
+from tests.unit.cloud.damages import (
     Place,
     altered,
     event_without_its_batch,
@@ -29,13 +28,9 @@ from tests.unit.cloud.test_damages import (
     row_removed,
     without,
 )
+from tests.unit.cloud.recordings import record
 
 KEYS = ("robot", "session", "connection", "stream", "seq", "row")
-
-
-@pytest.fixture
-def place(store_libraries: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Place:
-    return Place(tmp_path, capsys)
 
 
 def rows(url: str) -> list[tuple[object, ...]]:

@@ -18,16 +18,11 @@ from ml.store.tables import TELEMETRY
 from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import counting
 from server_gui.core.recording.receipts import RECEIPTS
+from tests.unit.cloud.damages import Place, altered, of_file, rewrite
 from tests.unit.cloud.recordings import record
-from tests.unit.cloud.test_damages import Place, altered, of_file, rewrite
 from tests.unit.cloud.test_mend import file_cut_off, rows
 
 LATER: tuple[type[StoreError], ...] = (StoreUnreachable, StoreRefused)
-
-
-@pytest.fixture
-def place(store_libraries: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Place:
-    return Place(tmp_path, capsys)
 
 
 def fails(error: type[StoreError]) -> Callable[..., object]:
