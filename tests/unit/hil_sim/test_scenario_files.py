@@ -74,7 +74,7 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
         ("[robot]\nspeed = 1", r"\[robot\]: there is no key 'speed'"),
         ('[robot]\nscenario = "swim"', "scenario = 'swim' is not possible; allowed are walk, stand"),
         ('[robot]\nseed = "x"', "seed = 'x' must be a whole number"),
-        ('[robot]\nimu = "x"', "imu = 'x' is not possible; allowed are witmotion"),
+        ('[robot]\nimu = "x"', "imu = 'x' is not possible; allowed are bno08x-rvc, microstrain"),
         ('[robot]\nseconds = 1\n[[at]]\ntime_s = 2\nactivity = "sit"', "seconds = 1 ends before something"),
         ("[at]\ntime_s = 2", r"at is a list of tables: write \[\[at\]\]"),
         ('[[at]]\nactivity = "sit"', r"\[\[at\]\] 1: time_s = None is no time"),

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ml.evaluate.arrays import Arrays
 
+from ml.benchmarks.arrays import Arrays
 from ml.parsing import TRIES, parsing
 from ml.registry import archive
 from ml.registry.code import _tree
