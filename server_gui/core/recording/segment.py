@@ -116,7 +116,7 @@ class Segment:
 
     Raises:
         SpoolUnusable: the file cannot be used, or is not there and was `written` before.
-        Damaged: it is no database, or is empty and was `written` before; or was not, and cannot be.
+        Damaged: it is no database, or is empty and was `written` before.
 
     """
 
@@ -132,8 +132,6 @@ class Segment:
             self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
             try:
                 self._prepare()
-                if not written:
-                    self._check_columns()
             except BaseException:
                 self._database.close()  # else the next close is not the last, and leaves the log behind
                 raise
@@ -161,8 +159,8 @@ class Segment:
             if "crc" not in _columns(self._database, table):
                 self._database.execute(f"ALTER TABLE {table} ADD COLUMN crc INTEGER")
 
-    def _check_columns(self) -> None:
-        """Nothing is written to tables that are not as we make them."""
+    def check_columns(self) -> None:
+        """Raises `Damaged` where its tables are not as we make them: nothing can be written to them."""
         for table, wanted in _made().items():
             if wrong := wanted - _columns(self._database, table):
                 missing = ", ".join(sorted(wrong))

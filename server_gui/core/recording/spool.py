@@ -383,6 +383,7 @@ class Spool:
     def _begin(self, number: int) -> Segment:
         segment = Segment(self._files.path(number), number)
         try:
+            segment.check_columns()
             with writing(self.folder):
                 if not segment.rows:
                     segment.name(self.writer)
