@@ -16,9 +16,10 @@ from typing import Any, Final, Self
 
 import msgspec
 
-from ml.store import Store, objects, store
+from ml.store import NoSuchTable, Store, objects, store
 from ml.store.objects import Objects
 from ml.store.store import ABOUT, About
+from ml.store.tables import TABLES
 from server_gui.core.recording import recorder
 from server_gui.core.recording.errors import SpoolUnusable
 from tests.explore_store.disk import Disk, Ended, changes, watching
@@ -30,6 +31,7 @@ from tests.explore_store.times import Names, Times, ours
 from tests.explore_store.wrong import Wrong, sentence
 
 TORN: Final = ("was never acknowledged: the next upload", "is being written, or is cut off")
+UNREAD: Final = "let gwrms cloud mend take it out of its table"  # or whoever writes next sets its entry aside
 CLAIMED: Final = "is being compacted by another"  # which was killed, and S3 knows nothing of that
 NO_STORE: Final = "there is no store at"
 AGAIN: Final = 5  # attempts on a disk that refuses; one refuses less often
@@ -175,9 +177,22 @@ class World:
             self.disk.left is not None
             or self.faults > faults
             or (self.disk.cuts > 0 and any(each in problem for each in TORN))
+            or (self.disk.cuts > 0 and UNREAD in problem and self._heals())
             or (self.s3 is not None and self.disk.ends > 0 and CLAIMED in problem)
             or (NO_STORE in problem and not self._is_there())
         )
+
+    def _heals(self) -> bool:
+        """Whether all can be read again once somebody writes: what a power cut has torn is set aside then."""
+        with self.disk.unseen():
+            store = Store.existing(self.url)
+            for location in [
+                name for table in TABLES.values() for name in table.locations(store.about.shards)
+            ]:
+                with contextlib.suppress(NoSuchTable):
+                    store.mend(location)
+                    store.dataset(location).to_table()
+        return True
 
     def _is_there(self) -> bool:
         with self.disk.unseen():
