@@ -197,7 +197,7 @@ def footer(store: Store, file: DataFile) -> pq.FileMetaData:
         return pq.read_metadata(opened)
 
 
-def happenings(store: Store, session: Session, table: Table = EVENTS) -> list[dict[str, Any]]:
+def rows_of(store: Store, session: Session, table: Table = EVENTS) -> list[dict[str, Any]]:
     """The session's rows of `events`, or of `labels`, in the order in which they were recorded."""
     named = pyarrow.dataset.field("session") == session.session
     return recorded_order(_rows(store, table, session.robot, named))
@@ -205,7 +205,7 @@ def happenings(store: Store, session: Session, table: Table = EVENTS) -> list[di
 
 def labels(store: Store, session: Session) -> list[dict[str, Any]]:
     """What somebody says that robot and wearer did, as far as it has not been taken back."""
-    return holding(happenings(store, session, LABELS))
+    return holding(rows_of(store, session, LABELS))
 
 
 def telemetry(

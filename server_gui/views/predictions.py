@@ -8,8 +8,8 @@ from typing import Final
 from ml.registry.card import Source
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level, Trust
+from server_gui.core.desk.leg_phase import LegPhase, phase_at
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.walk import LegPhase, phase_at
 from server_gui.core.prediction.current import Recalled, Told
 from server_gui.core.prediction.state import WITHIN_DAYS
 from server_gui.core.processing.gait_events import Leg

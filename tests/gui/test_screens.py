@@ -65,8 +65,8 @@ def busy(bench: Bench) -> None:
 def live(bench: Bench) -> None:
     """What a robot that walks has just told, and which is not stale before it has been drawn."""
     bench.station.take([walking(1000, -60.0)])
-    bench.station.foresee(predicted("walk", {"walk": 0.94, "turn": 0.04, "stand": 0.02}))
-    bench.station.foresee(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
+    bench.station.take_prediction(predicted("walk", {"walk": 0.94, "turn": 0.04, "stand": 0.02}))
+    bench.station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
 
 
 def colours(image: QImage) -> set[int]:

@@ -11,7 +11,7 @@ import msgspec
 from ml.store import NoSuchTable, Store, StoreError
 from ml.store.objects import Object
 from ml.store.sessions import UNTOLD, Session, in_order, sessions
-from server_gui.core.cloud import spooled, usage
+from server_gui.core.cloud import spool_reader, usage
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.settings.server_file import ServerSettings
@@ -105,7 +105,7 @@ def look(settings: ServerSettings) -> Found:
 
 def _waiting(settings: ServerSettings) -> list[Session]:
     try:
-        return spooled.sessions(settings.recorder.spool)
+        return spool_reader.sessions(settings.recorder.spool)
     except RecordingError:
         return []
 

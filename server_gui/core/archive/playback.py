@@ -15,7 +15,7 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
-from server_gui.core.archive.recall import Said
+from server_gui.core.archive.recorded_predictions import Said
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
 from server_gui.core.desk.station import Station

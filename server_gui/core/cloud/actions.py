@@ -14,7 +14,7 @@ from gateway.cli.text import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
 from ml.store.store import checked_url
-from server_gui.core.cloud import emptying, parts, transfer, verify
+from server_gui.core.cloud import partial_copy, spool_upload, transfer, verify
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recordings
@@ -54,7 +54,7 @@ def upload(settings: ServerSettings) -> Work:
     def work(job: Job) -> str:
         url = checked_url(settings.store.url)
         there = functools.partial(connect, settings.store)
-        done = emptying.empty(settings.recorder.spool, url, there, _steps(job, "batches"))
+        done = spool_upload.empty(settings.recorder.spool, url, there, _steps(job, "batches"))
         if done.waits:
             raise StoreError("; ".join((*done.waits, *done.problems)))
         if done.problems:
@@ -71,7 +71,7 @@ def download(url: str, folder: Path, wanted: Sequence[Session] = ()) -> Work:
         source, target = Store.existing(url), folder.absolute().as_uri()
         if wanted:
             job.expect(sum(session.rows for session in wanted), "rows")
-            rows = parts.copy(source, Store(target), wanted, (), job.advance)
+            rows = partial_copy.copy(source, Store(target), wanted, (), job.advance)
             return f"{folder}: {len(wanted)} sessions, {rows} rows of telemetry copied and counted"
         to = transfer.open_target(source, target)
         missing = transfer.missing(source.objects, to)

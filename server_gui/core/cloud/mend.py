@@ -19,9 +19,9 @@ from ml.store.fragments import DataFile
 from ml.store.private import FILE
 from ml.store.store import Store
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.again import Again, Untouched, Whose, whose
 from server_gui.core.cloud.counting import Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
+from server_gui.core.cloud.repeated_upload import Again, Untouched, Whose, whose
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt, Receipts
 from server_gui.core.recording.segment import Segment

@@ -24,7 +24,7 @@ from ml.store.precedence import recorded_order
 from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipts, went_to
@@ -53,7 +53,7 @@ class Recordings:
         self.unread: SpoolUnusable | None = None
         self._url = url
         self._spool = spool
-        self._batches = self._listed(spooled.waiting)
+        self._batches = self._listed(spool_reader.waiting)
         self._writers: dict[int, str] = {}  # of the batches
         self._store: Snapshot | None = None
         self._reach()
@@ -65,7 +65,7 @@ class Recordings:
             if not self.sessions():
                 raise (self.unread or error) from None
         except (StoreRefused, StoreUnreachable) as error:
-            self._batches = self._listed(spooled.kept)
+            self._batches = self._listed(spool_reader.kept)
             if not self.sessions():
                 raise
             self.problem = error
@@ -76,8 +76,8 @@ class Recordings:
         names: dict[tuple[str, str], Session] = {}
         for batch in self._batches:
             try:
-                here = spooled.untold(self._spool, [batch], ())
-                told += spooled.rows(self._spool, SESSIONS, self._missing(SESSIONS.name, [batch]))
+                here = spool_reader.untold(self._spool, [batch], ())
+                told += spool_reader.rows(self._spool, SESSIONS, self._missing(SESSIONS.name, [batch]))
             except SpoolUnusable as error:
                 self.unread = self.unread or error
             else:
@@ -120,16 +120,16 @@ class Recordings:
             raise why
         return sessions.among(known, name, self._url)
 
-    def happenings(self, session: Session, table: Table = EVENTS) -> list[Row]:
+    def rows_of(self, session: Session, table: Table = EVENTS) -> list[Row]:
         """The session's rows of this table, in the order in which they were recorded."""
-        stored = [] if self._store is None else sessions.happenings(self._store, session, table)
+        stored = [] if self._store is None else sessions.rows_of(self._store, session, table)
         mine = (session.robot, session.session)
         told = [row for row in self._waiting(table) if (row["robot"], row["session"]) == mine]
         return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
         """What somebody says that robot and wearer did, as far as it has not been taken back."""
-        return holding(self.happenings(session, LABELS))
+        return holding(self.rows_of(session, LABELS))
 
     def counted(self, session: Session) -> Session:
         """The session with the extent of all of its rows."""
@@ -171,7 +171,7 @@ class Recordings:
             return False
 
     def _waiting(self, table: Table) -> list[Row]:
-        return spooled.rows(self._spool, table, self._missing(table.name, self._batches))
+        return spool_reader.rows(self._spool, table, self._missing(table.name, self._batches))
 
     def _missing(self, location: str, batches: list[int]) -> list[int]:
         """The batches of the spool that are not in this table."""
@@ -181,7 +181,7 @@ class Recordings:
 
     def _writer(self, batch: int) -> str:
         if batch not in self._writers:
-            self._writers[batch] = spooled.writer(self._spool, batch)
+            self._writers[batch] = spool_reader.writer(self._spool, batch)
         return self._writers[batch]
 
 
@@ -269,11 +269,11 @@ class _Waiting:
 
     def _table(self, batch: int) -> pa.Table:
         """With the columns to which the upload brings the batch, which has other robots' channels too."""
-        runs = list(spooled.runs(self._spool, self._session, batch))
+        runs = list(spool_reader.runs(self._spool, self._session, batch))
         here = TELEMETRY.location(self._session.robot, self._shards)
         layouts = [
             layout
-            for robot, layout in spooled.layouts(self._spool, batch)
+            for robot, layout in spool_reader.layouts(self._spool, batch)
             if TELEMETRY.location(robot, self._shards) == here
         ]
         found = Columns(layouts, self._before[batch])

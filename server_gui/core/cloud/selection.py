@@ -79,6 +79,6 @@ def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Record
         session,
         channels,
         recorded.telemetry(names, choice.begin, choice.end),
-        list(filter(choice.holds, recordings.happenings(session))),
+        list(filter(choice.holds, recordings.rows_of(session))),
         list(filter(choice.holds, recordings.labels(session))),
     )

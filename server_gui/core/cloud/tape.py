@@ -89,7 +89,7 @@ class Tape:
             raise NoSuchTable(
                 f"the session {session.session} has no telemetry, neither in the store nor in the spool"
             )
-        events, units = recordings.happenings(session), _units(session, recorded.channels)
+        events, units = recordings.rows_of(session), _units(session, recorded.channels)
         ends = utc_ns(session.first), utc_ns(session.last)
         return cls(session, units, events, *ends, recorded, settings)
 

@@ -159,7 +159,7 @@ class Station:
             snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
             self.processing.apply(dataclasses.replace(event, snapshot=snapshot))
 
-    def foresee(self, news: PredictionNews) -> None:
+    def take_prediction(self, news: PredictionNews) -> None:
         """Apply what models say of this robot."""
         self.predictions.take(news)
         if isinstance(news, Ruled):

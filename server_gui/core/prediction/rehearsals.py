@@ -16,7 +16,7 @@ from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 
 SECOND_NS: Final = 1_000_000_000
 ALSO: Final[Mapping[str, frozenset[str]]] = MappingProxyType(
-    {"near_fall": frozenset({"near_fall", "fall"})}  # what foresees the one is right about the other
+    {"near_fall": frozenset({"near_fall", "fall"})}  # what warns of the one is right about the other
 )
 Read = Callable[[Path, Path | None], list[Told]]
 

@@ -106,7 +106,7 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
 def _live(store: Store, session: Session, model: Model, found: Sequence[Prediction]) -> Live:
     """Of a session that goes on, only up to here: by now there may be more in the store."""
     try:
-        rows = sessions.happenings(store, session, PREDICTIONS)
+        rows = sessions.rows_of(store, session, PREDICTIONS)
     except NoSuchTable:
         rows = []
     until_ns = found[-1].stamp_ns if found and session.ended is None else math.inf

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
 
-from ml.store import sums, upkeep
+from ml.store import checksums, upkeep
 from ml.store.errors import translated
 from ml.store.store import Store
 from ml.store.tables import Table
@@ -50,10 +50,10 @@ def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> 
         found = store.dataset(table.name).to_table(filter=mine)
     numbers = rows["number"].to_pylist()
     where = f"{store.url}/{table.name}"
-    known = _once(found["number"].to_pylist(), sums.of_rows(found).tolist(), where, hear)
+    known = _once(found["number"].to_pylist(), checksums.of_rows(found).tolist(), where, hear)
     wrong = [
         number
-        for number, ours in zip(numbers, sums.of_rows(rows).tolist(), strict=True)
+        for number, ours in zip(numbers, checksums.of_rows(rows).tolist(), strict=True)
         if number >= 0 and known.get(number, ours) != ours  # below: losses, as they were told the first time
     ]
     if wrong:
@@ -94,11 +94,11 @@ def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str, h
         named &= _column(key) == value
     found = rows.to_table(columns=mine.schema.names, filter=named).combine_chunks()
     [theirs] = found.to_batches() or [mine.slice(0, 0)]
-    known = _once(_keys(theirs), sums.of_numbers(theirs, same).tolist(), where, hear)
+    known = _once(_keys(theirs), checksums.of_numbers(theirs, same).tolist(), where, hear)
     keys = list(_keys(mine))
     wrong = [
         key
-        for key, ours in zip(keys, sums.of_numbers(mine, same).tolist(), strict=True)
+        for key, ours in zip(keys, checksums.of_numbers(mine, same).tolist(), strict=True)
         if known.get(key, ours) != ours
     ]
     if wrong:

@@ -49,7 +49,7 @@ class Mark(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Part(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Rows of a batch in one table; of telemetry, those of one stream. `sum` is as `ml.store.sums` makes it.
+    """Rows of a batch in one table; of telemetry, those of one stream. `sum` is by `ml.store.checksums`.
 
     Their times are from `begin_us` to `end_us`, in µs since 1970; None where they have none. Receipts from
     before have none of what follows `stream`.

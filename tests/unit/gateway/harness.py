@@ -22,9 +22,9 @@ from drivers.component import Component, Kind
 from drivers.errors import DeviceAbort, NotPermitted
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import WAY_UP
-from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
+from drivers.joint.transitions import Led
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from gateway.config import RobotConfig, load
