@@ -340,6 +340,10 @@ class FakeDrive(FakeComponent):
         return done(self.led_up.get(origin) or Led(WAY_UP[origin][1]))
 
 
+# Requests as they are on the wire: the id is to be put in, and the reason.
+CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
+STOP = b'{"jsonrpc":"2.0","id":"stop","method":"robot.stop","params":{"reason":"%s"}}\n'
+
 HEAD = """
 [robot]
 name = "exo-test"

@@ -30,10 +30,9 @@ from gateway.wire.limits import BAD_LINES, LINE_LIMIT
 from tests.support.examples import examples
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import ROBOT, Answered, Bench, Client, config, serving
+from tests.unit.gateway.harness import CLOCK, ROBOT, Answered, Bench, Client, config, serving
 
 Connect = Callable[[], Client]
-CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
 
 
 def test_hello_names_the_robot_and_the_protocol(client: Client) -> None:
