@@ -230,7 +230,7 @@ def run(
 
 
 def stop_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[X11Keys | None]:
-    """The keys that stop even while the window is busy, where there is an X server."""
+    """Return the keys that stop even while the window is busy, where there is an X server."""
     if qt.platformName() != "xcb":
         return contextlib.nullcontext()
     try:

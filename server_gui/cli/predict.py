@@ -155,7 +155,7 @@ def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) 
 
 
 def fields(one: PredictionNews) -> dict[str, Any]:
-    """What was predicted, for machines."""
+    """Return what was predicted, for machines."""
     match one:
         case Predicted():
             trust = {"trust": one.trust.level.value, "drifted": one.trust.drifted}

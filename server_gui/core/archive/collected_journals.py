@@ -94,7 +94,7 @@ class KeptJournals:
 
 
 def look(settings: ServerSettings) -> Found:
-    """What store and spool have now; blocks."""
+    """Return what store and spool have now; blocks."""
     entries: dict[str, list[Entry]] = {}
     try:
         waiting = spool_reader.rows(settings.recorder.spool, JOURNAL)

@@ -80,7 +80,7 @@ class Piece:
     said: Sequence[Said]
 
     def between(self, begin_ns: int, end_ns: int) -> "Piece":
-        """What is from `begin_ns` up to before `end_ns`."""
+        """Return what is from `begin_ns` up to before `end_ns`."""
         first, last = (bisect_left(self.said, at, key=lambda one: one.utc_ns) for at in (begin_ns, end_ns))
         return Piece(self.rows.between(begin_ns, end_ns), self.said[first:last])
 

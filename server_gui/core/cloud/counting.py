@@ -204,7 +204,7 @@ class _Rows:
     times_us: npt.NDArray[np.int64]
 
     def of(self, claim: Claim, mine: npt.NDArray[np.intp]) -> Count:
-        """Those of them that are the claim's."""
+        """Return those of them that are the claim's."""
         found = Count(len(mine), _total(self.each, mine), _total(self.names, mine))
         if claim.rest is not None:
             left = mine[self.times_us[mine] >= claim.rest.from_us]
@@ -230,7 +230,7 @@ class _Streams:
             self._firsts[name] = np.array([_first(claim) for claim in mine], np.int64)
 
     def seen(self, batch: pa.RecordBatch, file: DataFile, values: bool) -> Sequence[_Seen]:
-        """What these rows of a file are of each claim."""
+        """Return what these rows of a file are of each claim."""
         connections, streams, seqs = (
             batch[name].to_numpy(zero_copy_only=False) for name in (*WHOSE, NAMING[0])
         )

@@ -154,7 +154,7 @@ def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object
 
 
 def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> None:
-    """From now on what is there counts as what was sent; what was said before is kept beside.
+    """Count what is there as what was sent; what was said before is kept beside.
 
     Raises:
         StoreError: something is damaged, so nobody can say what is there.

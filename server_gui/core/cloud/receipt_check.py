@@ -130,7 +130,7 @@ def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
 
 
 def tables(store: Store) -> set[str]:
-    """What the store's tables are called for ever."""
+    """Return what the store's tables are called for ever."""
     found = set()
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
         try:

@@ -71,7 +71,7 @@ class Recordings:
             self.problem = error
 
     def sessions(self) -> list[Session]:
-        """Every session, oldest first; rows that wait for upload are not counted."""
+        """Return every session, oldest first; rows that wait for upload are not counted."""
         told: list[Row] = []
         names: dict[tuple[str, str], Session] = {}
         for batch in self._batches:
@@ -107,7 +107,7 @@ class Recordings:
         )
 
     def find(self, name: str, robot: str | None = None) -> Session:
-        """The session whose name is this, or alone begins so.
+        """Return the session whose name is this, or alone begins so.
 
         Raises:
             NoSuchSession: none, or several do.
@@ -121,18 +121,18 @@ class Recordings:
         return sessions.among(known, name, self._url)
 
     def rows_of(self, session: Session, table: Table = EVENTS) -> list[Row]:
-        """The session's rows of this table, in the order in which they were recorded."""
+        """Return the session's rows of this table, in the order in which they were recorded."""
         stored = [] if self._store is None else sessions.rows_of(self._store, session, table)
         mine = (session.robot, session.session)
         told = [row for row in self._waiting(table) if (row["robot"], row["session"]) == mine]
         return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
-        """What somebody says that robot and wearer did, as far as it has not been taken back."""
+        """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
         return holding(self.rows_of(session, LABELS))
 
     def counted(self, session: Session) -> Session:
-        """The session with the extent of all of its rows."""
+        """Return the session with the extent of all of its rows."""
         return self._looked_into(session).added_to(session)
 
     def open(self, session: Session) -> "Recorded":
@@ -198,7 +198,7 @@ class Recorded:
     def telemetry(
         self, names: Sequence[str], begin: datetime | None = None, end: datetime | None = None
     ) -> Iterator[pa.Table]:
-        """The rows from `begin` up to before `end`, as `ml.store.sessions.telemetry`."""
+        """Yield the rows from `begin` up to before `end`, as `ml.store.sessions.telemetry`."""
         with translated(f"the telemetry of {self.session.session} in {self._url} cannot be read"):
             yield from sessions.merged(self._sources, names, begin, end)
 
@@ -224,7 +224,7 @@ class _Waiting:
         self.rows = sum(piece.rows for piece in self._pieces.values())
 
     def source(self) -> Source:
-        """All of it, for `merged`."""
+        """Return all of it, for `merged`."""
         return Source([*self._pieces.values()], self._between)
 
     def _between(self, begin_ns: int, end_ns: int) -> pyarrow.dataset.Dataset:
@@ -247,7 +247,7 @@ class _Waiting:
         return self._there.get(column, Known()).unit
 
     def added_to(self, session: Session) -> Session:
-        """The session with the extent of all of its rows."""
+        """Return the session with the extent of all of its rows."""
         pieces = self._pieces.values()
         first = min(
             (time for time in (session.first, *(each.first for each in pieces)) if time), default=None

@@ -66,7 +66,7 @@ def whole(
 
 
 def receipts_of(spool: Path) -> list[Receipt | Altered]:
-    """The spool's receipts, oldest first.
+    """Return the spool's receipts, oldest first.
 
     Raises:
         SpoolUnusable: they are there, and cannot be read.
@@ -143,7 +143,7 @@ def second_copies(spool: Path) -> dict[int, Batch]:
 
 
 def sent_to(url: str, spool: Path) -> int:
-    """How many batches of the spool went to the store of this URL."""
+    """Return how many batches of the spool went to the store of this URL."""
     return len({(each.writer, each.batch) for each in went_to(_known(spool), url) if each.is_of_batch})
 
 
@@ -158,7 +158,7 @@ def no_store(url: str, spool: Path) -> str:
 
 
 def look(store: Store) -> tuple[list[DataFile], dict[str, str]]:
-    """Every file of the newest versions; which tables' logs cannot be read, and why."""
+    """Return every file of the newest versions; which tables' logs cannot be read, and why."""
     found: list[DataFile] = []
     problems = {}
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
@@ -205,12 +205,12 @@ def _needed(named: Pin) -> str:
 
 
 def files(store: Store) -> list[DataFile]:
-    """Every file that the newest versions of the tables consist of."""
+    """Return every file that the newest versions of the tables consist of."""
     return [file for table in TABLES.values() for file in reading.files(store, table)]
 
 
 def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> Iterator[str]:
-    """What is wrong with these files, in words: absent, of another size, unreadable, other rows.
+    """Yield what is wrong with these files, in words: absent, of another size, unreadable, other rows.
 
     Each file's footer is read, and with `deep` every value.
 
@@ -222,7 +222,7 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
 
 
 def broken(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> list[DataFile]:
-    """Which of these files are absent, cut off or unreadable; raises as `damages` does."""
+    """Return which of these files are absent, cut off or unreadable; raises as `damages` does."""
     told = _each(store, wanted, advance, deep=deep)
     return [file for file, problem in zip(wanted, told, strict=True) if problem]
 
@@ -240,7 +240,7 @@ def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: b
 
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
-    """The spool's batches that were set aside, are nowhere, or have no receipt though they were uploaded.
+    """Return the spool's batches that were set aside, are nowhere, or were uploaded and have no receipt.
 
     Of those with a receipt `prove` knows more. Receipts are read last: a batch has its own before its file
     has another name.
@@ -258,7 +258,7 @@ def batches_missing(store: Store, spool: Path) -> Iterator[str]:
 
 
 def own_receipts(receipts: Iterable[Receipt | Altered], spool: Path) -> list[Receipt]:
-    """Those that the spool itself has written, as far as its name is known."""
+    """Return those that the spool itself has written, as far as its name is known."""
     own = identity(spool)
     return [each for each in receipts if isinstance(each, Receipt) and (not own or each.spool == own)]
 
@@ -315,7 +315,7 @@ def _second_batches(spool: Path) -> tuple[list[spool_reader.Batch], list[str]]:
 
 
 def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spool_reader.Batch], list[str]]:
-    """The second copies that have no receipt, and which cannot be read."""
+    """Return the second copies that have no receipt, and which cannot be read."""
     found, problems = _second_batches(spool)
     return [batch for batch in found if (batch.writer, batch.number) not in known], problems
 

@@ -108,7 +108,7 @@ class Feeds:
         return self._collector is not None and self._settings.recorder.rate_hz == 0
 
     def recording(self, deliver: Deliver, news: News) -> Recording:
-        """What there is to say of who records; `look` keeps it right."""
+        """Return what there is to say of who records; `look` keeps it right."""
         keeper = self._collector or self._elsewhere
         by = {Collector: By.WINDOW, RemoteCollector: By.OTHER}.get(type(keeper), By.NOBODY)
         return Recording(by, keeper, deliver, news, self._why)
@@ -192,7 +192,7 @@ class Feeds:
 
 
 def shown_and_recorded(shown: FollowSettings, recorder: RecordingSettings) -> FollowSettings:
-    """What is asked of a robot that the window shows and records: by one link, once."""
+    """Return what is asked of a robot that the window shows and records: by one link, once."""
     return replace(
         whole(recorder),
         client=shown.client,

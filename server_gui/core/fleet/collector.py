@@ -141,7 +141,7 @@ class Collector:
             self._running.result()
 
     def report(self) -> "concurrent.futures.Future[CollectorReport]":
-        """How everything goes now."""
+        """Return how everything goes now."""
         return self._do(lambda: self._report(""))
 
     def follow(self, robot: str, address: Address) -> "concurrent.futures.Future[None]":
@@ -236,7 +236,7 @@ class Collector:
 
 
 def whole(recorder: RecordingSettings) -> FollowSettings:
-    """What is asked of each robot: everything that the store has a table for."""
+    """Return what is asked of each robot: everything that the store has a table for."""
     return FollowSettings(
         client="gwrms collect",
         channels=recorder.channels,
@@ -249,5 +249,5 @@ def whole(recorder: RecordingSettings) -> FollowSettings:
 
 
 def connect(store: StoreSettings) -> Store:
-    """The store that the server's file names."""
+    """Return the store that the server's file names."""
     return Store(store.url, store.shards, store.several_writers)

@@ -32,7 +32,7 @@ class Benchmark:
         self._read = read
 
     def rehearse(self, rules: Iterable[RuleSettings], data: Path, falls: Path | None) -> list[Rehearsed]:
-        """Those rules of which these recordings can show anything.
+        """Rehearse the rules of which these recordings can show anything.
 
         Raises:
             UnusableData: it is no such file.
@@ -86,7 +86,7 @@ def of_sessions(
     settings: PredictionSettings,
     sessions: Sequence[tuple[str, Sequence[Replayed]]],
 ) -> list[Rehearsed]:
-    """Every rule over the sessions (robot, what was replayed) of the robots that it concerns."""
+    """Rehearse each rule over the sessions (robot, replay) of the robots that it concerns."""
     found = []
     for rule in rules:
         own = [

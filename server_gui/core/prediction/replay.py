@@ -50,7 +50,7 @@ class Replayed:
 def replay(
     store: Store, session: Session, settings: PredictionSettings, models: Sequence[str] = ()
 ) -> list[Replayed]:
-    """Every task's replay, by the models that serve the robot now, or by those named.
+    """Replay every task, by the models that serve the robot now or by those named.
 
     Raises:
         UnusableModel: a model cannot be used, or not for this robot.

@@ -31,7 +31,7 @@ def refuse(text: str) -> None:
 def of_telemetry(
     store: Store, location: str, batches: Iterable[pa.RecordBatch], hear: Hear = refuse
 ) -> list[pa.RecordBatch]:
-    """The rows of these runs that the table does not have; `hear` of one twice, or with other values.
+    """Return the rows of these runs that the table does not have; `hear` of one twice, or with other values.
 
     Raises:
         Contradicted: there is one, and nobody else wants to hear of it.
@@ -44,7 +44,7 @@ def of_telemetry(
 
 
 def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> pa.Table:
-    """The same of a batch's rows in another table."""
+    """Return the same of a batch's rows in another table."""
     mine = (_column("spool") == rows["spool"][0]) & (_column("batch") == rows["batch"][0])
     with translated(f"{store.url}/{table.name} cannot be read"):
         found = store.dataset(table.name).to_table(filter=mine)
@@ -65,7 +65,7 @@ def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> 
 
 
 def newer(rows: Sequence[pa.RecordBatch], store: Store, location: str) -> list[pa.RecordBatch]:
-    """Those of them that retention does not mean to be gone; what has no time is never too old."""
+    """Return those of them that retention does not mean to be gone; what has no time is never too old."""
     until = upkeep.retained(store, location) if rows else None
     if until is None:
         return list(rows)
@@ -82,7 +82,7 @@ def name(writer: str, batch: int, rows: Sequence[pa.RecordBatch]) -> str:
 
 
 def numbers_alone(batch: pa.RecordBatch) -> tuple[pa.RecordBatch, dict[str, str]]:
-    """A run's columns of numbers, and the texts that its rows have in common."""
+    """Return a run's columns of numbers, and the texts that its rows have in common."""
     return batch.drop_columns(list(TEXTS)), {name: batch[name][0].as_py() for name in TEXTS}
 
 

@@ -26,7 +26,7 @@ _Name = tuple[str, str, str, int]  # robot, session, connection, stream
 
 
 def named(batch: pa.RecordBatch, naming: Sequence[str]) -> checksums.Sums:
-    """A number a row of what names it, whatever type somebody may have given that."""
+    """Return a number a row of what names it, whatever type somebody may have given that."""
     columns = [batch[name].cast(pa.int64()) for name in naming]
     return checksums.of_numbers(pa.record_batch(columns, names=list(naming)), {})
 
@@ -107,7 +107,7 @@ class Tally:
         known.times.add(times, each)
 
     def parts(self, location: str, table: str, units: Units) -> list[Part]:
-        """What was counted, the first with the units of the columns."""
+        """Return what was counted, the first with the units of the columns."""
         found = [
             Part(
                 location,
