@@ -38,7 +38,7 @@ class Frame(NamedTuple):
         return _BITS[self.extended][len(self.data)]
 
     def arbitration(self) -> int:
-        """Return its rank, of which the lowest wins: a standard frame before an extended one that begins alike."""
+        """Return its rank, of which the lowest wins: a standard frame goes before an extended one like it."""
         base = self.cob_id if self.extended else self.cob_id << 18
         return base << 2 | self.extended << 1 | self.remote
 

@@ -101,7 +101,7 @@ class Objects:
                 yield Object(found["path"], found["size"], found["last_modified"], tag)
 
     def pieces(self, found: Object, offset: int = 0) -> Iterator[bytes]:
-        """Yield an object's content from a byte on, a request a piece: a slow network is in time with that."""
+        """Yield an object's content from a byte on, a request a piece, so that a slow network is in time."""
         for start in range(offset, found.size_bytes, PIECE_BYTES):
             end = min(start + PIECE_BYTES, found.size_bytes)
             with translated(f"{self.url}/{found.path} cannot be read"):

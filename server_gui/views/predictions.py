@@ -66,7 +66,7 @@ def status(station: Station) -> Line | None:
 
 
 def lines(station: Station) -> Iterator[Line]:
-    """Yield the overview's lines: tasks with their models, rules that hold, what devices say of themselves."""
+    """Yield the overview's lines: tasks with their models, rules that hold, faults of devices."""
     predictions = station.predictions
     told_by_task = predictions.told
     for task, title in TITLES.items():
