@@ -13,7 +13,7 @@ from server_gui.cli.cloud_transfer import download, upload
 USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
 
   ls          tables, or with --path the files below one
-  du          who takes how much: tables and robots
+  du          space used by tables and robots
   verify      is every file there and whole, and every row that the spool has sent
   mend        what verify found: missing files taken out, their rows brought again from the spool
   upload      what waits in the spool, now; or with --from a whole store

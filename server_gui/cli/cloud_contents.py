@@ -45,7 +45,7 @@ def ls(argv: list[str]) -> int:
 
 def du(argv: list[str]) -> int:
     """Run `gwrms cloud du`."""
-    made = parser("cloud du", "Who takes how much of the store.")
+    made = parser("cloud du", "Space used in the store, by tables and robots.")
     add_url(made, "url")
     arguments = made.parse_args(argv)
     store = reach(arguments)

@@ -110,8 +110,8 @@ def download(argv: list[str]) -> int:
     made = parser("cloud download", "A store, or some of it, into a folder: a store too.", DOWNLOAD_EPILOG)
     add_url(made, "url")
     made.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where to")
-    made.add_argument("--robot", action="append", metavar="GLOB", help="these alone; again for more")
-    made.add_argument("--session", action="append", metavar="NAME", help="these alone; again for more")
+    made.add_argument("--robot", action="append", metavar="GLOB", help="these alone; repeat for more")
+    made.add_argument("--session", action="append", metavar="NAME", help="these alone; repeat for more")
     arguments = made.parse_args(argv)
     target = arguments.out.absolute().as_uri()
     if arguments.robot is None and arguments.session is None:

@@ -33,7 +33,7 @@ LOOK_S: Final = 0.25  # a look at what has come waits at most so long
 Show = Callable[[Live, Sequence[PredictionNews]], None]
 
 EPILOG: Final = """Live, robots are followed and nothing is recorded; a rule of the server's file says when it
-holds, and stops nothing: that does whoever records (gwrms collect, or a window that records).
+holds, and stops nothing: only the program that records does (gwrms collect, or a window).
 
 Over a session, its models of today, or those that --model names, say it again. Where one of them was there
 live, the labels of both are compared: they are the same. Where somebody has labelled the session (gwrms
@@ -213,7 +213,7 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME|HOST:PORT",
-        help="live: a robot of the server's file, or where one is; again for more",
+        help="live: a robot of the server's file, or where one is; repeat for more",
     )
     made.add_argument("--seconds", type=float, metavar="N", help="live: end after so long")
     made.add_argument(
@@ -221,14 +221,14 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="SESSION",
-        help="over a recording: its name, or how that alone begins; again for more",
+        help="over a recording: its name, or how that alone begins; repeat for more",
     )
     made.add_argument(
         "--model",
         action="append",
         default=[],
         metavar="ID",
-        help="over a recording: not what serves, but this; again for more",
+        help="over a recording: this instead of the serving one; repeat for more",
     )
     made.add_argument(
         "--rules",
@@ -240,7 +240,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--data", type=Path, metavar="FILE.npz", help="the benchmark's recordings")
     made.add_argument(
-        "--falls", type=Path, metavar="FILE.npz", help="for ipol-falls: what falls are learned from"
+        "--falls", type=Path, metavar="FILE.npz", help="for ipol-falls: recordings of falls to learn from"
     )
     made.add_argument(
         "--url", metavar="URL", help="the store of models and recordings (default: of the server's file)"

@@ -212,7 +212,7 @@ def export(argv: list[str]) -> int:
     )
     made.add_argument("--format", choices=FORMATS, help="default: what FILE ends with")
     made.add_argument(
-        "--channels", action="append", metavar="GLOB", help="these only; again for more (default: all)"
+        "--channels", action="append", metavar="GLOB", help="these only; repeat for more (default: all)"
     )
     _add_times(made, instant_or_seconds, "a time (UTC), or seconds since the session's first sample")
     arguments = made.parse_args(argv)

@@ -1,4 +1,4 @@
-"""What is known of the robot's computer, in words: load, temperatures, what monitoring costs, who leaks."""
+"""The robot's computer in words: load, temperatures, cost of monitoring, memory leaks."""
 
 from typing import Final
 

@@ -49,7 +49,7 @@ class Benchmark:
 def _falls_in_walks(data: Path, falls: Path | None) -> list[Told]:
     if falls is None:
         raise UnusableData(
-            "nobody falls in these walks: name what falls are learned from with --falls FILE.npz"
+            "nobody falls in these walks: name recordings of falls to learn from with --falls FILE.npz"
         )
     return alarms.walks(data, falls)
 

@@ -1,4 +1,4 @@
-"""Resource-processing: the robot's computer over time, who uses it most, and who leaks."""
+"""The robot's computer over time: its greatest consumers, and memory leaks."""
 
 import collections
 import statistics
