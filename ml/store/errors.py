@@ -1,6 +1,7 @@
 """What can go wrong with a store, and how the libraries' errors become these.
 
 StoreError
+├── ColumnTaken        another writer has made a column since it was looked at: look again, and append anew
 ├── NoSuchTable        nothing has been written to it yet, or not that version
 ├── StoreRefused       the keys are wrong or may not do this; retrying is no use
 ├── StoreUnreachable   no answer, or a server's own failure: try again later, nothing is done twice
@@ -22,6 +23,10 @@ from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundErr
 
 class StoreError(Exception):
     """The store could not do what was asked."""
+
+
+class ColumnTaken(StoreError):
+    """A column of the table holds another unit, or another channel, than was to be written to it."""
 
 
 class NoSuchTable(StoreError):

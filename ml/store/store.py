@@ -28,6 +28,7 @@ from pyarrow.fs import FileSystem
 
 from ml.store import durable, torn, writing
 from ml.store.errors import (
+    ColumnTaken,
     NoSuchTable,
     StoreError,
     StoreRefused,
@@ -111,6 +112,7 @@ class Store:
         synchronised when this returns. Columns that the table does not have are added to it.
 
         Raises:
+            ColumnTaken: not with these columns; place them by `columns` again, and repeat it.
             StoreError: it is not known whether they were appended; repeat it.
 
         """
@@ -335,12 +337,12 @@ class Store:
         for name, (unit, channel) in _known(DeltaSchema.from_arrow(schema)).items():
             known = there.get(name, Known(unit))
             if name not in table.schema.names and known.unit != unit:
-                raise StoreError(
+                raise ColumnTaken(
                     f"{where} has {name} in {known.unit or 'no unit'}, and it was to be written in "
                     f"{unit or 'no unit'}: look at its units again, and upload again"
                 )
             if None not in (channel, known.channel) and known.channel != channel:
-                raise StoreError(
+                raise ColumnTaken(
                     f"{where} has {known.channel} in the column {name}, to which {channel} was to be "
                     "written: look at its columns again, and upload again"
                 )

@@ -282,8 +282,10 @@ class Watched(sqlite3.Connection):
         super().close()
         self.disk.connections.discard(self)
         if self.disk.left is None and had and not log.exists() and self.file.exists():
-            self.disk.point(str(log.relative_to(self.disk.root)))  # SQLite keeps it until the rest lasts
-            self.disk.synced(self.file)
+            try:
+                self.disk.point(str(log.relative_to(self.disk.root)))  # SQLite keeps it until the rest lasts
+            finally:
+                self.disk.synced(self.file)  # for a kill too: where the log has gone, the rest lasts
 
     def __del__(self) -> None:
         if self in self.disk.connections:  # nobody has closed it

@@ -1,10 +1,12 @@
 """Every recording, wherever it is: in the store, in this computer's spool, or half in each; every row once.
 
-A batch of the spool is in a table of the store if that says so itself, and is read in the spool if not. The
-spool is listed before a table is looked at, and each table is looked at once: what is uploaded meanwhile is
-neither missed nor found twice.
+A batch of the spool is in a table of the store if that says so itself, and is read in the spool if not.
+Where the table says so and the batch waits all the same, a later one was faster, or a collector was killed
+before it knew: of these the rows are read that the table lacks. The spool is listed before a table is looked
+at, and each table is looked at once: what is uploaded meanwhile is neither missed nor found twice.
 """
 
+import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,12 +27,16 @@ from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
 from server_gui.core.cloud import spool_reader
+from server_gui.core.recording import missing_rows
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Receipts, went_to
 
 _US: Final = timedelta(microseconds=1)
 Row = dict[str, Any]
+Lacking = Callable[
+    [pa.RecordBatch], Sequence[pa.RecordBatch]
+]  # of a run's rows, those that are to be read here
 
 
 class Recordings:
@@ -77,7 +83,7 @@ class Recordings:
         for batch in self._batches:
             try:
                 here = spool_reader.untold(self._spool, [batch], ())
-                told += spool_reader.rows(self._spool, SESSIONS, self._missing(SESSIONS.name, [batch]))
+                told += self._waiting(SESSIONS, [batch])
             except SpoolUnusable as error:
                 self.unread = self.unread or error
             else:
@@ -124,7 +130,8 @@ class Recordings:
         """Return the session's rows of this table, in the order in which they were recorded."""
         stored = [] if self._store is None else sessions.rows_of(self._store, session, table)
         mine = (session.robot, session.session)
-        told = [row for row in self._waiting(table) if (row["robot"], row["session"]) == mine]
+        waiting = self._waiting(table, self._batches)
+        told = [row for row in waiting if (row["robot"], row["session"]) == mine]
         return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
@@ -161,8 +168,11 @@ class Recordings:
         shards = 1 if self._store is None else self._store.about.shards
         location = TELEMETRY.location(session.robot, shards)
         there = {} if self._store is None else self._store.columns(location)
-        batches = self._missing(location, self._batches)
-        return _Waiting(self._spool, batches, session, there, shards)
+        lacking = {
+            each: functools.partial(self._lacking, location, each)
+            for each in self._missing(location, self._batches)
+        }
+        return _Waiting(self._spool, lacking, session, there, shards)
 
     def _is_there(self, location: str) -> bool:
         try:
@@ -170,14 +180,36 @@ class Recordings:
         except NoSuchTable:
             return False
 
-    def _waiting(self, table: Table) -> list[Row]:
-        return spool_reader.rows(self._spool, table, self._missing(table.name, self._batches))
+    def _waiting(self, table: Table, batches: list[int]) -> list[Row]:
+        """The table's rows in these batches that it does not have."""
+        found: list[Row] = []
+        for batch in self._missing(table.name, batches):
+            rows = spool_reader.table_of(self._spool, table, [batch])
+            if rows.num_rows and self._store is not None and self._claims(table.name, batch):
+                lacking = missing_rows.of_rows(self._store, table, rows, _unheard).to_batches()
+                rows = pa.Table.from_batches(
+                    missing_rows.newer(lacking, self._store, table.name), rows.schema
+                )
+            found += rows.to_pylist()
+        return found
 
     def _missing(self, location: str, batches: list[int]) -> list[int]:
-        """The batches of the spool that are not in this table."""
-        if self._store is None:
-            return batches
-        return [each for each in batches if not self._store.has(location, self._writer(each), each)]
+        """The batches of the spool of which this table may lack something."""
+        return [
+            each
+            for each in batches
+            if not self._claims(location, each) or spool_reader.waits(self._spool, each)
+        ]
+
+    def _lacking(self, location: str, batch: int, run: pa.RecordBatch) -> Sequence[pa.RecordBatch]:
+        """The rows of a run in this batch that the table does not have."""
+        if self._store is None or not self._claims(location, batch):
+            return [run]
+        return missing_rows.newer([missing_rows.by_key(self._store, location, run)], self._store, location)
+
+    def _claims(self, location: str, batch: int) -> bool:
+        """Whether the table says that it has this batch of the spool, or a later one of its writer."""
+        return self._store is not None and self._store.has(location, self._writer(batch), batch)
 
     def _writer(self, batch: int) -> str:
         if batch not in self._writers:
@@ -204,17 +236,18 @@ class Recorded:
 
 
 class _Waiting:
-    """A session's telemetry in these batches, as columns of the store; read when it is asked for."""
+    """A session's telemetry that the store lacks, as columns of the store; read when it is asked for."""
 
     def __init__(
         self,
         spool: Path,
-        batches: Sequence[int],
+        batches: Mapping[int, Lacking],
         session: Session,
         there: Mapping[str, Known],
         shards: int,
     ) -> None:
         self._spool = spool
+        self._lacking = batches
         self._session = session
         self._there = there
         self._shards = shards
@@ -277,4 +310,10 @@ class _Waiting:
             if TELEMETRY.location(robot, self._shards) == here
         ]
         found = Columns(layouts, self._before[batch])
-        return pa.Table.from_batches(map(found.batch, runs), schema=found.schema)
+        lacking = self._lacking[batch]
+        pieces = [piece for run in runs for piece in lacking(found.batch(run))]
+        return pa.Table.from_batches(pieces, schema=found.schema)
+
+
+def _unheard(_: str) -> None:
+    """What the store has in another way is told by `gwrms cloud verify`."""

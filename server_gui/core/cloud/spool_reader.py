@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import pyarrow as pa
 
 from ml.store import Table
 from ml.store import sessions as sessions_
@@ -49,6 +50,11 @@ def waiting(spool: Path) -> list[int]:
     return sorted(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.db"))
 
 
+def waits(spool: Path, number: int) -> bool:
+    """Return whether the batch waits for upload now."""
+    return (spool / f"{number:08}.db").exists()
+
+
 def is_empty(spool: Path, number: int) -> bool:
     """Return whether nothing has been recorded into it yet; not where that cannot be read."""
     try:
@@ -77,7 +83,13 @@ def untold(spool: Path, batches: Iterable[int], known: Iterable[tuple[str, str]]
 
 
 def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> list[dict[str, Any]]:
-    """Return a table's rows in these batches, or in all that wait, as the store has them."""
+    """Return a table's rows in these batches, or in all that wait."""
+    made: list[dict[str, Any]] = table_of(spool, table, batches).to_pylist()
+    return made
+
+
+def table_of(spool: Path, table: Table, batches: Iterable[int] | None = None) -> pa.Table:
+    """Return the same as the store has them."""
     found = [
         record.fields | {"spool": name, "batch": batch, "number": number}
         for batch in (waiting(spool) if batches is None else batches)
@@ -85,8 +97,7 @@ def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> lis
         for number, record in _records(spool, batch)
         if record.table == table.name
     ]
-    made: list[dict[str, Any]] = table.rows(found).to_pylist()
-    return made
+    return table.rows(found)
 
 
 def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:

@@ -64,6 +64,14 @@ def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> 
     return rows.filter(pa.array([number not in known for number in numbers]))
 
 
+def by_key(store: Store, location: str, batch: pa.RecordBatch) -> pa.RecordBatch:
+    """The rows of a run that the table does not have by their names alone, whatever columns it has."""
+    with translated(f"{store.url}/{location} cannot be read"):
+        found = store.dataset(location).to_table(columns=["seq", "row"], filter=_like(batch))
+    known = set(_keys(found))
+    return batch.filter(pa.array([key not in known for key in _keys(batch)]))
+
+
 def newer(rows: Sequence[pa.RecordBatch], store: Store, location: str) -> list[pa.RecordBatch]:
     """Return those of them that retention does not mean to be gone; what has no time is never too old."""
     until = upkeep.retained(store, location) if rows else None
@@ -88,11 +96,7 @@ def numbers_alone(batch: pa.RecordBatch) -> tuple[pa.RecordBatch, dict[str, str]
 
 def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str, hear: Hear) -> pa.RecordBatch:
     mine, same = numbers_alone(batch)
-    extent = pc.min_max(batch["utc"])
-    named = (_column("utc") >= extent["min"]) & (_column("utc") <= extent["max"])
-    for key, value in (same | {"stream": batch["stream"][0]}).items():
-        named &= _column(key) == value
-    found = rows.to_table(columns=mine.schema.names, filter=named).combine_chunks()
+    found = rows.to_table(columns=mine.schema.names, filter=_like(batch)).combine_chunks()
     [theirs] = found.to_batches() or [mine.slice(0, 0)]
     known = _once(_keys(theirs), checksums.of_numbers(theirs, same).tolist(), where, hear)
     keys = list(_keys(mine))
@@ -109,7 +113,16 @@ def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str, h
     return batch.filter(pa.array([key not in known for key in keys]))
 
 
-def _keys(batch: pa.RecordBatch) -> Iterator[tuple[int, int]]:
+def _like(batch: pa.RecordBatch) -> pc.Expression:
+    """Of the same robot, session, connection, stream and time as the rows of this run."""
+    extent = pc.min_max(batch["utc"])
+    found = (_column("utc") >= extent["min"]) & (_column("utc") <= extent["max"])
+    for key in (*TEXTS, "stream"):
+        found &= _column(key) == batch[key][0]
+    return found
+
+
+def _keys(batch: pa.RecordBatch | pa.Table) -> Iterator[tuple[int, int]]:
     return zip(batch["seq"].to_pylist(), batch["row"].to_pylist(), strict=True)
 
 

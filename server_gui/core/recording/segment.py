@@ -2,6 +2,7 @@
 
 import collections
 import contextlib
+import functools
 import itertools
 import logging
 import operator
@@ -44,11 +45,12 @@ CREATE TABLE IF NOT EXISTS journal_head (
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL);
 COMMIT;
 """
+TABLES: Final = ("layout", "run", "record", "journal_head", "meta")
 ROWS_AT_ONCE: Final = 20_000  # that are in memory as columns
 PAGE_BYTES: Final = 16_384  # holds several runs; with SQLite's usual 4,096 hardly one
 MAPPED_BYTES: Final = 1 << 28
 _ALIKE: Final = operator.itemgetter(0, 6, 1, 2, 7)
-_COLUMNS: Final = "robot, connection, stream, seq, row, rows, session, layout, data, crc"
+_LINE: Final = "robot, connection, stream, seq, row, rows, session, layout, data, crc"
 SUFFIXES: Final = ("", "-wal", "-shm")  # of the files that SQLite may make
 
 # The last one: a statement of ours is refused, because the tables are not called as we have called them.
@@ -57,6 +59,18 @@ _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE
 _encoder = msgspec.msgpack.Encoder()
 _layout_decoder = msgspec.msgpack.Decoder(Layout)
 _record_decoder = msgspec.msgpack.Decoder(Record)
+
+
+@functools.cache
+def _made() -> dict[str, frozenset[str]]:
+    """The columns of each table, as we make it."""
+    with contextlib.closing(sqlite3.connect(":memory:")) as database:
+        database.executescript(SCHEMA)
+        return {table: _columns(database, table) for table in TABLES}
+
+
+def _columns(database: sqlite3.Connection, table: str) -> frozenset[str]:
+    return frozenset(column[1] for column in database.execute(f"PRAGMA table_info({table})"))
 
 
 @contextlib.contextmanager
@@ -142,9 +156,15 @@ class Segment:
     def _bring_forward(self) -> None:
         """Give a segment from before there were checksums room for them."""
         for table in ("run", "record", "journal_head"):
-            columns = [column[1] for column in self._database.execute(f"PRAGMA table_info({table})")]
-            if "crc" not in columns:
+            if "crc" not in _columns(self._database, table):
                 self._database.execute(f"ALTER TABLE {table} ADD COLUMN crc INTEGER")
+
+    def check_columns(self) -> None:
+        """Raises `Damaged` where its tables are not as we make them: nothing can be written to them."""
+        for table, wanted in _made().items():
+            if wrong := wanted - _columns(self._database, table):
+                missing = ", ".join(sorted(wrong))
+                raise Damaged(f"the spool's file {self.path} is damaged: its table {table} has no {missing}")
 
     def name(self, writer: str) -> None:
         """Say who brings it to the store; while nothing is in it."""
@@ -196,7 +216,7 @@ class Segment:
         self._damaged = None
         with self._transaction():
             self._database.executemany(
-                f"INSERT INTO run ({_COLUMNS}) VALUES ({', '.join('?' * 10)})",
+                f"INSERT INTO run ({_LINE}) VALUES ({', '.join('?' * 10)})",
                 [self._line(run) for run in runs],
             )
             self._database.executemany(
@@ -267,7 +287,7 @@ class Segment:
     def _lines(self) -> Iterator[tuple[Any, ...]]:
         """The runs that are sound; after the last one it is known which are not."""
         damaged = []
-        sql = f"SELECT {_COLUMNS}, rowid FROM run ORDER BY robot, connection, stream, seq, row"
+        sql = f"SELECT {_LINE}, rowid FROM run ORDER BY robot, connection, stream, seq, row"
         for line in self._database.execute(sql):
             if self._sound(line):
                 yield line

@@ -370,7 +370,11 @@ class Spool:
             log.error("%s", self.missing)
         if kept is not Kept.WAITING or known > newest:
             return self._begin(max(newest, known) + 1)
-        segment = self._begin(newest)
+        try:
+            segment = self._begin(newest)
+        except Damaged as error:
+            log.error("%s; what can be read of it goes to the store", error)
+            return self._begin(newest + 1)
         if not (segment.rows or segment.cut_commits):
             return segment
         segment.close()
@@ -379,6 +383,7 @@ class Spool:
     def _begin(self, number: int) -> Segment:
         segment = Segment(self._files.path(number), number)
         try:
+            segment.check_columns()
             with writing(self.folder):
                 if not segment.rows:
                     segment.name(self.writer)

@@ -14,7 +14,7 @@ import pyarrow.dataset
 
 from gateway.cli.text import counted
 from ml.store import upkeep
-from ml.store.errors import NoSuchTable, translated
+from ml.store.errors import ColumnTaken, NoSuchTable, translated
 from ml.store.store import Store
 from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
 from server_gui.core.recording import missing_rows
@@ -31,6 +31,7 @@ from server_gui.core.recording.tally import Tally, tallied
 
 _CUT: Final = -(1 << 62)  # the number of its event
 _WHOLE: Final = _CUT - 1
+_PLACED: Final = 3  # times that columns are placed anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +210,14 @@ def _openings(spool: Spool, store: Store) -> set[str]:
 def _telemetry(
     segment: Segment, writer: str, store: Store, location: str, robots: set[str]
 ) -> Iterable[Part]:
+    """Place the columns anew where another collector has just made one of them, in another unit."""
+    for _ in range(_PLACED):
+        with contextlib.suppress(ColumnTaken):
+            return _placed(segment, writer, store, location, robots)
+    return _placed(segment, writer, store, location, robots)
+
+
+def _placed(segment: Segment, writer: str, store: Store, location: str, robots: set[str]) -> Iterable[Part]:
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
     columns = Columns(layouts, store.columns(location))
     tally = Tally()

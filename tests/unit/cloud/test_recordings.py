@@ -100,6 +100,22 @@ def test_a_session_half_in_the_store_is_whole_and_every_row_is_there_once(
     assert len(values(whole)) == whole.session.rows
 
 
+def test_a_batch_that_a_later_one_has_overtaken_is_read_in_the_spool(folder_url: str, tmp_path: Path) -> None:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool:
+
+        def overtake(piece: int, store: Store) -> None:
+            if piece == 1:  # the first one was left behind by an error of its own
+                send(spool, spool.waiting()[1], store)
+                whole = sole(known := Recordings(folder_url, spool.folder))
+                assert len(values(whole)) == whole.session.rows == 11 * ROWS
+                assert whole.waiting == 6 * ROWS
+                texts = [row["text"] for row in known.rows_of(whole.session) if row["kind"] == "marker"]
+                assert texts == ["5", "11"]
+                assert whole.session.operator == "anna"
+
+        in_pieces(spool, folder_url, overtake)
+
+
 def test_what_is_uploaded_while_somebody_reads_is_there_once(folder_url: str, tmp_path: Path) -> None:
     recorded = record(folder_url, tmp_path / "spool", sent=False)
     before = Recordings(folder_url, tmp_path / "spool")

@@ -1,5 +1,7 @@
 """Each channel has a column of its own in the store, whatever robots and channels are called."""
 
+from pathlib import Path
+
 import pyarrow as pa
 import pyarrow.dataset
 import pytest
@@ -63,3 +65,18 @@ def test_a_column_that_another_has_just_added_for_another_channel_is_refused(fol
     append(stores["row"], "row", 2)
     with pytest.raises(StoreError, match="has row in the column row@rad, to which row@rad was to be written"):
         append(stores["row@rad"], "row@rad", 2)
+
+
+def test_a_column_that_another_collector_has_just_made_in_another_unit_costs_no_upload(
+    tmp_path: Path, folder_url: str
+) -> None:
+    stores = {unit: Store(folder_url) for unit in ("deg", "rad")}
+    for channel in ("hip", "knee"):  # of the knee, neither table that they have open knows anything
+        for unit, store in stores.items():
+            with Spool(tmp_path / unit, reserve_bytes=0) as spool:
+                with Recorder(spool) as recorder:
+                    units = {channel: unit if channel == "knee" else "rad"}
+                    recorder.describe("exo-01", described("exo-01", units))
+                    recorder.record("exo-01", 1, batch(0, channels=(channel,)))
+                upload_all(spool, store)
+    assert Store(folder_url).dataset(HERE).schema.names[-3:] == ["hip", "knee", "knee@rad"]

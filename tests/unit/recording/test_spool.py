@@ -138,6 +138,24 @@ def test_a_damaged_segment_is_set_aside_its_number_is_not_given_again_and_record
     assert "00000002.db is damaged: file is not a database; it is kept as" in said
 
 
+@pytest.mark.parametrize("rows", [0, 3])
+def test_where_a_column_is_called_otherwise_recording_goes_on_in_a_file_of_its_own(
+    tmp_path: Path, rows: int
+) -> None:
+    with Spool(tmp_path) as spool:
+        if rows:
+            spool.append([run(rows=rows)], [])
+    file = tmp_path / "00000001.db"
+    file.write_bytes(
+        file.read_bytes().replace(b"session TEXT", b"sessyon TEXT")
+    )  # as a flipped bit leaves it
+    with Spool(tmp_path) as spool:
+        spool.append([run(seq=9)], [])
+        spool.freeze()
+        assert spool.waiting() == [1, 2]
+        assert len(runs(spool.read(2))) == 1
+
+
 def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(SpoolUnusable, match="cannot be used"):
