@@ -4,7 +4,7 @@ import time
 from collections import Counter
 
 from gateway.cli.arguments import seconds
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, say, say_json, table
 from gateway.wire.resource import Overrun, Overruns
 
@@ -27,12 +27,12 @@ _REASONS = {"others_ran": "others ran", "own_work": "its own work", "asleep": "i
 
 def main(argv: list[str]) -> int:
     """Run `gwrms blame`; Ctrl-C ends it with the summary."""
-    made = parser("blame", "Watch the robot's control loop, and name who made it late.", EPILOG)
+    made = parser("blame", "Watch the robot's control loop, and name what made it late.", EPILOG)
     made.add_argument("--seconds", type=seconds, help="to watch (default: until Ctrl-C)")
     arguments = made.parse_args(argv)
     end_s = float("inf") if arguments.seconds is None else time.monotonic() + arguments.seconds
     seen: list[Overrun] = []
-    with reach(arguments, "blame") as robot:
+    with connect(arguments, "blame") as robot:
         told = robot.overruns()
         try:
             while True:

@@ -1,4 +1,4 @@
-"""The computer: CPU, memory, processes, and who made its control loop late."""
+"""The computer: CPU, memory, processes, and what made its control loop late."""
 
 from typing import Annotated, Literal
 

@@ -88,7 +88,7 @@ FAULTS = {
     "slow_disk": Fault(
         Target.HOST,
         _disk,
-        "Whoever waits for the same disk (fsync) waits longer, for it is kept busy; not so in tmpfs.",
+        "Programs that wait for the same disk (fsync) wait longer, for it is kept busy; not so in tmpfs.",
         {
             "folder": FolderName("a folder on the disk; empty for the simulator's own"),
             "writers": Number(2, 1, 16, "", "programs that write", Form.WHOLE),

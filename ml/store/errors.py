@@ -74,7 +74,7 @@ _ADVICE: Final = {
 }
 _ADVICE_OF_DISKS: Final = {
     "No space left on device": "make room there",
-    "Permission denied": "whoever runs this must be allowed to read there, and to write what is changed",
+    "Permission denied": "this account must be allowed to read there, and to write what is changed",
     "Read-only file system": "mount it for writing, or take another folder",
 }
 _LET_GO: Final = "bring it back from a copy, or let gwrms cloud mend take it out of its table"

@@ -3,17 +3,17 @@
 from collections.abc import Callable
 from typing import Final
 
-from gateway.cli.reach import choose
+from gateway.cli.connect import choose
 from ml.store.private import private_files
-from server_gui.cli.cloud_look import du, ls, verify
+from server_gui.cli.cloud_contents import du, ls, verify
+from server_gui.cli.cloud_maintenance import compact, retain, vacuum
 from server_gui.cli.cloud_mend import mend
-from server_gui.cli.cloud_move import download, upload
-from server_gui.cli.cloud_upkeep import compact, retain, vacuum
+from server_gui.cli.cloud_transfer import download, upload
 
 USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
 
   ls          tables, or with --path the files below one
-  du          who takes how much: tables and robots
+  du          space used by tables and robots
   verify      is every file there and whole, and every row that the spool has sent
   mend        what verify found: missing files taken out, their rows brought again from the spool
   upload      what waits in the spool, now; or with --from a whole store

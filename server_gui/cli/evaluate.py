@@ -77,7 +77,7 @@ def _answer(benchmark: Benchmark, outcome: Outcome, seconds: float) -> dict[str,
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms evaluate",
-        description="How well what we predict holds for people, real or simulated, that no model has seen.",
+        description="How well predictions hold for people, real or simulated, whom no model has seen.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

@@ -18,7 +18,7 @@ from ml.registry.card import age_days
 from ml.store import Store, sessions
 from ml.store.private import private_files
 from ml.store.sessions import Session
-from server_gui.cli.cloud_reach import parser
+from server_gui.cli.cloud_options import parser
 from server_gui.cli.rehearse import rehearse
 from server_gui.core.prediction.live import Live
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
@@ -33,7 +33,7 @@ LOOK_S: Final = 0.25  # a look at what has come waits at most so long
 Show = Callable[[Live, Sequence[PredictionNews]], None]
 
 EPILOG: Final = """Live, robots are followed and nothing is recorded; a rule of the server's file says when it
-holds, and stops nothing: that does whoever records (gwrms collect, or a window that records).
+holds, and stops nothing: only the program that records does (gwrms collect, or a window).
 
 Over a session, its models of today, or those that --model names, say it again. Where one of them was there
 live, the labels of both are compared: they are the same. Where somebody has labelled the session (gwrms
@@ -106,9 +106,9 @@ def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: ar
     ):
         while time.monotonic() < until_s:
             ending.check()
-            foreseen = live.look(LOOK_S)
-            predicted |= any(isinstance(one, Predicted) for one in foreseen)
-            show(live, foreseen)
+            news = live.look(LOOK_S)
+            predicted |= any(isinstance(one, Predicted) for one in news)
+            show(live, news)
     return 0 if predicted else 1
 
 
@@ -125,21 +125,21 @@ def _shown(arguments: argparse.Namespace) -> Iterator[Show]:
             yield lambda live, _: picture.update(Text(_page(live)))
     else:
         said: dict[tuple[str, str], str] = {}
-        yield lambda _, foreseen: _show_new(foreseen, said)
+        yield lambda _, news: _show_new(news, said)
 
 
 def _page(live: Live) -> str:
     return "\n".join(told(name, watched) for name, watched in live.robots.items())
 
 
-def _show_json(_live: Live, foreseen: Sequence[PredictionNews]) -> None:
-    for one in foreseen:
+def _show_json(_live: Live, news: Sequence[PredictionNews]) -> None:
+    for one in news:
         say_json(fields(one))
 
 
-def _show_new(foreseen: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
+def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
     """A line for each change."""
-    for one in foreseen:
+    for one in news:
         match one:
             case Predicted(prediction=prediction):
                 key = (one.robot, prediction.task)
@@ -155,7 +155,7 @@ def _show_new(foreseen: Sequence[PredictionNews], said: dict[tuple[str, str], st
 
 
 def fields(one: PredictionNews) -> dict[str, Any]:
-    """What was foreseen, for machines."""
+    """Return what was predicted, for machines."""
     match one:
         case Predicted():
             trust = {"trust": one.trust.level.value, "drifted": one.trust.drifted}
@@ -213,7 +213,7 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME|HOST:PORT",
-        help="live: a robot of the server's file, or where one is; again for more",
+        help="live: a robot of the server's file, or where one is; repeat for more",
     )
     made.add_argument("--seconds", type=float, metavar="N", help="live: end after so long")
     made.add_argument(
@@ -221,14 +221,14 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="SESSION",
-        help="over a recording: its name, or how that alone begins; again for more",
+        help="over a recording: its name, or how that alone begins; repeat for more",
     )
     made.add_argument(
         "--model",
         action="append",
         default=[],
         metavar="ID",
-        help="over a recording: not what serves, but this; again for more",
+        help="over a recording: this instead of the serving one; repeat for more",
     )
     made.add_argument(
         "--rules",
@@ -240,7 +240,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--data", type=Path, metavar="FILE.npz", help="the benchmark's recordings")
     made.add_argument(
-        "--falls", type=Path, metavar="FILE.npz", help="for ipol-falls: what falls are learned from"
+        "--falls", type=Path, metavar="FILE.npz", help="for ipol-falls: recordings of falls to learn from"
     )
     made.add_argument(
         "--url", metavar="URL", help="the store of models and recordings (default: of the server's file)"

@@ -14,7 +14,7 @@ from ml.store.private import private_files
 from ml.training.judging import Judged
 from ml.training.material import Wish
 from ml.training.training import Trained, told, train
-from server_gui.cli.cloud_reach import add_url, parser, url
+from server_gui.cli.cloud_options import add_url, parser, url
 from server_gui.cli.models import NOTHING
 
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
@@ -138,14 +138,14 @@ def _parser() -> argparse.ArgumentParser:
     add_url(made)
     made.add_argument("--robot", default="", metavar="NAME", help="learn from it alone, and serve it alone")
     made.add_argument(
-        "--session", action="append", default=[], metavar="NAME", help="these alone; again for more"
+        "--session", action="append", default=[], metavar="NAME", help="these alone; repeat for more"
     )
     made.add_argument(
         "--held-out",
         action="append",
         default=[],
         metavar="WHO",
-        help="wearers, or sessions, to be judged by; again for more",
+        help="wearers, or sessions, to be judged by; repeat for more",
     )
     made.add_argument("--promote", action="store_true", help="let it serve, if it is better")
     made.add_argument(

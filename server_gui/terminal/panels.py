@@ -65,7 +65,7 @@ NARROW = Look(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
 
 
 def header(robot: Robot, where: str, look: Look) -> RenderableType:
-    """Which robot, how it is reached, how old what is shown is, what is wrong."""
+    """Return which robot, how it is reached, how old what is shown is, what is wrong."""
     row = Table.grid(expand=True, padding=(0, 2))
     row.add_column(ratio=1)
     row.add_column(justify="right")
@@ -97,7 +97,7 @@ def _link(robot: Robot, look: Look) -> Text:
 
 
 def joints(station: Station, look: Look) -> RenderableType:
-    """Every joint with its drive's state and its angle over the last seconds."""
+    """Return every joint with its drive's state and its angle over the last seconds."""
     robot = station.robot
     stale = robot.is_stale()
     grid = Table(box=None, expand=True, padding=(0, 1), header_style=DIM)
@@ -148,7 +148,7 @@ def _part_state(robot: Robot, name: str) -> Text:
 
 
 def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
-    """What each foot carries, how the trunk leans, and how the wearer walks."""
+    """Return what each foot carries, how the trunk leans, and how the wearer walks."""
     stale = robot.is_stale()
     grid = Table.grid(expand=True, padding=(0, 1))
     grid.add_column(no_wrap=True)
@@ -187,7 +187,7 @@ def _walk(gait: Gait, look: Look) -> str:
 
 
 def parameters(robot: Robot, controls: Controls, look: Look) -> RenderableType:
-    """The gait parameters as the controller holds them; the chosen one can be moved."""
+    """Return the gait parameters as the controller holds them; the chosen one can be moved."""
     grid = Table.grid(expand=True, padding=(0, 1))
     for justify in ("left", "left", "right", "left", "left"):
         grid.add_column(justify=justify, no_wrap=True)
@@ -219,7 +219,7 @@ def _range(held: ParameterValue, info: ParameterInfo | None, look: Look) -> Text
 
 
 def resources(station: Station, look: Look) -> RenderableType:
-    """The robot's computer: CPU, memory, and who uses them most."""
+    """Return the robot's computer: CPU, memory, and who uses them most."""
     robot, table = station.robot, station.processes
     seen = robot.resources
     if seen is None:
@@ -245,7 +245,7 @@ def resources(station: Station, look: Look) -> RenderableType:
 
 
 def footer(station: Station, controls: Controls, where: str) -> RenderableType:
-    """The keys, and the last thing that was said."""
+    """Return the keys, and the last thing that was said."""
     keys = Text.assemble(
         (" s ", "bold white on red"),
         " STOP   ",

@@ -54,7 +54,7 @@ class Resources(QWidget):
         self._frame = 0
         self.setObjectName("page")
         self.cpu, self.memory = Trend(theme, "CPU", 20.0), Trend(theme, "Memory", 256.0, 1 / MIB)
-        self.top = Trend(theme, "Who uses the CPU, % of a core", 10.0)
+        self.top = Trend(theme, "CPU use by process, % of a core", 10.0)
         self.devices = Trend(theme, "Disk and network, KiB/s", 10.0, 1 / KIB)
         self.temperature = Trend(theme, "Temperature", 10.0)
         self.facts = PlainLabel()

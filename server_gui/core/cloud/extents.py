@@ -1,4 +1,4 @@
-"""Whether a file's rows are from when to when log and file say: who asks for a time reads no others."""
+"""Whether log and file are right about the time of a file's rows: a query for a time reads no other files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -57,7 +57,7 @@ def _fits(told: _Extent, ends: _Extent, slack: Any) -> bool:
 def _words(name: str, told: _Extent, ends: _Extent, who: str) -> str:
     return (
         f"{who} that {name} goes from {told[0]} to {told[1]}, and it goes from {ends[0]} to {ends[1]}: "
-        "who asks for a time may not find its rows; bring log and file back from a copy"
+        "a query for a time may not find its rows; bring log and file back from a copy"
     )
 
 

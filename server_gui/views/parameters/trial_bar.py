@@ -57,7 +57,7 @@ class TrialBar(QFrame):
         ends = (
             f"the robot takes it back in {left_s:.0f} s"
             if left_s
-            else "its time is over: looking what is held …"
+            else "its time is over: reading the values …"
         )
         set_text(self.words, f"On trial: {_values(station, trial, self._desk)}; {ends}")
 

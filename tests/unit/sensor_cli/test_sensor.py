@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from drivers.cli import look, sensor
+from drivers.cli import listen, sensor
 from drivers.errors import SettingsError, Unavailable
 from tests.support.waiting import until
 from tests.unit.port.terminals import Terminal
@@ -121,7 +121,7 @@ def test_unknown_sensor_is_identified_and_shown_live(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(look, "LISTEN_S", 0.4)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.4)
     with Talking(terminal, streams()[name]):
         assert sensor.main([str(terminal.path), "--seconds", "1"]) == 0
     out = capsys.readouterr().out
@@ -133,7 +133,7 @@ def test_unknown_sensor_is_identified_and_shown_live(
 def test_identified_sensor_as_json(
     terminal: Terminal, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(look, "LISTEN_S", 0.4)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.4)
     with Talking(terminal, streams()["xsens"]):
         assert sensor.main([str(terminal.path), "--json"]) == 0
     (line,) = lines(capsys)
@@ -143,7 +143,7 @@ def test_identified_sensor_as_json(
 def test_silent_port_is_called_silent(
     terminal: Terminal, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(look, "LISTEN_S", 0.05)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.05)
     assert sensor.main([str(terminal.path), "--baud", "9600"]) == 1
     assert "power" in capsys.readouterr().err
 
@@ -160,7 +160,7 @@ def test_what_is_recorded_is_replayed_at_its_pace(
     with Talking(terminal, streams()["bno08x-rvc"]):
         assert sensor.main(["record", str(terminal.path), str(file), "--seconds", "1"]) == 0
     assert file.stat().st_size > 500
-    monkeypatch.setattr(look, "LISTEN_S", 0.5)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.5)
     replaying = threading.Thread(target=sensor.main, args=(["replay", str(file), "--link", str(link)],))
     replaying.start()
     try:

@@ -178,7 +178,7 @@ def test_keys_are_in_no_object_of_ours(backend: SeaweedFS | None, store_url: str
     ("error", "said"),
     [
         (OSError(28, "No space left on device"), "No space left on device; make room there"),
-        (PermissionError(13, "Permission denied"), "Permission denied; whoever runs this must be allowed"),
+        (PermissionError(13, "Permission denied"), "Permission denied; this account must be allowed"),
         (OSError(111, "Connection refused"), "Connection refused; check the network"),
     ],
 )

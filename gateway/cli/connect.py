@@ -39,7 +39,7 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
     return made
 
 
-def reach(arguments: argparse.Namespace, command: str) -> Robot:
+def connect(arguments: argparse.Namespace, command: str) -> Robot:
     """The robot that `--robot` names, connected.
 
     Raises:

@@ -5,14 +5,14 @@ from collections.abc import Iterator
 from gateway.cli.text import NONE, say, say_json, size, table
 from ml.store.sessions import Session
 from ml.store.tables import RESOURCES
-from server_gui.cli.cloud_reach import add_url, parser, recordings
+from server_gui.cli.cloud_options import add_url, parser, recordings
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.processing.recorded_use import Looks, ProgramUse, looks, used
 from server_gui.core.processing.regression import Regression, SessionUse, regressions
 
 HEADER = ("PROCESS", "CPU", "MEMORY", "AT MOST", "GROWTH AN HOUR")
 COMPARE_EPILOG = """Several sessions a side are separated by commas: with one alone, a version cannot be told
-from a day. A process is named whose median over the minutes is a tenth more, and at least 1 % of a core or
+from a day. A process is named if its median over the minutes is a tenth more, and at least 1 % of a core or
 2 MiB, if three quarters of the sessions after lie above three quarters of those before, and if chance is
 ruled out (rank-sum test, p < 0.01 over all comparisons together).
 
@@ -25,7 +25,9 @@ exit status
 
 def resources(argv: list[str]) -> int:
     """Run `gwrms sessions resources`."""
-    made = parser("sessions resources", "What each program on the robot's computer took, and who leaks.")
+    made = parser(
+        "sessions resources", "Resources that each program on the robot's computer used, and memory leaks."
+    )
     made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
     add_url(made)
     arguments = made.parse_args(argv)
@@ -69,7 +71,7 @@ def _version(session: Session) -> str:
 
 
 def _looks(known: Recordings, session: Session) -> Looks:
-    return looks(known.happenings(session, RESOURCES))
+    return looks(known.rows_of(session, RESOURCES))
 
 
 def _told(sides: list[list[SessionUse]], found: list[Regression]) -> Iterator[str]:

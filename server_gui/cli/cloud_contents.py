@@ -8,7 +8,7 @@ from typing import Final
 from gateway.cli.text import NONE, say, say_json, size, table, warn
 from ml.store.errors import NoSuchTable, StoreError
 from ml.store.objects import Object
-from server_gui.cli.cloud_reach import add_url, parser, progress, reach, spool, url, when
+from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool, url, when
 from server_gui.core.cloud import usage
 from server_gui.core.cloud import verify as checks
 from server_gui.core.cloud.usage import Usage
@@ -45,7 +45,7 @@ def ls(argv: list[str]) -> int:
 
 def du(argv: list[str]) -> int:
     """Run `gwrms cloud du`."""
-    made = parser("cloud du", "Who takes how much of the store.")
+    made = parser("cloud du", "Space used in the store, by tables and robots.")
     add_url(made, "url")
     arguments = made.parse_args(argv)
     store = reach(arguments)

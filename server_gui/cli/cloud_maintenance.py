@@ -4,14 +4,14 @@ import argparse
 import math
 from datetime import UTC, datetime, timedelta
 
-from gateway.cli.reach import ask
+from gateway.cli.connect import ask
 from gateway.cli.text import counted, say, say_json, table
 from ml.store import TABLES, TELEMETRY, Store, UnsafeStore, upkeep
 from ml.store.tables import RESOURCES
-from server_gui.cli.cloud_reach import add_url, parser, reach, when
+from server_gui.cli.cloud_options import add_url, parser, reach, when
 
 COMPACT_EPILOG = """An upload brings a file a robot; some thousands of small files make a table slow to
-open. Once an hour or a day is enough. Nobody who writes or reads is disturbed, and older versions stay as
+open. Once an hour or a day is enough. Writers and readers are not disturbed, and older versions stay as
 they are."""
 RETAIN_EPILOG = """Rows go from the newest version only: older versions, and those that models were made
 from, still have them until gwrms cloud vacuum. By default telemetry and resources; sessions, events,
@@ -39,7 +39,7 @@ def retain(argv: list[str]) -> int:
     """Run `gwrms cloud retain`."""
     made = _parser("retain", "Remove rows that are older than so many days.", RETAIN_EPILOG)
     made.add_argument("--days", type=_days, required=True, metavar="N", help="how old rows may become")
-    made.add_argument("--table", action="append", choices=TABLES, help="of this table; again for more")
+    made.add_argument("--table", action="append", choices=TABLES, help="of this table; repeat for more")
     made.add_argument("--yes", action="store_true", help="do not ask")
     arguments = made.parse_args(argv)
     store = _writable(arguments)
