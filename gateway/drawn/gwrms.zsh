@@ -626,7 +626,7 @@ _shtab_gwrms_predict_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
   "--json[for machines]"
-  "*--robot[live\: a robot of the server\'s file, or where one is\; again for more]:NAME|HOST:PORT:"
+  "*--robot[live\: a robot of the server\'s file, or where one is\; again for more]:NAME|[NAME=]HOST:PORT:"
   "--seconds[live\: end after so long]:N:"
   "*--session[over a recording\: its name, or how that alone begins\; again for more]:SESSION:"
   "*--model[over a recording\: not what serves, but this\; again for more]:ID:"
