@@ -1,19 +1,16 @@
 """`gwrms sensor PORT`: tries baud rates and formats on an unknown sensor, then shows it live."""
 
 import argparse
-import os
-import select
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import msgspec
 
+from drivers.cli.listening import best, listen, nothing
 from drivers.component import Component
-from drivers.errors import Unavailable
-from drivers.identify import Match, matches
+from drivers.identify import Match
 from drivers.imu.device import Imu
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.imu.settings import ImuSettings
@@ -21,22 +18,10 @@ from drivers.insole import layout as layouts
 from drivers.insole.build import insoles
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.settings import InsoleSettings
-from drivers.port import open_port
 from drivers.samples import State
 
-BAUDRATES = (115200, 230400, 9600, 460800, 921600, 57600, 38400, 19200, 4800)
-LISTEN_S = 1.0
-SURE = 0.9  # a share of the bytes that needs no other baud rate tried
 REFRESH_S = 0.25
-
-
-@dataclass(frozen=True, slots=True)
-class Heard:
-    """What came at one baud rate."""
-
-    baudrate: int
-    bytes: int
-    match: Match | None
+AXES = "# which of its axes point forward, left and up; here as its maker means it to sit"
 
 
 def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
@@ -45,91 +30,52 @@ def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], i
     parser.add_argument(
         "--seconds", type=float, help="show it live for so long (0: not at all; default: Ctrl-C)"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON line: what was found")
+    parser.add_argument("--json", action="store_true", help="one JSON line: what was found, with the table")
     return run
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify, then show; 1 when nothing fits.
+    """Identify, print the table for the robot's file, then show it live; 1 when nothing fits.
 
     Raises:
         Unavailable: the port cannot be opened.
 
     """
     heard = []
-    for one in listen(options.port, (options.baud,) if options.baud else BAUDRATES):
+    for one in listen(options.port, options.baud):
         heard.append(one)
         if not options.json:
-            sys.stdout.write(f"{one.baudrate:>7} baud: {_described(one)}\n")
+            sys.stdout.write(f"{one.baudrate:>7} baud: {one}\n")
             sys.stdout.flush()
-    best = max(heard, key=lambda one: one.match.share if one.match else -1.0)
+    found = best(heard)
+    wired = None if found.match is None else table(options.port, found.baudrate, found.match)
     if options.json:
-        sys.stdout.write(msgspec.json.encode({"port": options.port, "found": best}).decode() + "\n")
-    if best.match is None:
-        sys.stderr.write(f"gwrms sensor: {_nothing(options.port, heard)}\n")
+        told = {"port": options.port, "found": found, "table": wired}
+        sys.stdout.write(msgspec.json.encode(told).decode() + "\n")
+    if found.match is None:
+        sys.stderr.write(f"gwrms sensor: {nothing(options.port, heard)}\n")
         return 1
-    if options.json or options.seconds == 0:
+    if options.json:
         return 0
-    sys.stdout.write(f"\nfor the robot's file:\n\n{table(options.port, best.baudrate, best.match)}\n")
-    _show(_components(options.port, best.baudrate, best.match), options.seconds)
+    sys.stdout.write(f"\nfor the robot's file:\n\n{wired}\n")
+    if options.seconds != 0:
+        _show(_components(options.port, found.baudrate, found.match), options.seconds)
     return 0
-
-
-def listen(port: str, baudrates: tuple[int, ...]) -> Iterator[Heard]:
-    """What speaks at each baud rate, until one fits."""
-    for baudrate in baudrates:
-        data = _read(port, baudrate, LISTEN_S)
-        match = next(iter(matches(data)), None)
-        yield Heard(baudrate, len(data), match)
-        if match is not None and match.share >= SURE:
-            return
 
 
 def table(port: str, baudrate: int, match: Match) -> str:
     """What of the robot's file wires the sensor: a table, or one for each foot."""
     keys = f'port = "{port}"\nbaudrate = {baudrate}\nformat = "{match.format_name}"\n'
     if match.format_name in IMU_FORMATS:
-        return f"[imu.trunk]\n{keys}"
+        axes = msgspec.json.encode(IMU_FORMATS[match.format_name].conventions.axes).decode()
+        return f"[imu.trunk]\n{keys}axes = {axes:<22} {AXES}\n"
     layout = _layout(match)
     keys += f'layout = "{layout}"\n' if layout is not None else ""
-    return "\n".join(f"[insole.{foot}_insole]\n{keys}" for foot in match.feet or ("left",))
-
-
-def _read(port: str, baudrate: int, seconds: float) -> bytes:
-    data = b""
-    until = time.monotonic() + seconds
-    with open_port(port, baudrate) as line:
-        while (left := until - time.monotonic()) > 0:
-            if select.select([line.fileno()], [], [], left)[0]:
-                try:
-                    part = os.read(line.fileno(), 4096)
-                except OSError as error:
-                    raise Unavailable(f"{port} went away while it was read: check its cable") from error
-                if not part:
-                    raise Unavailable(f"{port} went away while it was read: check its cable")
-                data += part
-    return data
-
-
-def _described(heard: Heard) -> str:
-    if not heard.bytes:
-        return "silent"
-    if heard.match is None:
-        return f"{heard.bytes} bytes in no format known"
-    match = heard.match
-    cells = f", {match.cells} cells" if match.cells else ""
-    return (
-        f"{match.format_name}{cells}: {match.frames} frames explain {match.share:.0%} of {heard.bytes} bytes"
-    )
-
-
-def _nothing(port: str, heard: list[Heard]) -> str:
-    if not any(one.bytes for one in heard):
-        return f"{port} is silent: check the sensor's power and its TX wire, and whether it has to be started"
-    return (
-        f"{port} sends bytes that no known format explains: try another --baud, or describe it in a layout "
-        "file (formats insole-csv and insole-frame)"
-    )
+    if not match.feet:
+        return (
+            f"[insole.left_insole]  # or right_insole: which foot it is under, its frames do not say\n{keys}"
+        )
+    return "\n".join(f"[insole.{foot}_insole]\n{keys}" for foot in match.feet)
 
 
 def _layout(match: Match) -> str | None:

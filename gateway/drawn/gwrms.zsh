@@ -104,7 +104,7 @@ _shtab_gwrms_params_commands() {
 _shtab_gwrms_sensor_commands() {
   local _commands=(
     decode:'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}.'
-    record:'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate and duration.'
+    record:'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: it may be noise at a wrong baud rate.'
     replay:'Sends a capture'"'"'s bytes out of a pseudo-terminal, at the pace at which they were recorded. Prints {"ready": true, "port": …} when it can be opened.'
   )
   _describe 'gwrms sensor commands' _commands
@@ -677,7 +677,7 @@ _shtab_gwrms_sensor_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--baud[try this baud rate only]:baud:"
   "--seconds[show it live for so long (0\: not at all\; default\: Ctrl-C)]:seconds:"
-  "--json[one JSON line\: what was found]"
+  "--json[one JSON line\: what was found, with the table]"
   ":best a stable path\: \/dev\/serial\/by-id\/\…:"
 )
 
@@ -696,7 +696,8 @@ _shtab_gwrms_sensor_decode_defaults_added=0
 
 _shtab_gwrms_sensor_record_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--baud[default\: 115200]:baud:"
+  "--baud[default\: the first at which a format fits]:baud:"
+  "--raw[whatever comes, as of a sensor that nobody knows yet (without --baud at 115200)]"
   "--seconds[for so long\; default\: until Ctrl-C]:seconds:"
   ":PORT:"
   ":FILE:_files"
