@@ -52,6 +52,12 @@ def recognise(data: bytes) -> Match | None:
     return next(iter(matches(data)), None)
 
 
+def format_of(data: bytes) -> str | None:
+    """The name of that format."""
+    match = recognise(data)
+    return None if match is None else match.format_name
+
+
 def _try(data: bytes, name: str, layout: str | None, make_parser: Callable[[], Parser[Any]]) -> Match | None:
     parser = make_parser()
     frames = parser.feed(data)

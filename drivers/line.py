@@ -8,10 +8,15 @@ from drivers.port import SerialPort
 
 F = TypeVar("F")
 Listening = TypeVar("Listening", contravariant=True)
+Recognise = Callable[[bytes], str | None]  # the name of the format that some bytes are in
 
 TAIL = 2048  # bytes that are kept to tell what speaks there instead
 UNREAD = 256  # bytes without a frame that are no beginning of one any more
 SILENCE_S = 1.0  # a sensor that streams says something within this time
+
+
+def unrecognised(_data: bytes) -> None:
+    """Recognise nothing: for who does not know other formats."""
 
 
 class User(Protocol[Listening]):
@@ -27,17 +32,25 @@ class User(Protocol[Listening]):
 class Line(Generic[F]):
     """A port and a parser; open while at least one user is started.
 
+    `recognise` is asked about bytes without a frame, so that the problem can name what speaks there instead.
+
     `start` and `stop` belong to one thread. Everything else may be read from any.
     """
 
     def __init__(
-        self, path: str, baudrate: int, format_name: str, make_parser: Callable[[], Parser[F]]
+        self,
+        path: str,
+        baudrate: int,
+        format_name: str,
+        make_parser: Callable[[], Parser[F]],
+        recognise: Recognise = unrecognised,
     ) -> None:
         self.path = path
         self.format_name = format_name
         self.parser = make_parser()
         self.reconnects = 0
         self._make_parser = make_parser
+        self._recognise = recognise
         self._port = SerialPort(path, baudrate, self._received, self._opened, self._closed)
         self._users: tuple[User[F], ...] = ()
         self._unread = 0  # bytes since the last frame, or since the port was opened
@@ -70,14 +83,10 @@ class Line(Generic[F]):
             return f"no byte from {self.path} for {silent_s:.1f} s: check the sensor's power and its TX wire"
         if self._unread < UNREAD:
             return None
-        from drivers.identify import (
-            recognise,  # imports every format: for a line that nobody understands only
-        )
-
-        spoken = recognise(self._unread_tail)
+        spoken = self._recognise(self._unread_tail)
         why = f"wrong baud rate or wrong format (gwrms sensor {self.path} finds out)"
-        if spoken is not None and spoken.format_name != self.format_name:
-            why = f"another device is there, it speaks {spoken.format_name}"
+        if spoken is not None and spoken != self.format_name:
+            why = f"another device is there, it speaks {spoken}"
         return (
             f"{self._unread} bytes came from {self.path} at {self._port.baudrate} baud "
             f"and no {self.format_name} frame among them: {why}"

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drivers.line import Line, Recognise, unrecognised
+
 if TYPE_CHECKING:
     import eds
     from drivers.bus.bus import CanBus
-    from drivers.line import Line
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +18,10 @@ class Site:
 
     file: Path  # the robot's; other files are looked for beside it
     buses: "Mapping[str, CanBus]" = field(default_factory=dict)
-    lines: "dict[str, Line[Any]]" = field(default_factory=dict)  # by the ports' paths
+    lines: dict[str, Line[Any]] = field(default_factory=dict)  # by the ports' paths
     descriptions: "dict[str, eds.Description]" = field(default_factory=dict)  # of CANopen devices, by name
+
+    recognise: Recognise = unrecognised  # what speaks on a line instead of the format that is expected
 
     @property
     def folder(self) -> Path:

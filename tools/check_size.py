@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Final
 
 MOST_LINES: Final = 500
-MOST_LINES_OF_TESTS: Final = 700  # of one part, with what they need
 
 
 def main() -> int:
@@ -15,14 +14,10 @@ def main() -> int:
     lengths = {
         name: len(Path(name).read_text(encoding="utf-8").splitlines()) for name in listed.stdout.split()
     }
-    too_long = {name: lines for name, lines in lengths.items() if lines > _most(name)}
+    too_long = {name: lines for name, lines in lengths.items() if lines > MOST_LINES}
     for name, lines in too_long.items():
-        sys.stdout.write(f"{name}: {lines} lines, more than {_most(name)}: it is more than one idea\n")
+        sys.stdout.write(f"{name}: {lines} lines, more than {MOST_LINES}: it is more than one idea\n")
     return len(too_long) > 0
-
-
-def _most(name: str) -> int:
-    return MOST_LINES_OF_TESTS if name.startswith("tests/") else MOST_LINES
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
 from drivers.cli.sensor import run_parsed
 from drivers.errors import SettingsError, Unavailable
+from drivers.identify import format_of
 from drivers.imu import zero
 from drivers.imu.build import build_imu
 from drivers.imu.device import Imu
@@ -24,7 +25,7 @@ from drivers.imu.settings import ImuSettings, kind_of
 from drivers.imu.trunk import TrunkImu
 from drivers.insole import fit as fitting
 from drivers.insole.calibration import CellCalibration, loaded_counts
-from drivers.insole.format import USUAL_LAYOUT, layout_of
+from drivers.insole.device import USUAL_LAYOUT, layout_of
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.frame import InsoleFrame
 from drivers.line import Line
@@ -113,7 +114,9 @@ class _Average:
 
 def _insole(options: argparse.Namespace) -> int:
     layout = layout_of(options.format, options.layout)
-    line = Line(options.port, options.baud, options.format, INSOLE_FORMATS[options.format].parser(layout))
+    line = Line(
+        options.port, options.baud, options.format, INSOLE_FORMATS[options.format].parser(layout), format_of
+    )
     base = CellCalibration(
         polarity="falling" if options.falling else "rising",
         full_scale=options.falling,
@@ -157,7 +160,7 @@ def _imu(options: argparse.Namespace) -> int:
 def _imu_on_port(options: argparse.Namespace) -> Imu:
     settings = {"port": options.port, "baudrate": options.baud, "format": options.format}
     settings |= {"mounting": options.mounting} | ({"axes": options.axes} if options.axes else {})
-    return Imu("trunk", msgspec.convert(settings, ImuSettings))
+    return Imu("trunk", msgspec.convert(settings, ImuSettings), recognise=format_of)
 
 
 def _imu_in_file(where: str) -> TrunkImu | None:
@@ -180,7 +183,7 @@ def _imu_in_file(where: str) -> TrunkImu | None:
         raise SettingsError(f"{file} has no table of the name {error}, which [imu.{name}] needs") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise SettingsError(f"{file}: {error}") from error
-    return build_imu(name, settings, Site(Path(file), buses))
+    return build_imu(name, settings, Site(Path(file), buses, recognise=format_of))
 
 
 def _average(line: Line[InsoleFrame], foot: str | None, cells: int) -> list[float]:

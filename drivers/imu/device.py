@@ -7,17 +7,23 @@ from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame, moments
 from drivers.imu.settings import ImuSettings
 from drivers.imu.trunk import TrunkImu
-from drivers.line import Line
+from drivers.line import Line, Recognise, unrecognised
 from drivers.samples import Quality
 
 
 class Imu(TrunkImu):
     """An IMU that streams over a serial port (a `Component`)."""
 
-    def __init__(self, name: str, settings: ImuSettings, beside: Path | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        settings: ImuSettings,
+        beside: Path | None = None,
+        recognise: Recognise = unrecognised,
+    ) -> None:
         imu_format = FORMATS[settings.format]
         super().__init__(name, settings, imu_format.conventions, settings.attitude, beside)
-        self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.parser)
+        self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.parser, recognise)
         self._clock_spec = imu_format.clock
         self._clock = imu_format.clock.make() if imu_format.clock else None
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from drivers.clock import ClockSpec
-from drivers.imu import rotation
+from drivers.imu.conventions import USUAL, Conventions
 from drivers.imu.frame import ImuFrame
-from drivers.imu.rotation import Quaternion
-from drivers.imu.settings import Axis, CanImuSettings, ImuSettings, NodeImuSettings
+from drivers.imu.settings import CanImuSettings, ImuSettings, NodeImuSettings
 from drivers.parsing import Parser
 
 if TYPE_CHECKING:
@@ -18,25 +17,13 @@ if TYPE_CHECKING:
     Build = Callable[[str, Any, Site], TrunkImu]  # name, settings of its kind, site
 
 
-@dataclass(frozen=True, slots=True)
-class Conventions:
-    """How a device lays its axes and angles.
-
-    `axes` are the sensor's axes along the trunk's x (forward), y (left) and z (up) when it is mounted as its
-    maker means it; `angles` makes the orientation (sensor to the device's world) of its roll, pitch and yaw.
-    """
-
-    axes: tuple[Axis, Axis, Axis] = ("x", "y", "z")
-    angles: Callable[[float, float, float], Quaternion] = rotation.from_yaw_pitch_roll
-
-
 # The components are imported by who builds one: they need what is here.
 
 
 def _on_port(name: str, settings: ImuSettings, site: "Site") -> "TrunkImu":
     from drivers.imu.device import Imu
 
-    return Imu(name, settings, site.folder)
+    return Imu(name, settings, site.folder, site.recognise)
 
 
 def _on_bus(name: str, settings: CanImuSettings, site: "Site") -> "TrunkImu":
@@ -51,7 +38,7 @@ class Format:
 
     parser: Callable[[], Parser[ImuFrame]]
     clock: ClockSpec | None = None  # of the frames' ticks
-    conventions: Conventions = Conventions()
+    conventions: Conventions = USUAL
     settings: type[ImuSettings] = ImuSettings  # of its table; what it adds has defaults
     build: "Build" = _on_port
 
@@ -63,7 +50,7 @@ class CanFormat:
     decode: Callable[[bytes], ImuFrame | None]  # one payload; None where it is not the device's
     parser: Callable[[], Parser[ImuFrame]]  # of captured payloads
     maker: str  # in words
-    conventions: Conventions = Conventions()
+    conventions: Conventions = USUAL
     settings: type[CanImuSettings] = CanImuSettings
     build: "Build" = _on_bus
 

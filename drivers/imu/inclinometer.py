@@ -14,7 +14,7 @@ from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import SettingsError
 from drivers.imu import slopes
 from drivers.imu.canopen.cia410 import InclinometerSettings
-from drivers.imu.format import Conventions
+from drivers.imu.conventions import Conventions
 from drivers.imu.motion import TILT
 from drivers.imu.slopes import MappedSlope, SlopePlan
 from drivers.imu.trunk import TrunkImu

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from drivers.errors import SettingsError
 from drivers.imu import rotation
 from drivers.imu.attitude import ComplementaryFilter
-from drivers.imu.format import Conventions
+from drivers.imu.conventions import Conventions
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion, Vector
 from drivers.imu.settings import Attitude, MountedSettings

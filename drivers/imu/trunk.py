@@ -6,7 +6,7 @@ from pathlib import Path
 from drivers.component import Kind
 from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
-from drivers.imu.format import Conventions
+from drivers.imu.conventions import Conventions
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import UNITS, TrunkMotion, channels
 from drivers.imu.plausibility import ImuCheck

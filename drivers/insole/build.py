@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import cast
 
 from drivers.component import Component, Kind
-from drivers.insole.device import Insole, line_for
-from drivers.insole.format import layout_of
+from drivers.insole.device import Insole, layout_of, line_for
 from drivers.insole.settings import InsoleSettings
 from drivers.site import Site
 
@@ -20,7 +19,7 @@ def build_insole(name: str, settings: InsoleSettings, site: Site) -> Insole:
     """
     if settings.port not in site.lines:
         layout = layout_of(settings.format, settings.layout, site.folder)
-        site.lines[settings.port] = line_for(settings, layout)
+        site.lines[settings.port] = line_for(settings, layout, site.recognise)
     return Insole(name, settings, site.lines[settings.port], site.folder)
 
 

@@ -7,8 +7,8 @@ from drivers.component import Kind
 from drivers.errors import SettingsError
 from drivers.freshness import Freshness, silence_text
 from drivers.insole import calibration as calibrations
+from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
-from drivers.insole.format import layout_of
 from drivers.insole.formats import FORMATS
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import FEET, Foot, Layout
@@ -16,9 +16,10 @@ from drivers.insole.load import Stance, load_of
 from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
-from drivers.line import Line
+from drivers.line import Line, Recognise, unrecognised
 from drivers.samples import Channel, Quality, State
 
+USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}
 
 
@@ -199,7 +200,22 @@ class Insole:
         }
 
 
-def line_for(settings: InsoleSettings, layout: Layout) -> Line[InsoleFrame]:
+def layout_of(format_name: str, layout_name: str | None, beside: Path | None = None) -> Layout:
+    """The layout of that name; without one, the device's own, or the usual one.
+
+    Raises:
+        SettingsError: there is none, or it is wrong; the message names file and key.
+
+    """
+    own = FORMATS[format_name].layout
+    if own is not None and layout_name is None:
+        return own
+    return layouts.load(layout_name or USUAL_LAYOUT, beside)
+
+
+def line_for(
+    settings: InsoleSettings, layout: Layout, recognise: Recognise = unrecognised
+) -> Line[InsoleFrame]:
     """The line that `settings` describe.
 
     Raises:
@@ -207,7 +223,7 @@ def line_for(settings: InsoleSettings, layout: Layout) -> Line[InsoleFrame]:
 
     """
     make_parser = FORMATS[settings.format].parser(layout)
-    return Line(settings.port, settings.baudrate, settings.format, make_parser)
+    return Line(settings.port, settings.baudrate, settings.format, make_parser, recognise)
 
 
 def _calibration(settings: InsoleSettings, layout: Layout, beside: Path | None) -> Cells | None:

@@ -5,10 +5,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gateway.cli.parameters import say_written, trial_s
 from gateway.cli.reach import ask, check_names, choose, parameter_names, parser, reach
-from gateway.cli.text import exact, say, say_json, table, warn
-from gateway.cli.trial import wait_for_decision
+from gateway.cli.text import counted, exact, say, say_json, table, warn
+from gateway.cli.writing import add_trial, write
 from gateway.client import Robot
 from gateway.coding import Number
 from gateway.parameter_files.comparison import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
@@ -101,9 +100,7 @@ def apply(argv: list[str]) -> int:
     made = _parser("apply", "Bring a robot's parameters to what a file says, all or none.", APPLY_EPILOG)
     made.add_argument("--yes", action="store_true", help="do not ask")
     made.add_argument("--skip", action="store_true", help="leave out what cannot be changed at all")
-    made.add_argument(
-        "--trial", metavar="S", type=trial_s, help="try it for S seconds (at most 300); exit status 0 if kept"
-    )
+    add_trial(made)
     arguments = made.parse_args(argv)
     with reach(arguments, "params") as robot:
         scope = Scope(robot.describe(), arguments.component)
@@ -112,14 +109,9 @@ def apply(argv: list[str]) -> int:
         changes = _changes(rows, arguments.file, skip=arguments.skip)
         if not changes:
             return 0
-        if not ask(f"Write {_counted(len(changes), 'parameter')}?", yes=arguments.yes):
+        if not ask(f"Write {counted(len(changes), 'parameter')}?", yes=arguments.yes):
             return 1
-        if arguments.trial is None:
-            say_written(robot.write(changes), scope.robot, json=arguments.json)
-            return 0
-        with robot.trial(changes, arguments.trial) as written:
-            say_written(written, scope.robot, json=arguments.json)
-            return wait_for_decision(robot, written, json=arguments.json)
+        return write(robot, changes, scope.robot, arguments)
 
 
 def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
@@ -152,11 +144,11 @@ def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number
     found = Counter(row.verdict for row in rows)
     refused = sum(found[verdict] for verdict in REFUSED)
     if refused:
-        raise FileProblem(f"{file}: nothing was sent, the robot would refuse {_counted(refused, 'value')}")
+        raise FileProblem(f"{file}: nothing was sent, the robot would refuse {counted(refused, 'value')}")
     fixed = sum(found[verdict] for verdict in CANNOT_CHANGE)
     if fixed and not skip:
         raise FileProblem(
-            f"{file}: nothing was sent, {_counted(fixed, 'value')} cannot be changed; --skip leaves them out"
+            f"{file}: nothing was sent, {counted(fixed, 'value')} cannot be changed; --skip leaves them out"
         )
     changes = {
         row.name: row.file for row in rows if row.verdict is Verdict.DIFFERENT and row.file is not None
@@ -164,7 +156,7 @@ def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number
     size = len(encode_request(0, PARAMETER_WRITE.name, ParameterWriteParams(changes))) if changes else 0
     if size > LINE_LIMIT:
         raise FileProblem(
-            f"{file}: nothing was sent, {_counted(len(changes), 'change')} are too many for one request "
+            f"{file}: nothing was sent, {counted(len(changes), 'change')} are too many for one request "
             f"({size / 1024:.0f} of {LINE_LIMIT // 1024} KiB): divide the file"
         )
     return changes
@@ -179,7 +171,7 @@ def _say_saved(file: Path, count: int, problems: Mapping[str, str], *, json: boo
     if json:
         say_json({"file": str(file), "saved": count, "problems": problems})
     else:
-        say(f"{file}: {_counted(count, 'parameter')}\n")
+        say(f"{file}: {counted(count, 'parameter')}\n")
 
 
 def _say_unlike(rows: Sequence[Row], *, json: bool) -> None:
@@ -203,7 +195,3 @@ def _table(rows: Iterable[Row]) -> str:
 def _summary(rows: Iterable[Row]) -> str:
     found = Counter(row.verdict for row in rows)
     return ", ".join(f"{found[verdict]} {verdict}" for verdict in Verdict if found[verdict]) + "\n"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -17,7 +17,6 @@ from hil_sim.bus.interface import InterfaceUnusable, open_interface, to_bytes, t
 from hil_sim.clock import MILLISECOND_NS, Event
 from hil_sim.errors import SimulatorError
 from hil_sim.loop import Loop
-from hil_sim.node.nmt import HEARTBEAT_BASE
 
 LISTEN_S = 1.0  # how long to find out who is there already; heartbeats rarely come less often
 
@@ -25,7 +24,7 @@ _RETRY_NS = 500 * MILLISECOND_NS
 _BACKLOG = 256  # frames that the interface does not take yet: about a fifth of a second of a walking robot
 _AT_ONCE = 256  # frames received in one go
 _FULL = (errno.EAGAIN, errno.ENOBUFS)
-_SDO_REQUEST, _SDO_ANSWER = 0x600, 0x580  # CiA 301 §7.3.5, by node id
+_SDO_REQUEST, _SDO_ANSWER, _HEARTBEAT = 0x600, 0x580, 0x700  # CiA 301 §7.3.5, by node id
 _READ_DEVICE_TYPE = bytes.fromhex("40 00 10 00 00 00 00 00")
 
 
@@ -58,7 +57,7 @@ class SocketCanBridge:
         self._retry: Event | None = None
         self._waiting: deque[bytes] = deque(maxlen=_BACKLOG)
         # What nobody but a device of that node id sends.
-        self._ours = {base + node for base in (HEARTBEAT_BASE, _SDO_ANSWER) for node in nodes}
+        self._ours = {base + node for base in (_HEARTBEAT, _SDO_ANSWER) for node in nodes}
         self._socket: socket.socket | None = open_interface(interface)
         try:
             self._refuse_doubles(self._socket)

@@ -12,7 +12,8 @@ import struct
 
 from drivers.clock import ClockSpec
 from drivers.imu import rotation
-from drivers.imu.format import Conventions, Format
+from drivers.imu.conventions import Conventions
+from drivers.imu.format import Format
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Quaternion
 from drivers.parsing import FrameScanner, Sequence

@@ -13,7 +13,8 @@ import struct
 from typing import Any, NamedTuple
 
 from drivers.clock import ClockSpec
-from drivers.imu.format import Conventions, Format
+from drivers.imu.conventions import Conventions
+from drivers.imu.format import Format
 from drivers.imu.frame import ImuFrame, More
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 

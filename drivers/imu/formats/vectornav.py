@@ -15,7 +15,8 @@ from functools import reduce
 from operator import xor
 
 from drivers.clock import ClockSpec
-from drivers.imu.format import Conventions, Format
+from drivers.imu.conventions import Conventions
+from drivers.imu.format import Format
 from drivers.imu.frame import ImuFrame
 from drivers.imu.rotation import Vector
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs

@@ -51,7 +51,7 @@ def assemble(config: RobotConfig) -> Robot:
         gc.freeze()  # so that what is collected below is looked for among little
     for name, settings in config.can.items():
         robot.buses[name] = CanBus(name, settings, config.gateway.role, urgent=config.guard is not None)
-    site = Site(config.path, robot.buses, descriptions=robot.descriptions)
+    site = Site(config.path, robot.buses, descriptions=robot.descriptions, recognise=_format_of)
     for kind, builder in BUILDERS.items():
         for name, settings in getattr(config, kind).items():
             _add(robot, kind, name, partial(builder.build, name, settings, site))
@@ -59,6 +59,12 @@ def assemble(config: RobotConfig) -> Robot:
         if builder.join is not None:
             builder.join(robot.components)
     return robot
+
+
+def _format_of(data: bytes) -> str | None:
+    from drivers import identify  # imports every format: for a line that nobody understands only
+
+    return identify.format_of(data)
 
 
 def _import_canopen(*, with_can: bool) -> None:

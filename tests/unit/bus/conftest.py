@@ -1,13 +1,15 @@
-"""A bus on a virtual channel of the test's own, and a description of a small device."""
+"""A bus on a virtual channel of the test's own, a description of a small device, and one with its worker."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 import eds
 from drivers.bus.bus import CanBus
+from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import CanSettings
+from tests.unit.bus.sdo_device import Device
 
 IDENTITY = {
     (0x1000, 0): (0x00020192).to_bytes(4, "little"),
@@ -73,3 +75,16 @@ def describe(tmp_path: Path) -> Callable[[int], eds.Description]:
         return eds.load(path, node_id)
 
     return load
+
+
+@pytest.fixture
+def device() -> Device:
+    return Device()
+
+
+@pytest.fixture
+def worker(device: Device) -> Iterator[SdoWorker]:
+    worker = SdoWorker(device.channel)
+    worker.start()
+    yield worker
+    worker.stop()

@@ -3,9 +3,7 @@
 import io
 import json
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -17,52 +15,7 @@ from gateway.parameter_files.comparison import Verdict, compare
 from gateway.parameter_files.contents import COMMANDS
 from gateway.wire.limits import LINE_LIMIT
 from gateway.wire.parameter import ParameterInfo, ParameterValue
-from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, config, serving
-
-EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'
-STEP, CYCLE, TORQUE, VELOCITY = (0x2001, 0), (0x2002, 0), (0x6072, 0), (0x6081, 0)
-
-
-@pytest.fixture
-def robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator["Served"]:
-    bench = Bench()
-    monkeypatch.setattr("gateway.modules.component.module.assemble", bench.assemble)
-    monkeypatch.chdir(tmp_path)
-    for drive in (bench.left, bench.right):
-        drive.set_state(DISABLED)
-        drive.node.objects |= {
-            VELOCITY: (65190).to_bytes(4, "little"),
-            (0x6083, 0): (260_000).to_bytes(4, "little"),
-            (0x6084, 0): (260_000).to_bytes(4, "little"),
-            (0x1017, 0): (100).to_bytes(2, "little"),
-        }
-    text = ROBOT.replace("gear_ratio = 100.0\n", "gear_ratio = 100.0" + EDS)
-    with serving(config(tmp_path, text)) as (host, port):
-        yield Served(bench, f"{host}:{port}")
-
-
-class Served:
-    def __init__(self, bench: Bench, address: str) -> None:
-        self.bench = bench
-        self.address = address
-
-    def run(self, *arguments: str) -> int:
-        return main([*arguments, "--robot", self.address])
-
-    def gait(self, key: tuple[int, int]) -> int:
-        return int.from_bytes(self.bench.gait.node.objects[key], "little")
-
-    def left(self, key: tuple[int, int]) -> int:
-        return int.from_bytes(self.bench.left.node.objects[key], "little")
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def lines(capsys: pytest.CaptureFixture[str]) -> list[list[str]]:
-    return [line.split() for line in capsys.readouterr().out.splitlines()]
+from tests.unit.cli.served import CYCLE, STEP, TORQUE, VELOCITY, Served, Terminal, lines
 
 
 def verdicts(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
@@ -142,7 +95,6 @@ def test_a_file_that_is_there_is_not_written_over_unasked(
 
 
 # Verdicts
-
 VERDICTS = """
 [parameters]
 "gait.step_length" = 0.4004
@@ -436,69 +388,3 @@ def test_an_unknown_command_is_wrong_usage(
 ) -> None:
     assert main(["params", *arguments]) == 2
     assert "usage: gwrms params save FILE" in capsys.readouterr().err
-
-
-# Store and restore
-
-
-@pytest.fixture
-def storing(robot: Served) -> Served:
-    node = robot.bench.left.node
-    node.objects |= {(0x1010, 1): b"\1\0\0\0", (0x1011, 1): b"\1\0\0\0"}
-    node.store = lambda index, data: b"\1\0\0\0" if index in (0x1010, 0x1011) else data
-    return robot
-
-
-def sent(robot: Served) -> list[tuple[int, Any]]:
-    return robot.bench.left.node.written()
-
-
-def test_store_takes_the_lease_and_says_what_was_done(
-    storing: Served, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert storing.run("store", "left_knee") == 0
-    assert capsys.readouterr().out == "left_knee: stored, and it still holds the same values\n"
-    assert sent(storing) == [(0x1010, b"save")]
-
-
-@pytest.mark.parametrize(("answer", "status", "done"), [("yes\n", 0, [(0x1011, b"load")]), ("n\n", 1, [])])
-def test_restore_asks_first(
-    storing: Served, monkeypatch: pytest.MonkeyPatch, answer: str, status: int, done: list[tuple[int, bytes]]
-) -> None:
-    monkeypatch.setattr("sys.stdin", Terminal(answer))
-    assert storing.run("restore", "left_knee") == status
-    assert sent(storing) == done
-
-
-def test_restore_with_yes_in_a_script(storing: Served, capsys: pytest.CaptureFixture[str]) -> None:
-    assert storing.run("restore", "left_knee", "--yes", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["component"] == "left_knee"
-
-
-def test_a_refused_store_is_a_sentence(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
-    assert robot.run("store", "left_insole") == 1
-    assert "'left_insole' is no device that can store" in capsys.readouterr().err
-
-
-# What is shown of read-only parameters
-
-
-def test_describe_counts_what_is_read_only_and_get_shows_it(
-    robot: Served, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert robot.run("describe") == 0
-    printed = capsys.readouterr().out
-    assert "more, read-only (gwrms get 'left_knee.*')" in printed
-    assert "left_knee.profile_velocity" in printed
-    assert "left_knee.controlword" not in printed
-    assert robot.run("get", "left_knee.0x1017:0", "left_knee.max_torque") == 0
-    shown = lines(capsys)
-    assert ["left_knee.producer_heartbeat_time", "100", "–", "…", "–", "read-only:", "communication"] in shown
-
-
-def test_a_parameter_is_set_by_its_address_and_whole_numbers_stay_whole(
-    robot: Served, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert robot.run("set", "left_knee.0x6081:0=70001", "--json") == 0
-    assert '"left_knee.profile_velocity":70001}' in capsys.readouterr().out
-    assert robot.left(VELOCITY) == 70001

@@ -50,12 +50,6 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     return found
 
 
-@pytest.fixture
-def spool(tmp_path: Path) -> Iterator[Spool]:
-    with Spool(tmp_path / "spool", reserve_bytes=0) as opened:
-        yield opened
-
-
 class Robot:
     """A stream of rows, ten milliseconds apart on its own clock, each batch received as its newest row is."""
 

@@ -1,8 +1,5 @@
 """Each channel has a column of its own in the store, whatever robots and channels are called."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pyarrow as pa
 import pyarrow.dataset
 import pytest
@@ -15,12 +12,6 @@ from server_gui.core.recording.upload import send
 from tests.unit.recording.robots import batch, described, value
 
 HERE = TELEMETRY.location("exo-01", 1)
-
-
-@pytest.fixture
-def spool(tmp_path: Path) -> Iterator[Spool]:
-    with Spool(tmp_path / "spool", reserve_bytes=0) as opened:
-        yield opened
 
 
 def upload_all(spool: Spool, store: Store) -> None:

@@ -31,12 +31,6 @@ from tests.unit.recording.robots import CHANNELS, batch, description, stamp_ns, 
 HERE = TELEMETRY.location("exo-01", 1)
 
 
-@pytest.fixture
-def spool(tmp_path: Path) -> Iterator[Spool]:
-    with Spool(tmp_path / "spool", reserve_bytes=0) as opened:
-        yield opened
-
-
 def upload_all(spool: Spool, store: Store) -> None:
     for number in spool.waiting():
         segment = spool.read(number)

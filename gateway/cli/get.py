@@ -1,0 +1,39 @@
+"""`gwrms get`: parameters, as the devices have them now."""
+
+from gateway.cli.reach import check_names, parameter_names, parser, reach
+from gateway.cli.text import exact, say, say_json, table
+from gateway.wire.parameter import ParameterInfo, ParameterValue
+
+EPILOG = """examples:
+  gwrms get 'gait.*'
+  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not
+  gwrms get left_knee.0x6072:0       by its address in the device"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms get`."""
+    made = parser("get", "Read parameters from the devices, now.", EPILOG)
+    made.add_argument(
+        "names",
+        metavar="GLOB",
+        nargs="*",
+        help="names, addresses or globs (default: all that can be changed)",
+    )
+    arguments = made.parse_args(argv)
+    with reach(arguments, "get") as robot:
+        description = robot.describe()
+        check_names("parameter", arguments.names, parameter_names(description))
+        values = robot.read(*arguments.names).values
+    if arguments.json:
+        say_json({"values": values})
+    else:
+        infos = {info.name: info for info in description.parameters}
+        rows = [_row(infos[name], value) for name, value in values.items()]
+        say(table(("PARAMETER", "VALUE", "UNIT", "RANGE", ""), rows, right=(1,)))
+    return 1 if any(value.value is None for value in values.values()) else 0
+
+
+def _row(info: ParameterInfo, value: ParameterValue) -> tuple[str, ...]:
+    read_only = f"read-only: {info.read_only}" if info.read_only else ""
+    bounds = f"{exact(value.min)} … {exact(value.max)}"
+    return info.name, exact(value.value), value.unit, bounds, value.problem or read_only

@@ -1,0 +1,24 @@
+"""`gwrms restore`: a device gets its defaults back."""
+
+from gateway.cli.reach import ask, reach
+from gateway.cli.storage import device_parser, say_stored
+
+EPILOG = """Refused as gwrms store is. The defaults act after the device's next reset: switch it off
+and on.
+
+example:
+  gwrms restore left_knee"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms restore`."""
+    made = device_parser("restore", "Give a device its defaults back (1011h).", EPILOG)
+    made.add_argument("--yes", action="store_true", help="do not ask")
+    arguments = made.parse_args(argv)
+    with reach(arguments, "restore") as robot:
+        question = f"{arguments.component} loses what was stored in it, and takes its defaults. Go on?"
+        if not ask(question, yes=arguments.yes):
+            return 1
+        restored = robot.restore(arguments.component)
+    say_stored(restored, json=arguments.json)
+    return 0
