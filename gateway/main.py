@@ -1,7 +1,7 @@
 """The `gwrms` command: finds the subcommand and imports only what it needs.
 
-Exit codes: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr; `--debug`
-shows the traceback.
+Exit codes: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr, with `--json`
+also an object on stdout; `--debug` shows the traceback.
 """
 
 import importlib
@@ -133,6 +133,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         if page := _help_without(error, arguments):
             sys.stdout.write(page)
             return 0
+        if "--json" in rest:  # who reads that finds the error where the answer would be
+            from gateway.cli.text import say_json
+
+            kind = getattr(error, "kind", None) or type(error).__name__
+            say_json({"error": {"kind": str(kind), "message": explain(error)}})
         if debug:
             traceback.print_exc()
         else:

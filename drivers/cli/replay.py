@@ -32,8 +32,8 @@ class About(msgspec.Struct, frozen=True):
 def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
         "Records a port's raw bytes, and beside them FILE.json with baud rate, format and duration. Listens "
-        "first, as gwrms sensor does, and records nothing that no format explains: it may be noise at a wrong "
-        "baud rate."
+        "first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a "
+        "wrong baud rate."
     )
     parser.add_argument("port", metavar="PORT")
     parser.add_argument("file", metavar="FILE", type=Path)

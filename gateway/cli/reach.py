@@ -60,6 +60,12 @@ def reach(arguments: argparse.Namespace, command: str) -> Robot:
     return Robot(address, LinkSettings(client=f"gwrms {command}"), report)
 
 
+def widened(asked: Iterable[str], description: Description) -> list[str]:
+    """A component's name alone means all that it has: `left_knee` is `left_knee.*`."""
+    components = {each.name for each in description.components}
+    return [f"{name}.*" if name in components else name for name in asked]
+
+
 def check_names(what: str, asked: Iterable[str], known: Sequence[str]) -> None:
     """Refuse a name or glob that nothing on the robot has.
 

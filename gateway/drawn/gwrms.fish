@@ -185,7 +185,7 @@ complete -c gwrms -n '_shtab_gwrms_using sensor' -s h -l help -d 'show this help
 complete -c gwrms -n '_shtab_gwrms_using sensor' -l baud -x -d 'try this baud rate only'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -l seconds -x -d 'show it live for so long (0: not at all; default: Ctrl-C)'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -l json -d 'one JSON line: what was found, with the table'
-complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq 1' -a record -d 'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: it may be noise at a wrong baud rate.'
+complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq 1' -a record -d 'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a wrong baud rate.'
 complete -c gwrms -n '_shtab_gwrms_using sensor record' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor record' -l baud -x -d 'default: the first at which a format fits'
 complete -c gwrms -n '_shtab_gwrms_using sensor record' -l raw -d 'whatever comes, as of a sensor that nobody knows yet (without --baud at 115200)'

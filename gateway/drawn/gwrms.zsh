@@ -104,7 +104,7 @@ _shtab_gwrms_params_commands() {
 _shtab_gwrms_sensor_commands() {
   local _commands=(
     decode:'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}.'
-    record:'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: it may be noise at a wrong baud rate.'
+    record:'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a wrong baud rate.'
     replay:'Sends a capture'"'"'s bytes out of a pseudo-terminal, at the pace at which they were recorded. Prints {"ready": true, "port": …} when it can be opened.'
   )
   _describe 'gwrms sensor commands' _commands
@@ -414,7 +414,7 @@ _shtab_gwrms_get_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
-  "(*)::names, addresses or globs (default\: all that can be changed):"
+  "(*)::names, addresses, globs, or a component (default\: all that can be changed):"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -931,7 +931,7 @@ _shtab_gwrms_watch_options=(
   "--json[one JSON object a line, for machines]"
   "--rate[ticks a second, 0.1 to 1000 (default 10)]:HZ:"
   "--count[end after N lines]:N:"
-  "(*):names or globs:"
+  "(*):names, globs, or a component\: all of its channels:"
 )
 
 # guard to ensure default positional specs are added only once per session
