@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "bench": ("gateway.cli.bench:main", "measure a robot's gateway: latency, CPU and memory of what it does"),
     "blame": ("gateway.cli.blame:main", "when the control loop is late, and who ran instead"),
     "watch": ("gateway.cli.watch:main", "follow channels live"),
+    "top": ("server_gui.cli.top:main", "one robot in the terminal, live: tune, stop, reset"),
     "get": ("gateway.cli.get:main", "read parameters from the devices"),
     "set": ("gateway.cli.set:main", "change parameters, all or none, read back"),
     "params": ("gateway.cli.params:main", "parameters as files: save, compare, apply"),

@@ -28,6 +28,13 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+    add_robot(made)
+    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    return made
+
+
+def add_robot(made: argparse.ArgumentParser) -> None:
+    """The argument `--robot`: which gateway."""
     made.add_argument(
         "--robot",
         metavar="HOST:PORT",
@@ -35,8 +42,6 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         default=Address(),
         help=f"the gateway to ask (default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
-    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
-    return made
 
 
 def reach(arguments: argparse.Namespace, command: str) -> Robot:

@@ -43,6 +43,7 @@ _shtab_gwrms_commands() {
     snapshot:'One look at a robot: what it has now, asked once.'
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
     store:'Make a device keep its parameters as they are now (1010h).'
+    top:'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
     train:'A model from recorded sessions and their labels.'
     watch:'Follow channels live, one line for every tick.'
   )
@@ -907,6 +908,15 @@ _shtab_gwrms_store_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_store_defaults_added=0
 
+_shtab_gwrms_top_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--seconds[end after N seconds]:N:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_top_defaults_added=0
+
 _shtab_gwrms_train_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
@@ -989,6 +999,7 @@ _shtab_gwrms() {
         snapshot) _arguments -C -s $_shtab_gwrms_snapshot_options ;;
         stop) _arguments -C -s $_shtab_gwrms_stop_options ;;
         store) _arguments -C -s $_shtab_gwrms_store_options ;;
+        top) _arguments -C -s $_shtab_gwrms_top_options ;;
         train) _arguments -C -s $_shtab_gwrms_train_options ;;
         watch) _arguments -C -s $_shtab_gwrms_watch_options ;;
       esac
