@@ -34,7 +34,7 @@ Values = list[float | None]
 
 
 def reported(robot: Exoskeleton) -> Values:
-    """The values of all channels now, in the order of `UNITS`; after the sensors' first cycle."""
+    """Return the values of all channels now, in the order of `UNITS`; after the sensors' first cycle."""
     drives, sensors = robot.drives.values(), robot.sensors
     return [
         *(_counted(drive, objects.POSITION_ACTUAL) for drive in drives),

@@ -53,7 +53,7 @@ class Clock:
         return Repeating(self, period_ns, action)
 
     def next_due_ns(self) -> int | None:
-        """When the next event is due, `None` if nothing is to happen."""
+        """Return when the next event is due, `None` if nothing is to happen."""
         while self._events and self._events[0][2].action is None:
             heapq.heappop(self._events)
         return self._events[0][0] if self._events else None

@@ -46,7 +46,7 @@ class Folder:
             self._lock = None
 
     def hub_port(self) -> int:
-        """The port of the last start, 0 at the first."""
+        """Return the port of the last start, 0 at the first."""
         try:
             return int(self._port_file.read_text(encoding="ascii"))
         except (FileNotFoundError, ValueError):
@@ -71,9 +71,9 @@ class Folder:
         return True
 
     def memory(self, node: Node) -> FileMemory:
-        """What a device stores on command, and has again at the next start."""
+        """Return what a device stores on command, and has again at the next start."""
         return FileMemory(self.path / "stored" / f"{node.name}.json", node.description.path.name)
 
     def link(self, sensor: str) -> Path:
-        """The stable path of a serial sensor."""
+        """Return the stable path of a serial sensor."""
         return self.path / sensor

@@ -64,7 +64,7 @@ class Operator:
 
 
 def verb_of(request: Request) -> str:
-    """Which of the things that can be asked for it is; raises `RequestRefused`."""
+    """Return which of the things that can be asked for it is; raises `RequestRefused`."""
     verbs = [verb for verb in _CHECKS if verb in request]
     if len(verbs) != 1:
         raise RequestRefused(f"say one of {', '.join(_CHECKS)}, not {', '.join(request) or 'nothing'}")
@@ -72,7 +72,7 @@ def verb_of(request: Request) -> str:
 
 
 def check(request: object) -> Request:
-    """The request, where it can be obeyed as far as anybody can tell; raises `SimulatorError`."""
+    """Return the request, where it can be obeyed as far as anybody can tell; raises `SimulatorError`."""
     if not isinstance(request, Mapping):
         raise RequestRefused('a request is an object like {"fault": "node_lost", "on": "left_knee"}')
     verb = verb_of(request)

@@ -10,7 +10,7 @@ from hil_sim.errors import SimulatorError
 
 
 def choose(words: Iterable[str], joints: Collection[str], beside: Path | None) -> dict[str, Path]:
-    """The file of each joint: `FILE` is for all of them, `JOINT=FILE` for one; later words count.
+    """Return the file of each joint: `FILE` is for all of them, `JOINT=FILE` for one; later words count.
 
     Files are looked for beside `beside`, and among those that ship. Raises `SimulatorError`.
     """
@@ -30,7 +30,7 @@ def choose(words: Iterable[str], joints: Collection[str], beside: Path | None) -
 
 
 def describe(path: Path, node_id: int) -> Description:
-    """The device in the file; raises `SimulatorError`."""
+    """Return the device in the file; raises `SimulatorError`."""
     try:
         return eds.load(path, node_id)
     except EdsError as error:
@@ -38,6 +38,6 @@ def describe(path: Path, node_id: int) -> Description:
 
 
 def name(description: Description) -> str:
-    """What robot.toml calls the file: its name where it ships, else its whole path."""
+    """Return what robot.toml calls the file: its name where it ships, else its whole path."""
     path = description.path
     return path.name if path.parent == SHIPPED else str(path)

@@ -172,22 +172,22 @@ live = true
 
 
 def hub_bus(port: int) -> str:
-    """The bus's table where it is reached through the hub on `port`."""
+    """Return the bus's table where it is reached through the hub on `port`."""
     return _HUB.format(channel=CHANNEL, host=HOST, port=port)
 
 
 def virtual_bus(channel: str) -> str:
-    """The bus's table where it is reached in the same process."""
+    """Return the bus's table where it is reached in the same process."""
     return _VIRTUAL.format(channel=channel)
 
 
 def socketcan_bus(interface: str) -> str:
-    """The bus's table where it is a Linux CAN interface."""
+    """Return the bus's table where it is a Linux CAN interface."""
     return _SOCKETCAN.format(channel=interface)
 
 
 def text(folder: Path, bus: str, robot: Exoskeleton) -> str:
-    """The file for the simulator in `folder` (absolute), with the tables of its bus and its sensors."""
+    """Return the file for the simulator in `folder` (absolute), with the tables of bus and sensors."""
     drives = robot.simulated_drives
     templates = (_FIRST_JOINT, *[_JOINT] * (len(drives) - 1))
     led = CONTROLLER not in robot.without

@@ -46,7 +46,7 @@ FOLLOWING: Final = FollowSettings(
     journal_s=2.0,
 )
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
-FORESEEN: Final = 4096  # what may wait for a window that hangs
+MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs
 
 
 class Poster(QObject):
@@ -96,11 +96,11 @@ class App:
         self._followed: list[Followed] = []
         self._mailboxes: dict[str, Mailbox] = {}
         self._stations: dict[str, Station] = {}
-        self._foreseen: collections.deque[PredictionNews] = collections.deque(maxlen=FORESEEN)
+        self._predicted: collections.deque[PredictionNews] = collections.deque(maxlen=MOST_PREDICTIONS)
         self._poster = Poster()
-        self.feeds = Feeds(settings, following, record, self._show, self._foreseen.extend, self._stop)
+        self.feeds = Feeds(settings, following, record, self._show, self._predicted.extend, self._stop)
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
-        self._foresees = settings.prediction.enabled
+        self._predicts = settings.prediction.enabled
         self._own = OwnRobot(self._own_ready, self._own_failed)
         self._desk_units(kept)
         self.theme = Theme(
@@ -145,7 +145,7 @@ class App:
         network = self.feeds.network
         link = Link(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
-        station.predictions.off = not self._foresees
+        station.predictions.off = not self._predicts
         self._mailboxes[name], self._stations[name] = mailbox, station
         self._followed.append(Followed(station, mailbox, network.run(link.run()), Ticks()))
         self.feeds.follow(name, address)
@@ -171,8 +171,8 @@ class App:
             followed.station.take(followed.ticks.take(events) if self.feeds.by_source else events)
             if followed.link.done():
                 followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
-        for foreseen in [self._foreseen.popleft() for _ in range(len(self._foreseen))]:
-            self._stations[foreseen.robot].foresee(foreseen)
+        for news in [self._predicted.popleft() for _ in range(len(self._predicted))]:
+            self._stations[news.robot].take_prediction(news)
         self.feeds.look(self.desk.recording)
         self.window.refresh()
 
@@ -230,7 +230,7 @@ def run(
 
 
 def stop_keys(qt: QApplication, app: App) -> contextlib.AbstractContextManager[X11Keys | None]:
-    """The keys that stop even while the window is busy, where there is an X server."""
+    """Return the keys that stop even while the window is busy, where there is an X server."""
     if qt.platformName() != "xcb":
         return contextlib.nullcontext()
     try:

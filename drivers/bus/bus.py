@@ -18,7 +18,7 @@ from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.sender import Sender, always
 from drivers.bus.settings import CanSettings, Role
-from drivers.bus.switching import FastSwitching
+from drivers.bus.thread_switching import FastSwitching
 from drivers.errors import Unavailable
 from drivers.urgency import make_urgent
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-from drivers.cli.listening import best, listen, nothing
+from drivers.cli.listen import best, listen, nothing
 from drivers.errors import Unavailable
 from drivers.port import SerialPort
 

@@ -13,11 +13,11 @@ from drivers.bus.sender import always
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import CONTROLWORD, STOPPED_STATES, Controlword
-from drivers.joint.leading import Errand, Led, lead_down, look, step_up
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.quick_stop import StopOutcome, Stopping
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import StopRpdo
+from drivers.joint.transitions import Errand, Led, lead_down, look, step_up
 
 TRANSITION_S = 3.0  # how long one step up may take: brakes open in it
 RESET_S = 3.0  # how long the whole way down may take

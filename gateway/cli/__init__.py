@@ -1,1 +1,1 @@
-"""The commands of the robot side: one file a command, what they share in `reach` and `text`."""
+"""The commands of the robot side: one file a command, what they share in `connect` and `text`."""

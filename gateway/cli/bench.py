@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import psutil
 from msgspec import Struct
 
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, percent, say, say_json, size, table
 from gateway.client import Batch, Robot
 from gateway.client.address import Address
@@ -48,7 +48,7 @@ def main(argv: list[str]) -> int:
     made.add_argument("--requests", type=_count, default=REQUESTS, help="of each kind (default: %(default)d)")
     arguments = made.parse_args(argv)
     figures = []
-    with reach(arguments, "bench") as robot:
+    with connect(arguments, "bench") as robot:
         for figure in measure(robot, arguments.robot, arguments.requests):
             figures.append(figure)
             if arguments.json:

@@ -4,7 +4,7 @@ import time
 from collections import Counter
 
 from gateway.cli.arguments import seconds
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, say, say_json, table
 from gateway.wire.resource import Overrun, Overruns
 
@@ -32,7 +32,7 @@ def main(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     end_s = float("inf") if arguments.seconds is None else time.monotonic() + arguments.seconds
     seen: list[Overrun] = []
-    with reach(arguments, "blame") as robot:
+    with connect(arguments, "blame") as robot:
         told = robot.overruns()
         try:
             while True:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 
 from gateway.cli.arguments import seconds
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, budget, percent, say, say_json, size, table
 from gateway.wire.cost import BusCost, ClientCost, GatewayCost, StreamCost
 
@@ -24,7 +24,7 @@ def main(argv: list[str]) -> int:
     made = parser("cost", "What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.", EPILOG)
     made.add_argument("--seconds", type=seconds, default=SECONDS, help="to look for (default: %(default)g)")
     arguments = made.parse_args(argv)
-    with reach(arguments, "cost") as robot:
+    with connect(arguments, "cost") as robot:
         robot.cost()  # rates are from here on
         time.sleep(arguments.seconds)
         cost = robot.cost()

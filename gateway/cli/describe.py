@@ -5,7 +5,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, budget, exact, say, say_json, table
 from gateway.wire.component import ChannelInfo
 from gateway.wire.parameter import ParameterInfo
@@ -22,7 +22,7 @@ def main(argv: list[str]) -> int:
         "What a robot is made of: its components and what is wrong with them, its channels and their units,\n"
         "its parameters and their limits, and what each drive does on a stop.",
     ).parse_args(argv)
-    with reach(arguments, "describe") as robot:
+    with connect(arguments, "describe") as robot:
         description = robot.describe()
     if arguments.json:
         say_json(description)

@@ -1,6 +1,6 @@
 """`gwrms enable`: enables drives, as the master of a bench."""
 
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, say, say_json, table, warn
 from gateway.wire.stop import Enabled
 
@@ -19,7 +19,7 @@ def main(argv: list[str]) -> int:
     made = parser("enable", "Enable drives, one confirmed transition at a time.", EPILOG)
     made.add_argument("joints", metavar="JOINT", nargs="*", help="names or globs (default: all)")
     arguments = made.parse_args(argv)
-    with reach(arguments, "enable") as robot:
+    with connect(arguments, "enable") as robot:
         enabled = robot.enable(*arguments.joints)
     if arguments.json:
         say_json(enabled)

@@ -1,6 +1,6 @@
 """`gwrms get`: parameters, as the devices have them now."""
 
-from gateway.cli.reach import check_names, parameter_names, parser, reach, widened
+from gateway.cli.connect import check_names, connect, parameter_names, parser, widened
 from gateway.cli.text import exact, say, say_json, table
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 
@@ -20,7 +20,7 @@ def main(argv: list[str]) -> int:
         help="names, addresses, globs, or a component (default: all that can be changed)",
     )
     arguments = made.parse_args(argv)
-    with reach(arguments, "get") as robot:
+    with connect(arguments, "get") as robot:
         description = robot.describe()
         names = widened(arguments.names, description)
         check_names("parameter", names, parameter_names(description))

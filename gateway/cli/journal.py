@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway import config
-from gateway.cli.reach import choose, parser, reach
+from gateway.cli.connect import choose, connect, parser
 from gateway.cli.text import say, say_json, table, warn
 from gateway.records.chain import Broken
 from gateway.records.folder import RecordsFolder
@@ -32,7 +32,7 @@ def tail(argv: list[str]) -> int:
     made = parser("journal tail", "The newest entries: who did what, when, and what came of it.")
     made.add_argument("-n", type=int, default=20, metavar="N", help="how many, at most 1000 (default 20)")
     arguments = made.parse_args(argv)
-    with reach(arguments, "journal") as robot:
+    with connect(arguments, "journal") as robot:
         found = robot.journal(arguments.n)
     if arguments.json:
         for entry in found.entries:

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gateway.cli.reach import ask, check_names, choose, parameter_names, parser, reach
+from gateway.cli.connect import ask, check_names, choose, connect, parameter_names, parser
 from gateway.cli.text import counted, exact, say, say_json, table, warn
 from gateway.cli.writing import add_trial, write
 from gateway.client import Robot
@@ -68,7 +68,7 @@ def save(argv: list[str]) -> int:
     kind = format_of(file)
     if file.exists() and not arguments.overwrite:
         raise FileProblem(f"{file} is there already; say --overwrite, or give another name")
-    with reach(arguments, "params") as robot:
+    with connect(arguments, "params") as robot:
         scope = Scope(robot.describe(), arguments.component, arguments.eds)
         check_names("parameter", arguments.globs, parameter_names(scope.robot))
         held = _read(robot, [info.name for info in kind.chosen(scope, arguments.globs)])
@@ -85,7 +85,7 @@ def compare_(argv: list[str]) -> int:
     """Run `gwrms params compare`."""
     made = _parser("compare", "What a file says beside what the robot holds.", COMPARE_EPILOG)
     arguments = made.parse_args(argv)
-    with reach(arguments, "params") as robot:
+    with connect(arguments, "params") as robot:
         rows = _rows(robot, Scope(robot.describe(), arguments.component), arguments.file)
     same = all(row.verdict not in UNLIKE for row in rows)
     if arguments.json:
@@ -102,7 +102,7 @@ def apply(argv: list[str]) -> int:
     made.add_argument("--skip", action="store_true", help="leave out what cannot be changed at all")
     add_trial(made)
     arguments = made.parse_args(argv)
-    with reach(arguments, "params") as robot:
+    with connect(arguments, "params") as robot:
         scope = Scope(robot.describe(), arguments.component)
         rows = _rows(robot, scope, arguments.file)
         _say_unlike(rows, json=arguments.json)

@@ -1,6 +1,6 @@
 """`gwrms reset`: ends a held stop."""
 
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, say, say_json, table, warn
 from gateway.wire.stop import Reset
 
@@ -14,7 +14,7 @@ def main(argv: list[str]) -> int:
     """Run `gwrms reset`; 0 only when no stop is held any more and every drive is where it should be."""
     made = parser("reset", "End a held stop: every drive switched off, none enabled.", EPILOG)
     arguments = made.parse_args(argv)
-    with reach(arguments, "reset") as robot:
+    with connect(arguments, "reset") as robot:
         reset = robot.reset()
     if arguments.json:
         say_json(reset)

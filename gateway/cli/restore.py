@@ -1,6 +1,6 @@
 """`gwrms restore`: a device gets its defaults back."""
 
-from gateway.cli.reach import ask, reach
+from gateway.cli.connect import ask, connect
 from gateway.cli.storage import device_parser, say_stored
 
 EPILOG = """Refused as gwrms store is. The defaults act after the device's next reset: switch it off
@@ -15,7 +15,7 @@ def main(argv: list[str]) -> int:
     made = device_parser("restore", "Give a device its defaults back (1011h).", EPILOG)
     made.add_argument("--yes", action="store_true", help="do not ask")
     arguments = made.parse_args(argv)
-    with reach(arguments, "restore") as robot:
+    with connect(arguments, "restore") as robot:
         question = f"{arguments.component} loses what was stored in it, and takes its defaults. Go on?"
         if not ask(question, yes=arguments.yes):
             return 1

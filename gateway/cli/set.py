@@ -4,7 +4,7 @@ import argparse
 import contextlib
 import math
 
-from gateway.cli.reach import check_names, parameter_names, parser, reach
+from gateway.cli.connect import check_names, connect, parameter_names, parser
 from gateway.cli.writing import add_trial, write
 from gateway.coding import Number
 
@@ -30,7 +30,7 @@ def main(argv: list[str]) -> int:
     changes = dict(arguments.changes)
     if len(changes) != len(arguments.changes):
         made.error("a parameter is named twice")
-    with reach(arguments, "set") as robot:
+    with connect(arguments, "set") as robot:
         description = robot.describe()
         check_names("parameter", changes, parameter_names(description))
         return write(robot, changes, description, arguments)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from gateway.cli.reach import channel_names, check_names, parser, reach, widened
+from gateway.cli.connect import channel_names, check_names, connect, parser, widened
 from gateway.cli.text import NONE, age, exact, measured, percent, say, say_json, size, table
 from gateway.client import Robot
 from gateway.wire.component import QualityInfo, Snapshot
@@ -25,7 +25,7 @@ EPILOG = """examples:
 def main(argv: list[str]) -> int:
     """Run `gwrms snapshot`."""
     arguments = _parse(argv)
-    with reach(arguments, "snapshot") as robot:
+    with connect(arguments, "snapshot") as robot:
         if arguments.module == "resource":
             return _resource(robot, arguments)
         return _values(robot, arguments)

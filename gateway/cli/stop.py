@@ -1,6 +1,6 @@
 """`gwrms stop`: quick stop on every drive."""
 
-from gateway.cli.reach import parser, reach
+from gateway.cli.connect import connect, parser
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client import ClientError
 from gateway.wire.stop import Stopped
@@ -21,7 +21,7 @@ def main(argv: list[str]) -> int:
     made.add_argument("--reason", default="gwrms stop", help="what the robot's journal shall say")
     arguments = made.parse_args(argv)
     try:
-        with reach(arguments, "stop") as robot:
+        with connect(arguments, "stop") as robot:
             stopped = robot.stop(arguments.reason)
     except ClientError as error:
         warn("stop", f"NOT CONFIRMED, take it that the robot still moves. {error}")

@@ -2,7 +2,7 @@
 
 import argparse
 
-from gateway.cli.reach import parser
+from gateway.cli.connect import parser
 from gateway.cli.text import say, say_json
 from gateway.wire.parameter import Stored
 

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 from gateway.cli.arguments import number
-from gateway.cli.reach import channel_names, check_names, parser, reach, widened
+from gateway.cli.connect import channel_names, check_names, connect, parser, widened
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
 from gateway.wire.component import ChannelInfo
@@ -37,7 +37,7 @@ def main(argv: list[str]) -> int:
     )
     made.add_argument("--count", type=_count, metavar="N", help="end after N lines")
     arguments = made.parse_args(argv)
-    with reach(arguments, "watch") as robot:
+    with connect(arguments, "watch") as robot:
         description = robot.describe()
         channels = widened(arguments.channels, description)
         check_names("channel", channels, channel_names(description))

@@ -21,10 +21,10 @@ from typing import Any, BinaryIO, Final
 import msgspec
 
 from gateway.process.futures import failed
-from gateway.records import durable, pieces
+from gateway.records import durable, journal_files
 from gateway.records.chain import Broken, Head, line
+from gateway.records.journal_files import Entry, Piece, Tail, head_file, read_head
 from gateway.records.limits import OWN, Limits, Share, TooMany, within_limits
-from gateway.records.pieces import Entry, Piece, Tail, head_file, read_head
 from gateway.records.reading import SHORTENED, read_verified
 
 __all__ = ["Entry", "Journal", "Share", "Sizes", "Tail", "TooMany", "head_file", "read_head", "read_verified"]
@@ -286,13 +286,13 @@ class Journal:
     def _take_up(self) -> str | None:
         """Find the newest entry; says what is wrong with the journal's end."""
         with self.path.open("a+b", buffering=0) as file:
-            end = pieces.end_of_last_line(file)
+            end = journal_files.end_of_last_line(file)
             torn = file.seek(0, os.SEEK_END) - end
             if torn:
                 os.ftruncate(file.fileno(), end)
         try:
-            last = pieces.newest_line(self.path)
-            self._head = pieces.hash_of(last) if last is not None else Head()
+            last = journal_files.newest_line(self.path)
+            self._head = journal_files.hash_of(last) if last is not None else Head()
             known = read_head(self.path)
         except Broken as error:
             return self._set_aside(str(error))
@@ -306,8 +306,8 @@ class Journal:
         The file that shows the damage goes last: after a crash in between the rest is set aside too.
         """
         kept = self.path.with_name(f"{self.path.name}.broken-{time.time_ns()}")
-        for piece in pieces.closed_pieces(self.path):
-            piece.path.replace(pieces.closed_piece(kept, piece.last).path)
+        for piece in journal_files.closed_pieces(self.path):
+            piece.path.replace(journal_files.closed_piece(kept, piece.last).path)
         self.path.replace(kept)
         self._head = Head()
         return f"{why}; the journal begins anew, the old one is {kept.name}"
@@ -319,7 +319,7 @@ class Journal:
         """
         if file.seek(0, os.SEEK_END) < self._sizes.piece:
             return
-        closed = pieces.closed_piece(self.path, self._head.n)
+        closed = journal_files.closed_piece(self.path, self._head.n)
         try:
             if closed.path.exists():
                 raise FileExistsError(None, f"{closed.path.name} is there already")
@@ -353,7 +353,7 @@ class Journal:
             log.warning("old pieces of the journal cannot be removed: %s", error.strerror or error)
 
     def _surplus(self) -> list[Piece]:
-        closed = pieces.closed_pieces(self.path)
+        closed = journal_files.closed_pieces(self.path)
         left = self._sizes.kept
         for index in range(len(closed) - 1, -1, -1):
             left -= closed[index].path.stat().st_size
@@ -374,7 +374,7 @@ class Journal:
 
     def _read(self, count: int, newest: int) -> Tail:
         try:
-            return pieces.tail(self.path, count, newest)
+            return journal_files.tail(self.path, count, newest)
         except Broken as error:
             raise OSError(None, f"{self.path} is damaged: {error}") from error
 
@@ -399,8 +399,8 @@ def _last_hash(piece: Piece) -> str | None:
     """What the line after it refers to; `None` where the piece is damaged."""
     try:
         with piece.path.open("rb") as file:
-            last = next(pieces.lines_backwards(file), None)
-        return None if last is None else pieces.hash_of(last).hash
+            last = next(journal_files.lines_backwards(file), None)
+        return None if last is None else journal_files.hash_of(last).hash
     except Broken:
         return None
 
@@ -410,7 +410,10 @@ def _room(journal: Path, sizes: Sizes) -> Entry:
     folder = journal.parent
     try:
         found = os.statvfs(folder)
-        has = sum(one.path.stat().st_size for one in pieces.closed_pieces(journal)) + journal.stat().st_size
+        has = (
+            sum(one.path.stat().st_size for one in journal_files.closed_pieces(journal))
+            + journal.stat().st_size
+        )
     except OSError as error:
         log.warning("how much room there is in %s cannot be seen: %s", folder, error.strerror or error)
         return {}

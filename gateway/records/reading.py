@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, Final
 import msgspec
 
 from gateway.records.chain import UNDECODABLE, Broken, Head, verify
-from gateway.records.pieces import Entry, closed_pieces, read_head
+from gateway.records.journal_files import Entry, closed_pieces, read_head
 
 SHORTENED: Final = "journal shortened"  # an entry that says which lines the journal itself has removed
 _TRIES: Final = 10

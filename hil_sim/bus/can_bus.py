@@ -38,7 +38,7 @@ class Frame(NamedTuple):
         return _BITS[self.extended][len(self.data)]
 
     def arbitration(self) -> int:
-        """The lower number wins the bus: a standard frame beats an extended one with the same first bits."""
+        """Return its rank, of which the lowest wins: a standard frame goes before an extended one like it."""
         base = self.cob_id if self.extended else self.cob_id << 18
         return base << 2 | self.extended << 1 | self.remote
 
@@ -58,15 +58,15 @@ class Disturbance:
     """What a fault does to the frames of a bus; this one lets them all pass."""
 
     def leaves(self, frame: Frame, sender: object, /) -> bool:  # noqa: ARG002 - the shape of a disturbance
-        """Whether a frame that is sent queues for the bus; `CanBus.queue` puts one there past everybody."""
+        """Return whether a frame that is sent queues for the bus; `CanBus.queue` goes past everybody."""
         return True
 
     def survives(self, frame: Frame, sender: object, /) -> bool:  # noqa: ARG002 - the shape of a disturbance
-        """Whether a frame gets over the wire; an error frame ends it otherwise, and it is sent again."""
+        """Return whether a frame gets over the wire; else an error frame ends it, and it is sent again."""
         return True
 
     def arrives(self, frame: Frame, sender: object, receiver: object, /) -> bool:  # noqa: ARG002 - its shape
-        """Whether one receiver takes a frame that came over the wire."""
+        """Return whether one receiver takes a frame that came over the wire."""
         return True
 
 
@@ -122,7 +122,7 @@ class CanBus:
         return len(self._pending)
 
     def pending_of(self, sender: object, cob_id: int) -> int:
-        """Those of one sender with one identifier."""
+        """Return those of one sender with one identifier."""
         return sum(one is sender and frame.cob_id == cob_id for _, _, frame, one in self._pending)
 
     def send(self, frame: Frame, sender: object) -> None:

@@ -24,13 +24,13 @@ class InterfaceUnusable(SimulatorError):
 
 
 def to_bytes(frame: Frame) -> bytes:
-    """A frame as the kernel takes it."""
+    """Return a frame as the kernel takes it."""
     flags = _EXTENDED * frame.extended | _REMOTE * frame.remote
     return _FRAME.pack(frame.cob_id | flags, len(frame.data), frame.data)
 
 
 def to_frame(data: bytes) -> Frame:
-    """What the kernel gave, as a frame."""
+    """Return what the kernel gave, as a frame."""
     identifier, length, payload = _FRAME.unpack(data)
     remote = bool(identifier & _REMOTE)
     content = b"" if remote else payload[:length]
@@ -38,7 +38,7 @@ def to_frame(data: bytes) -> Frame:
 
 
 def open_interface(name: str) -> socket.socket:
-    """A socket, not blocking, that carries every frame of the interface but its own.
+    """Return a socket, not blocking, that carries every frame of the interface but its own.
 
     Raises:
         InterfaceUnusable: there is no such interface, it is no CAN interface, or it is down.

@@ -12,18 +12,18 @@ _EXTENDED_DIGITS = 8
 
 
 def frame_message(frame: Frame, stamp_s: float) -> bytes:
-    """A received frame; without data the field is empty, and its two spaces stay."""
+    """Return a received frame; without data the field is empty, and its two spaces stay."""
     message = b"< frame %08X %.6f %b >" if frame.extended else b"< frame %03X %.6f %b >"
     return message % (frame.cob_id, stamp_s, binascii.hexlify(frame.data).upper())
 
 
 def error_message(error_class: int, stamp_s: float) -> bytes:
-    """An error frame, as the interface saw it on the bus."""
+    """Return an error frame, as the interface saw it on the bus."""
     return f"< error {error_class:03X} {stamp_s:.6f} >".encode("ascii")
 
 
 def parse_send(words: list[bytes]) -> Frame | None:
-    """The frame in `send ID LENGTH BYTE…`, `None` if that is not what it is."""
+    """Return the frame in `send ID LENGTH BYTE…`, `None` if that is not what it is."""
     if not all(word.isalnum() for word in words):  # what int() would take beyond digits
         return None
     try:

@@ -15,7 +15,7 @@ def speed(text: str) -> float | None:
 
 
 def seconds(text: str) -> float:
-    """A time greater than 0."""
+    """Return a time greater than 0."""
     value = number(text)
     if not (math.isfinite(value) and value > 0):
         raise argparse.ArgumentTypeError(f"{text} is no time: give seconds greater than 0")

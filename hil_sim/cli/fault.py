@@ -122,7 +122,7 @@ def _active(one: dict[str, Any]) -> str:
 
 
 def explained() -> str:
-    """Every fault by what it can be on: what it looks like, and its parameters with their defaults."""
+    """Return every fault by what it can be on: what it looks like, and its parameters with their defaults."""
     return "\n".join(text for target in Target for text in (_heading(target), *_explained(target)))
 
 

@@ -43,7 +43,7 @@ _MASKED_BY_6F = {
 
 
 def power_state_of(statusword: int) -> PowerState | None:
-    """The drive's state in its statusword, `None` for bits that no state has."""
+    """Return the drive's state in its statusword, `None` for bits that no state has."""
     return _MASKED_BY_6F.get(statusword & 0x6F) or _MASKED_BY_4F.get(statusword & 0x4F)
 
 
@@ -76,5 +76,5 @@ class Seen:
 
 
 def first(drives: list[Seen], wrong: Callable[[Seen], bool]) -> int | None:
-    """The node id of the first drive that is `wrong`."""
+    """Return the node id of the first drive that is `wrong`."""
     return next((seen.node_id for seen in drives if wrong(seen)), None)

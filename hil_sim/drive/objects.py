@@ -199,5 +199,5 @@ class Objects:
         return _OTHERWISE[key] if entry is None else entry.number()
 
     def positive(self, key: Key) -> int:
-        """A number that cannot be 0."""
+        """Return a number that cannot be 0."""
         return self.number(key) or _OTHERWISE[key]

@@ -51,10 +51,10 @@ WAYS_OUT = {
 
 
 def ramp(objects: Objects, option: Key) -> Ramp:
-    """What `option` says; a vendor's own code counts as the quick stop ramp."""
+    """Return what `option` says; a vendor's own code counts as the quick stop ramp."""
     return RAMPS.get(objects.number(option), Ramp.QUICK_STOP)
 
 
 def stays(objects: Objects) -> bool:
-    """Whether a quick stop ends in QUICK STOP ACTIVE, from where the drive can be enabled again."""
+    """Return whether a quick stop ends in QUICK STOP ACTIVE, from where the drive can be enabled again."""
     return objects.number(od.QUICK_STOP_OPTION) in _STAYING

@@ -88,12 +88,12 @@ ENERGISED = (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE, S.FAULT_REACTION_ACTIVE)
 
 
 def command_of(controlword: int, previous: int) -> Command | None:
-    """The command in a controlword; a fault reset is the rising edge of bit 7 against the `previous` one."""
+    """Return a controlword's command; a fault reset is a rising edge of bit 7 since the `previous` one."""
     if controlword & ~previous & _FAULT_RESET_BIT:
         return Command.FAULT_RESET
     return _COMMANDS[controlword & 0xFF]
 
 
 def after(state: PowerState, command: Command) -> PowerState:
-    """The state that follows; the same one where the table has no transition."""
+    """Return the state that follows; the same one where the table has no transition."""
     return TRANSITIONS.get((state, command), state)

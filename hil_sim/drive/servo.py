@@ -112,7 +112,7 @@ class Servo:
     # -- motion ----------------------------------------------------------------------------------------
 
     def limits(self) -> tuple[float, float]:
-        """The lowest and highest torque that objects and the winding's heat allow."""
+        """Return the lowest and highest torque that objects and the winding's heat allow."""
         settings = self.settings
         rated = settings.rated_torque
         highest, lowest = settings.highest_torque, settings.lowest_torque

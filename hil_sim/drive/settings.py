@@ -87,7 +87,7 @@ class Settings:
 
 
 def read(objects: Objects) -> Settings:
-    """The settings as the dictionary holds them now."""
+    """Return the settings as the dictionary holds them now."""
     number, positive = objects.number, objects.positive
     gear = positive(od.GEAR_MOTOR_REVOLUTIONS) / positive(od.GEAR_SHAFT_REVOLUTIONS)
     counts = positive(od.ENCODER_INCREMENTS) / positive(od.ENCODER_REVOLUTIONS) * gear / math.tau

@@ -24,7 +24,7 @@ _LOAD_WARNING = 0.9  # of I²t
 
 
 def trouble(servo: Servo, supply_v: float, live: bool) -> int | None:
-    """The error that is there now, if any; supply and current count where the power stage is `live`."""
+    """Return the present error, if any; supply and current count where the power stage is `live`."""
     thermal = servo.thermal
     if thermal.housing_c > _HOUSING_FAULT_C or thermal.winding_c > _WINDING_FAULT_C:
         return OVERTEMPERATURE
@@ -55,7 +55,7 @@ class FollowingErrorWatch:
         self.late_s = 0.0
 
     def update(self, servo: Servo, watched: bool, elapsed_s: float) -> bool:
-        """Whether it has lasted longer than 6066h allows."""
+        """Return whether it has lasted longer than 6066h allows."""
         following = servo.settings.following
         late = watched and abs(servo.following_error) > following.size
         self.late_s = self.late_s + elapsed_s if late else 0.0

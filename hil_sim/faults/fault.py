@@ -56,7 +56,7 @@ class Number:
     form: Form = Form.REAL
 
     def check(self, name: str, value: object) -> float:
-        """The value as a number; raises `FaultRefused`."""
+        """Return the value as a number; raises `FaultRefused`."""
         number = _number(value)
         whole = self.form is Form.REAL or (number is not None and number == int(number))
         if number is None or not whole or not self.low <= number <= self.high:
@@ -68,7 +68,7 @@ class Number:
         return number
 
     def show(self, value: Value) -> str:
-        """A value as people write it, with its unit."""
+        """Return a value as people write it, with its unit."""
         number = f"0x{int(value):X}" if self.form is Form.CODE else f"{value:g}"
         return f"{number} {self.unit}".rstrip()
 
@@ -81,13 +81,13 @@ class FolderName:
     default: str = ""
 
     def check(self, name: str, value: object) -> str:
-        """The folder's name; raises `FaultRefused`."""
+        """Return the folder's name; raises `FaultRefused`."""
         if not isinstance(value, str) or (value and not os.access(Path(value) / ".", os.W_OK)):
             raise FaultRefused(f"{name} = {value!r} is no folder to write in ({self.what}): name another one")
         return value
 
     def show(self, value: Value) -> str:
-        """A value as people write it."""
+        """Return a value as people write it."""
         return str(value) or "the simulator's"
 
 
@@ -111,7 +111,7 @@ class Site:
         return int(self.values[name])
 
     def folder(self, name: str) -> Path:
-        """The folder that a parameter names; the simulator's own where it names none."""
+        """Return the folder that a parameter names; the simulator's own where it names none."""
         return Path(str(self.values[name])) if self.values[name] else self.home
 
     @property

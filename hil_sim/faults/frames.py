@@ -8,7 +8,7 @@ from hil_sim.faults.fault import Site
 
 
 def disturbed_by(make: Callable[[Site], Disturbance]) -> Callable[[Site], AbstractContextManager[None]]:
-    """A fault that is nothing but a disturbance of the bus."""
+    """Return a fault that is nothing but a disturbance of the bus."""
 
     @contextmanager
     def act(site: Site) -> Iterator[None]:

@@ -102,7 +102,7 @@ class Faults:
 
 
 def find(name: object) -> Fault:
-    """The fault of a name; raises `FaultRefused` with the name that is near."""
+    """Return the fault of a name; raises `FaultRefused` with the name that is near."""
     if isinstance(name, str) and name in FAULTS:
         return FAULTS[name]
     near = difflib.get_close_matches(str(name), FAULTS, 1)
@@ -113,7 +113,7 @@ def find(name: object) -> Fault:
 def check_fault(
     name: object, on: object, for_s: object, params: Mapping[str, object]
 ) -> tuple[Fault, str, dict[str, Value]]:
-    """What is meant: the kind of fault, the device, every parameter's value; raises `FaultRefused`."""
+    """Return what is meant: the kind of fault, the device, every parameter's value; raises `FaultRefused`."""
     fault = find(name)
     _check_duration(name, fault, for_s)
     return fault, _device(name, fault, on), _values(name, fault, params)

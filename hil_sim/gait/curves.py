@@ -56,7 +56,7 @@ def _closed(rows: Sequence[float]) -> Curve:
 
 @cache
 def measured() -> tuple[LegCurves, ...]:
-    """The measured sets, slowest first."""
+    """Return the measured sets, slowest first."""
     text = resources.files("hil_sim").joinpath("data/joint_angles.csv").read_text(encoding="ascii")
     rows = list(csv.DictReader(text.splitlines()))
     columns = ("hip_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg")

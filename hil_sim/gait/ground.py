@@ -83,5 +83,5 @@ class Path(NamedTuple):
 
 
 def outward(stance: float) -> float:
-    """How far outside the midline the pressure's centre lies (m): out in mid-stance, in at the toes."""
+    """Return how far off the midline the pressure's centre lies (m): out in mid-stance, in at the toes."""
     return 0.002 + 0.08 * stance * stance * (0.9 - stance)

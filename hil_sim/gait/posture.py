@@ -17,7 +17,7 @@ _STEP = 0.002  # of seating, for its derivatives
 
 
 def bent(seating: float) -> float:
-    """How far the legs are from standing (0) to sitting (1) at a share of the way to the seat."""
+    """Return how far the legs are from standing (0) to sitting (1) at a share of the way to the seat."""
     return rise(seating, 0.0, 0.75)
 
 
@@ -32,7 +32,7 @@ def lean(seating: float) -> float:
 
 
 def place(seating: float, leg_length: float) -> tuple[float, float]:
-    """Where the trunk's centre of mass is, before and above the ankles (m): thigh, shank, leaning trunk."""
+    """Return where the trunk's centre of mass is, before and above the ankles (m)."""
     leg = mix(STANDING, SITTING, bent(seating))
     thigh, shank, trunk = leg.hip, leg.hip - leg.knee, lean(seating)
     return (

@@ -56,7 +56,7 @@ NOMINAL = WearerSettings()
 
 
 def subject(number: int) -> WearerSettings:
-    """The person with this number, always the same one; 0 is the nominal wearer.
+    """Return the person with this number, always the same one; 0 is the nominal wearer.
 
     Every fourth on average has an impaired leg.
     """

@@ -31,7 +31,7 @@ STAIRS_DOWN = LegCurves(
 
 
 def stairs_up(phase: float, _step_length: float, _leg_length: float) -> Leg:
-    """One leg on the way up; the stairs, not the operator, say how long the step is."""
+    """Return one leg on the way up; the stairs, not the operator, say how long the step is."""
     return STAIRS_UP.at(phase)
 
 

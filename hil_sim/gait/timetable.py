@@ -74,7 +74,7 @@ def _near(pace: Pace, source: random.Random) -> Pace:
 
 
 def timetable(name: str, seed: int) -> Iterator[Entry]:
-    """The entries of a scenario: `day`, one that repeats, or an activity that lasts."""
+    """Yield the entries of a scenario: `day`, one that repeats, or an activity that lasts."""
     if name == "day":
         return day(seed)
     if name in _LOOPS:

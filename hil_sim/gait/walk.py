@@ -50,7 +50,7 @@ def swing(phase: float, stance: float) -> float:
 
 
 def lifted(pose: Leg, toe_height: float, swing: float) -> Leg:
-    """The leg with knee and ankle bent for another toe height (m) than the curves have."""
+    """Return the leg with knee and ankle bent for another toe height (m) than the curves have."""
     lift = (toe_height - _USUAL_TOE_HEIGHT) * swing
     return Leg(
         pose.hip, pose.knee * (1.0 + _KNEE_PER_TOE_HEIGHT * lift), pose.ankle + _ANKLE_PER_TOE_HEIGHT * lift

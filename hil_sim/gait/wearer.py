@@ -93,7 +93,7 @@ class Wearer:
         return (1.0 - self._generator.walking) * (1.0 - self._generator.sitting)
 
     def support(self) -> float:
-        """What the seat, or the ground under hands and body, carries (N)."""
+        """Return what the seat, or the ground under hands and body, carries (N)."""
         return self._carried() * self._support()
 
     def _carried(self) -> float:

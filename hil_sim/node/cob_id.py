@@ -24,14 +24,14 @@ _RESTRICTED = (
 
 
 def is_valid(cob_id: int) -> bool:
-    """Whether the communication object exists; identifier 0 stands for none in files, it is NMT's."""
+    """Return whether the communication object exists; identifier 0 stands for none in files, it is NMT's."""
     return not cob_id & INVALID and bool(cob_id & IDENTIFIER)
 
 
 def guard(
     entry: Entry, exists: Callable[[int], bool] = is_valid, frozen: Callable[[int], bool] = is_valid
 ) -> Callable[[Value], None]:
-    """A check for `entry`: an object that `exists` may use the identifier, and keeps it while `frozen`."""
+    """Make a check of `entry`: what `exists` may use the identifier, and keeps it while `frozen`."""
 
     def check(value: Value) -> None:
         new, old = int(value), entry.number()

@@ -18,13 +18,13 @@ def size(data_type: DataType) -> int | None:
 
 
 def empty(data_type: DataType) -> Value:
-    """The value of an object for which nobody gave one."""
+    """Return the value of an object for which nobody gave one."""
     by_kind: dict[str, Value] = {"text": "", "bytes": bytes(size(data_type) or 0), "real": 0.0}
     return by_kind.get(data_type.kind, 0)
 
 
 def encode(data_type: DataType, value: Value) -> bytes:
-    """The value as bytes; integers are saturated to their type."""
+    """Return the value as bytes; integers are saturated to their type."""
     if isinstance(value, bytes):
         return value
     if isinstance(value, str):
@@ -38,7 +38,7 @@ def encode(data_type: DataType, value: Value) -> bytes:
 
 
 def decode(data_type: DataType, data: bytes) -> Value:
-    """The value of bytes from the wire; raises `SdoAbort` on the wrong length."""
+    """Return the value of bytes from the wire; raises `SdoAbort` on the wrong length."""
     check_size(data_type, len(data))
     if data_type.kind == "text":
         return data.decode(_TEXT_ENCODINGS.get(data_type.name, _VISIBLE), errors="replace")

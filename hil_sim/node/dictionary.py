@@ -70,14 +70,14 @@ class Entry:
         return self.value if self.source is None else self.source()
 
     def number(self) -> int:
-        """The value of an object that holds an integer."""
+        """Return the value of an object that holds an integer."""
         value = self.value if self.source is None else self.source()
         if not isinstance(value, int):
             raise TypeError(f"object {self.key[0]:04X}h:{self.key[1]} holds no integer")
         return value
 
     def encode(self) -> bytes:
-        """The value as it travels."""
+        """Return the value as it travels."""
         return coding.encode(self.data_type, self.get())
 
     def write(self, data: bytes) -> None:
@@ -130,24 +130,24 @@ class Dictionary:
         return iter(self._entries.values())
 
     def get(self, key: Key) -> Entry | None:
-        """The entry, `None` where the device has none."""
+        """Return the entry, `None` where the device has none."""
         return self._entries.get(key)
 
     def number(self, key: Key, otherwise: int = 0) -> int:
-        """The integer that an object holds, `otherwise` where the device has no such object."""
+        """Return the integer that an object holds, `otherwise` where the device has no such object."""
         entry = self._entries.get(key)
         return otherwise if entry is None else entry.number()
 
     def members(self, index: int) -> list[Entry]:
-        """The entries of one object, sub-index 0 first; empty where the device has none."""
+        """Return the entries of one object, sub-index 0 first; empty where the device has none."""
         return [self._entries[key] for key in sorted(self._entries) if key[0] == index]
 
     def indices(self, first: int, last: int) -> list[int]:
-        """The objects from `first` to `last` that the device has."""
+        """Return the objects from `first` to `last` that the device has."""
         return sorted(index for index in self._indices if first <= index <= last)
 
     def find(self, index: int, subindex: int) -> Entry:
-        """The object of an SDO request; raises `SdoAbort` where there is none."""
+        """Return the object of an SDO request; raises `SdoAbort` where there is none."""
         if index not in self._indices:
             raise SdoAbort(AbortCode.NO_SUCH_OBJECT)
         entry = self._entries.get((index, subindex))
@@ -156,14 +156,14 @@ class Dictionary:
         return entry
 
     def find_writable(self, index: int, subindex: int) -> Entry:
-        """The object of an SDO download; raises `SdoAbort`."""
+        """Return the object of an SDO download; raises `SdoAbort`."""
         entry = self.find(index, subindex)
         if not entry.writable:
             raise SdoAbort(AbortCode.READ_ONLY)
         return entry
 
     def read(self, index: int, subindex: int) -> bytes:
-        """What an SDO upload gives; raises `SdoAbort`."""
+        """Return what an SDO upload gives; raises `SdoAbort`."""
         entry = self.find(index, subindex)
         if not entry.readable:
             raise SdoAbort(AbortCode.WRITE_ONLY)

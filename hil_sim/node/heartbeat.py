@@ -65,7 +65,7 @@ class HeartbeatConsumer:
             entry.on_write = self._check(entry)
 
     def times_ns(self) -> dict[int, int]:
-        """The nodes that are watched, each with its consumer time."""
+        """Return the nodes that are watched, each with its consumer time."""
         watched = [_watched(entry.number()) for entry in self._entries]
         return {node: time_ms * MILLISECOND_NS for node, time_ms in watched if node in _NODES and time_ms}
 

@@ -128,7 +128,7 @@ class Node:
             self._bus.send(Frame(identifier, data), self)
 
     def watched(self, key: Key) -> bool:
-        """Whether somebody wants to be told by `object_changed`."""
+        """Return whether somebody wants to be told by `object_changed`."""
         return key in self._pdos.watched
 
     def object_changed(self, key: Key) -> None:
@@ -148,11 +148,11 @@ class Node:
     # -- for who disturbs it -----------------------------------------------------------------------------
 
     def sdo_channels(self) -> dict[int, int]:
-        """The SDO servers as they listen now: identifier of the requests to that of the answers."""
+        """Return the SDO servers as they listen now: identifier of the requests to that of the answers."""
         return {channel.request: channel.response for channel in self._sdo.channels()}
 
     def tpdo_cob_ids(self) -> frozenset[int]:
-        """The identifiers on which the device sends PDOs now."""
+        """Return the identifiers on which the device sends PDOs now."""
         return frozenset(tpdo.cob_id for tpdo in self._pdos.sent)
 
     # -- the bus ---------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ class Field:
 
     @classmethod
     def of(cls, dictionary: Dictionary, value: int) -> Self:
-        """The field that an entry of a mapping names; raises `SdoAbort` where there is no such object."""
+        """Return the field that a mapping's entry names; raises `SdoAbort` where there is no such object."""
         key, bits = (value >> 16, value >> 8 & 0xFF), value & 0xFF
         entry = dictionary.get(key)
         if entry is None and (key[0] >= _FIRST_OBJECT or not value):
@@ -66,7 +66,7 @@ class Mapping:
 
     @classmethod
     def read(cls, dictionary: Dictionary, index: int, count: int) -> Self:
-        """The first `count` entries of the mapping object `index`; raises `SdoAbort` where that cannot be."""
+        """Return the first `count` entries of the mapping `index`; raises `SdoAbort` where that cannot be."""
         slots = [dictionary.get((index, number)) for number in range(1, count + 1)]
         values = [slot.number() for slot in slots if slot is not None]
         if len(values) < count:
@@ -75,7 +75,7 @@ class Mapping:
 
     @classmethod
     def current(cls, dictionary: Dictionary, index: int) -> Self:
-        """The mapping as it stands; none where a device's own defaults map what it has not."""
+        """Return the mapping as it stands; none where a device's own defaults map what it has not."""
         with suppress(SdoAbort):
             return cls.read(dictionary, index, dictionary.number((index, 0)))
         return cls()

@@ -46,7 +46,7 @@ class SdoChannels:
                 entry.on_written = moved
 
     def channels(self) -> Iterator[SdoChannel]:
-        """Those that exist now."""
+        """Yield those that exist now."""
         for index, server in self._servers.items():
             request, response = self._cob_id(index, _REQUEST), self._cob_id(index, _RESPONSE)
             if cob_id.is_valid(request) and cob_id.is_valid(response):

@@ -19,7 +19,7 @@ class Transfer(Protocol):
     finished: bool
 
     def takes(self, request: bytes) -> bool:
-        """Whether a request belongs to this transfer."""
+        """Return whether a request belongs to this transfer."""
 
     def respond(self, request: bytes) -> bytes | None:
         """Go on; raises `SdoAbort`."""

@@ -82,7 +82,7 @@ class _Source:
         return f"{self.path}, after {self.read} frames"
 
     def look(self, message: can.Message) -> tuple[str, bool]:
-        """The channel as the file calls it, and whether this is an error frame.
+        """Return the channel as the file calls it, and whether this is an error frame.
 
         Raises `_Implausible` where the message is not what the file says.
         """

@@ -31,7 +31,7 @@ class Capture:
     data: bytes
 
     def pieces(self, first_ns: int) -> Iterator[tuple[int, bytes]]:
-        """When which bytes have come, for a capture without a beginning from `first_ns` on."""
+        """Yield when which bytes have come, for a capture without a beginning from `first_ns` on."""
         began_ns = first_ns if self.began_ns is None else self.began_ns
         size, sent = len(self.data), 0
         for elapsed_ns in range(_TICK_NS, self.duration_ns + _TICK_NS, _TICK_NS):

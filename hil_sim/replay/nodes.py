@@ -27,7 +27,7 @@ _PDO_OBJECTS = range(pdo.RPDO_COMMUNICATION, 0x1C00)
 
 
 def seen(identifiers: set[int]) -> set[int]:
-    """The node ids of those who sent on these identifiers (11 bits)."""
+    """Return the node ids of those who sent on these identifiers (11 bits)."""
     return {node for node in range(1, 128) if any(base + node in identifiers for base in _SENT)}
 
 

@@ -25,14 +25,14 @@ name = "recording"
 
 
 def text(folder: Path, bus: str, nodes: Collection[int], ports: Collection[str]) -> str:
-    """What robot.toml can say of a recording in `folder` (absolute)."""
+    """Return what robot.toml can say of a recording in `folder` (absolute)."""
     names = "".join(f'\n#   port = "{folder / name}"' for name in ports)
     numbers = ", ".join(str(node) for node in sorted(nodes))
     return _TEXT.format(path=folder / "robot.toml", bus=bus, nodes=numbers or "none", ports=names or " none")
 
 
 def descriptions(config: Path) -> dict[int, Description]:
-    """The devices of every table with `node_id` and `eds`, by node id; none where there is no file.
+    """Return the devices of every table with `node_id` and `eds`, by node id; none where there is no file.
 
     Raises `ReplayError`.
     """

@@ -17,7 +17,7 @@ _SUBJECTS = {
 
 
 def read(table: Table) -> list[Expectation]:
-    """The expectations of one table; raises `ScenarioError`."""
+    """Return the expectations of one table; raises `ScenarioError`."""
     subject = table.one_of(_SUBJECTS)
     table.only({subject, *_SUBJECTS[subject], *_TIMINGS})
     glob, timing = table.text(subject), _timing(table)

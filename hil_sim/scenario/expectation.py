@@ -57,7 +57,7 @@ class Timing:
         }[self.when]
 
     def choose(self, moments: Sequence[Moment]) -> list[Moment]:
-        """The moments that count."""
+        """Return the moments that count."""
         if self.when is When.AT:
             return [moment for moment in moments if moment.time_s >= self.begin_s][:1]
         return [moment for moment in moments if self.begin_s <= moment.time_s <= self.end_s]
@@ -95,7 +95,7 @@ class Expectation:
         return f"{what.get(self.track, '')}{self.glob} {self.condition.words} {self.timing.words}"
 
     def is_open(self, observed: Observed, now_s: float) -> bool:
-        """Whether what comes later can still change the verdict."""
+        """Return whether what comes later can still change the verdict."""
         if self.timing.when is When.AT:
             return not self.timing.choose(observed.get(self.track, ()))
         over = now_s > self.timing.end_s

@@ -5,7 +5,7 @@ from hil_sim.scenario.script import Script
 
 
 def text(script: Script, outcome: Outcome) -> str:
-    """A line for each expectation; what was seen stands below those that failed."""
+    """Return a line for each expectation; what was seen stands below those that failed."""
     lines = [script.title]
     for verdict in outcome.verdicts:
         lines.append(f"  {'ok    ' if verdict.ok else 'FAILED'}  {verdict.expected}")

@@ -33,7 +33,7 @@ class Table:
                 raise self.fail(f"there is no key {key!r}; allowed are {', '.join(sorted(allowed))}")
 
     def one_of(self, keys: Collection[str]) -> str:
-        """The one of these keys that is there; raises where there is none, or more."""
+        """Return the one of these keys that is there; raises where there is none, or more."""
         found = [key for key in keys if key in self.values]
         if len(found) != 1:
             raise self.fail(f"give exactly one of {', '.join(keys)}, not {' and '.join(found) or 'none'}")

@@ -47,7 +47,7 @@ class Sole:
         self._last: Pressures | None = None
 
     def measure(self, own: Foot, other: Foot, dt: float) -> Pressures:
-        """The load of the shoe that it lies in, `dt` seconds after the last measurement."""
+        """Return the load of the shoe that it lies in, `dt` seconds after the last measurement."""
         faults = self._faults
         self._drifted = self._drifted + faults.drift * dt if faults.drift else 0.0
         if self._last is None or not faults.frozen:
@@ -78,7 +78,7 @@ class Sole:
 
 
 def calibration_text(pascal_per_count: float) -> str:
-    """What `gwrms calibrate insole` would write for cells that are all alike."""
+    """Return what `gwrms calibrate insole` would write for cells that are all alike."""
     return f"""\
 # The simulated insole's converter: the same for every cell. A real one is measured: gwrms calibrate insole.
 [default]

@@ -59,7 +59,7 @@ class TrunkImu:
         self._drifted = 0.0
 
     def measure(self, trunk: Trunk, dt: float) -> Motion:
-        """The trunk, `dt` seconds after the last measurement."""
+        """Return the trunk, `dt` seconds after the last measurement."""
         drift = self._faults.drift
         self._drifted = self._drifted + drift * dt if drift else 0.0
         if self._last is None or not self._faults.frozen:
@@ -100,7 +100,7 @@ def quaternion(trunk: Trunk) -> Quaternion:
 
 
 def specific_force(trunk: Trunk) -> Vector:
-    """What the accelerometer feels (m/s²): acceleration and the reaction to gravity, in its own axes."""
+    """Return what the accelerometer feels (m/s²), in its own axes: acceleration and reaction to gravity."""
     w, x, y, z = quaternion(trunk)
     ax, ay, az = trunk.acceleration
     az += GRAVITY

@@ -27,7 +27,7 @@ from ml.benchmarks.sim import (
 )
 from ml.registry.judged import calibrated
 from ml.robot.learn import learn
-from ml.robot.learned import NONE, STRANGE
+from ml.robot.learned import ABNORMAL_FROM, NONE
 from ml.robot.task import ACTIVITY
 from ml.training.simulated import LOST, Examples
 
@@ -111,7 +111,7 @@ def _judged(variant: Variant, taught: Examples, seen: Examples) -> Judged:
 def _figures(judged: Judged, seen: Examples) -> dict[str, float]:
     known, said = judged.known, judged.label != NONE
     right = judged.likeliest == judged.truth
-    strange = judged.novelty >= STRANGE
+    strange = judged.novelty >= ABNORMAL_FROM
     lost = np.isin(seen.label, list(LOST))
     bins = calibrated(judged.probabilities[known], judged.truth[known])
     return {

@@ -4,7 +4,8 @@ task.py       the tasks: classes, what labels mean, which sensors support what; 
 groups.py     groups of sensors, by the robot's names of channels
 blocks.py     a group's windows → feature columns
 learned.py    what has been learned, and what it judges
-familiar.py, network.py, checks.py    of it: novelty, the network's outputs, whether a file holds all
+novelty.py    how unlike an input is to what has been learned from
+network.py    a small network's outputs
+checks.py     whether a file holds all of a model
 learn.py      how it is learned, calibrated, and made to abstain
-simulated.py  what the simulator recorded, as examples
 """

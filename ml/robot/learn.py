@@ -17,7 +17,7 @@ from sklearn.preprocessing import StandardScaler
 from ml.errors import UnusableData
 from ml.features.recipe import Features, Recipe
 from ml.neural import fixed_epochs
-from ml.robot import familiar
+from ml.robot import novelty
 from ml.robot.learned import Floats, Learned, on_circle, scaled, scores, softmax
 from ml.robot.network import FAR, Rows, outputs
 from ml.robot.task import STRIDE, Task
@@ -130,8 +130,8 @@ def _taught(
         parts = _parts(features[train], targets[train], network, seed)
         inputs = scaled(parts["scale"], features[held_out])
         unseen[held_out] = _columns(parts["network"], outputs(parts["network"], inputs), columns)
-        far[:, held_out] = familiar.distances(parts, inputs)
-    return _parts(features, targets, network, seed), unseen, familiar.limits((far[0], far[1]))
+        far[:, held_out] = novelty.distances(parts, inputs)
+    return _parts(features, targets, network, seed), unseen, novelty.limits((far[0], far[1]))
 
 
 def _parts(features: Features, targets: npt.NDArray[Any], network: Network, seed: int) -> dict[str, Any]:
@@ -143,7 +143,7 @@ def _parts(features: Features, targets: npt.NDArray[Any], network: Network, seed
         )
     for name in ONLY_TO_LEARN:
         del vars(fitted)[name]
-    return {"scale": scale, "network": fitted, **familiar.fitted(inputs, seed)}
+    return {"scale": scale, "network": fitted, **novelty.fitted(inputs, seed)}
 
 
 def _columns(network: Any, found: Rows, columns: int) -> Floats:

@@ -11,14 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.features.recipe import Features, Recipe
-from ml.robot import familiar
+from ml.robot import novelty
 from ml.robot.network import Rows, outputs
 from ml.robot.task import SIDES, TASKS, Task
 
 Floats = npt.NDArray[np.float64]
 
 NONE: Final = -1  # the label of a row of which the model says "unknown"
-STRANGE: Final = 1.0  # the novelty from which on a row is like nothing that was learned from: "abnormal"
+ABNORMAL_FROM: Final = (
+    1.0  # the novelty from which on a row is like nothing that was learned from: "abnormal"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,8 +28,8 @@ class Verdicts:
     """What is judged of n rows.
 
     `probabilities` (n, classes) are calibrated. `label` (n,) is an index into the classes, or NONE where the
-    model abstains. `novelty` (n,) is 0 for what is as in learning, from STRANGE on abnormal. `values` are
-    further numbers: for gait_phase the phases "left" and "right", 0 (heel strike) to 1.
+    model abstains. `novelty` (n,) is 0 for what is as in learning; abnormal begins at ABNORMAL_FROM.
+    `values` are further numbers: for gait_phase the phases "left" and "right", 0 (heel strike) to 1.
     """
 
     probabilities: Floats
@@ -76,14 +78,14 @@ class Learned:
         """Judge rows (n, features) of the recipe."""
         inputs = scaled(self.parts["scale"], features)
         found = outputs(self.parts["network"], inputs)
-        strange = familiar.novelty(self.parts, self.numbers, inputs)
+        unlike = novelty.score(self.parts, self.numbers, inputs)
         if self.task.fold:
             probabilities = softmax(scores(found) / self.numbers["temperature"])
-            return Verdicts(probabilities, self._labels(probabilities), strange)
+            return Verdicts(probabilities, self._labels(probabilities), unlike)
         phases, lengths = on_circle(found)
         probabilities = np.interp(lengths.min(axis=1), self.parts["length"], self.parts["trust"])[:, None]
         values = dict(zip(SIDES, phases.T, strict=True))
-        return Verdicts(probabilities, self._labels(probabilities), strange, values)
+        return Verdicts(probabilities, self._labels(probabilities), unlike, values)
 
     def _labels(self, probabilities: Floats) -> npt.NDArray[np.int_]:
         sure = probabilities.max(axis=1) >= self.numbers["threshold"]

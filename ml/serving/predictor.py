@@ -12,7 +12,7 @@ import numpy as np
 from ml.features import FeatureStream, Recipe, features
 from ml.features.recipe import Features
 from ml.features.windows import Samples
-from ml.robot.learned import NONE, STRANGE, Learned
+from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.grid import Grid, Stamps, on_grid, period_ns
 
@@ -129,6 +129,6 @@ def _predictions(model: str, learned: Learned, stamps_ns: Sequence[int], rows: F
 
 
 def _label(classes: Sequence[str], label: int, novelty: float) -> str:
-    if novelty >= STRANGE:
+    if novelty >= ABNORMAL_FROM:
         return ABNORMAL
     return UNKNOWN if label == NONE else classes[label]

@@ -16,7 +16,7 @@ from ml.serving.predictor import Prediction
 WITHIN_S: Final = 60  # what is older counts no more
 SECOND_NS: Final = 1_000_000_000
 FEWEST: Final = 20  # decisions, before which nothing is said
-STRANGE_SHARE: Final = 0.2  # of the decisions, from which on a robot differs from what was learned from
+ABNORMAL_SHARE: Final = 0.2  # of the decisions, from which on a robot differs from what was learned from
 UNSURE_SHARE: Final = 0.5  # of the decisions that abstain
 OUTSIDE_SHARE: Final = 0.05  # of a channel's samples; 0.2 % of those that were learned from are outside
 
@@ -58,7 +58,7 @@ class Trust:
         """How far to believe it."""
         if self.decisions < FEWEST:
             return Level.UNSEEN
-        if self.abnormal > STRANGE_SHARE or self.drifted:
+        if self.abnormal > ABNORMAL_SHARE or self.drifted:
             return Level.DRIFTED
         return Level.UNSURE if self.unknown > UNSURE_SHARE else Level.GOOD
 

@@ -23,7 +23,7 @@ _UNREADABLE: Final = (pa.ArrowException, OSError, ValueError)  # what pyarrow ra
 
 
 def damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) -> str | None:
-    """What is wrong with a file of which a listing says this size, in words; None where it is whole.
+    """Return what is wrong with a file of which a listing says this size, in words; None where it is whole.
 
     Its footer is read, and with `deep` every value.
 
@@ -42,7 +42,7 @@ def damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) 
 
 
 def proven(store: Store, file: DataFile, why: str) -> str:
-    """What is wrong with a file that seems damaged, in words; `why` it seems so, in words too.
+    """Return what is wrong with a file that seems damaged, in words; `why` it seems so, in words too.
 
     Raises:
         StoreError: it is not proven.

@@ -97,7 +97,7 @@ def mark(synchronised: Iterable[Path]) -> None:
 
 
 def is_marked(file: Path) -> bool:
-    """Whether this is known to have been synchronised, and so, if it is an entry, may be acknowledged."""
+    """Return whether this is known to be synchronised; an entry may be acknowledged then."""
     try:
         return os.getxattr(file, _MARK) == b"1"
     except OSError:
@@ -105,12 +105,12 @@ def is_marked(file: Path) -> bool:
 
 
 def log_entry(table: Path, version: int) -> Path:
-    """The log entry of this version."""
+    """Return the log entry of this version."""
     return table / LOG / f"{version:020}.json"
 
 
 def read(entry: Path) -> Iterator[dict[str, Any]]:
-    """What it says, line by line."""
+    """Yield what it says, line by line."""
     yield from map(json.loads, entry.read_bytes().splitlines())
 
 

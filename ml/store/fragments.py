@@ -81,14 +81,14 @@ class Extent:
 
 
 def data_files(delta: DeltaTable, location: str) -> Iterator[DataFile]:
-    """Every file of this version, from the log alone."""
+    """Yield every file of this version, from the log alone."""
     log = _log(delta)
     for path, *values in zip(*(log[name].to_pylist() for name in _OF_THE_LOG), strict=True):
         yield DataFile(location, unquote(path), *values)
 
 
 def as_dataset(delta: DeltaTable, location: str, files: FileSystem) -> pyarrow.dataset.Dataset:
-    """The rows of this version; `files` are the store's."""
+    """Return the rows of this version; `files` are the store's."""
     log = _log(delta)
     names = (log[name].to_pylist() for name in ("path", "robot", "session"))
     fragments = [

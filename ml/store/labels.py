@@ -58,7 +58,7 @@ class Label(Struct, frozen=True, order=True):
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Self:
-        """The label that a row of the table tells of.
+        """Return the label that a row of the table tells of.
 
         Raises:
             StoreError: somebody has written it who is none of the sources.
@@ -75,7 +75,7 @@ class Label(Struct, frozen=True, order=True):
         )
 
     def row(self, written_utc_ns: int, *, removed: bool = False) -> dict[str, Any]:
-        """The fields of a row of the table `labels`."""
+        """Return the fields of a row of the table `labels`."""
         return {
             "robot": self.robot,
             "session": self.session,
@@ -106,7 +106,7 @@ def wearer(label: str) -> str | None:
 
 
 def person(name: str) -> str:
-    """What all spellings of somebody's name have in common: `P01`, `p01 `, `P-01` and `P1` are `p1`.
+    """Return what all spellings of somebody's name have in common: `P01`, `p01 `, `P-01` and `P1` are `p1`.
 
     Capitals, spaces, signs and leading zeros are nothing; but numbers stay apart: `1-11` is not `11-1`.
     """
@@ -134,7 +134,7 @@ def holding(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def utc_ns(time: datetime) -> int:
-    """A time of the store in ns since 1970."""
+    """Return a time of the store in ns since 1970."""
     return (time - datetime(1970, 1, 1, tzinfo=UTC)) // timedelta(microseconds=1) * US_NS
 
 

@@ -55,7 +55,7 @@ def take_out(store: Store, files: Sequence[DataFile], advance: Callable[[int], o
 
 
 def taken_out(store: Store) -> tuple[list[TakenOut], list[str]]:
-    """Every file that was taken out of a table, once; in words, which notes of that cannot be read."""
+    """Return every file that was taken out of a table, once; in words, which notes of that cannot be read."""
     found: dict[tuple[str, str], TakenOut] = {}
     problems = []
     for name in store.objects.names(_NOTED):

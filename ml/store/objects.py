@@ -73,7 +73,7 @@ class Objects:
             obstore.put(to, path, content, chunk_size=PIECE_BYTES, max_concurrency=2)
 
     def read(self, path: str) -> bytes | None:
-        """An object's content, None where it is not there."""
+        """Return an object's content, None where it is not there."""
         with translated(f"{self.url}/{path} cannot be read"):
             try:
                 return bytes(obstore.get(self._objects(), path).bytes())
@@ -81,7 +81,7 @@ class Objects:
                 return None
 
     def find(self, path: str) -> Object | None:
-        """What is said of an object, without a listing, which may be late; None where it is not there."""
+        """Return what is said of an object, without a listing, which may be late; None without one."""
         with translated(f"{self.url}/{path} cannot be read"):
             try:
                 found = obstore.head(self._objects(), path)
@@ -90,18 +90,18 @@ class Objects:
             return Object(path, found["size"], found["last_modified"], (found["e_tag"] or "").strip('"'))
 
     def names(self, folder: str) -> list[str]:
-        """Every object below a folder."""
+        """Return every object below a folder."""
         return sorted(found.path for found in self.listing(folder))
 
     def listing(self, folder: str = "") -> Iterator[Object]:
-        """Every object below a folder, in no order."""
+        """Yield every object below a folder, in no order."""
         with translated(f"{self.url}/{folder} cannot be listed"):
             for found in itertools.chain.from_iterable(obstore.list(self._objects(), folder or None)):
                 tag = (found["e_tag"] or "").strip('"')
                 yield Object(found["path"], found["size"], found["last_modified"], tag)
 
     def pieces(self, found: Object, offset: int = 0) -> Iterator[bytes]:
-        """An object's content from a byte on, a request a piece: a slow network carries that in time."""
+        """Yield an object's content from a byte on, a request a piece, so that a slow network is in time."""
         for start in range(offset, found.size_bytes, PIECE_BYTES):
             end = min(start + PIECE_BYTES, found.size_bytes)
             with translated(f"{self.url}/{found.path} cannot be read"):
@@ -135,7 +135,7 @@ class Objects:
 
 
 def s3_options() -> dict[str, str]:
-    """How S3 is reached: what the AWS environment says, and the profile where it has no keys."""
+    """Return how S3 is reached: what the AWS environment says, and the profile where it has no keys."""
     options = {"connect_timeout": f"{CONNECT_TIMEOUT_S}s", "timeout": f"{TIMEOUT_S}s"} | _profile()
     endpoint = os.environ.get("AWS_ENDPOINT_URL") or options.get("aws_endpoint", "")
     return options | ({"allow_http": "true"} if endpoint.startswith("http://") else {})

@@ -25,7 +25,7 @@ def last(rows: Iterable[Row], about: Callable[[Row], Hashable], time: Callable[[
 
 
 def recorded_order(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows as they were recorded; those of several spools by `utc`."""
+    """Return the rows as they were recorded; those of several spools by `utc`."""
     newest: dict[str, Any] = {}
     found = []
     for row in sorted(rows, key=lambda row: (*_place(row), row["utc"])):
@@ -36,12 +36,12 @@ def recorded_order(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def spool(row: Row) -> str:
-    """Whose row it is, however often that spool was begun anew."""
+    """Return whose row it is, however often that spool was begun anew."""
     return str(row.get("spool") or "").partition("/")[0]
 
 
 def opened_us(spool: str) -> int:
-    """When this opening of a spool was, by its name; 0 where that does not say."""
+    """Return when this opening of a spool was, by its name; 0 where that does not say."""
     found = re.search(OPENED, spool)
     return int(found[1]) if found else 0
 

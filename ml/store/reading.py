@@ -12,7 +12,7 @@ from ml.store.tables import Table
 
 
 def dataset(store: Store, table: Table, robot: str | None = None) -> pyarrow.dataset.Dataset:
-    """The table's rows for pyarrow and duckdb, lazily. With `robot` only the shard that holds its rows."""
+    """Return the table's rows for pyarrow and duckdb, lazily; with `robot` those of its shard alone."""
     found = []
     for location in _locations(store, table, robot):
         try:
@@ -26,7 +26,7 @@ def dataset(store: Store, table: Table, robot: str | None = None) -> pyarrow.dat
 
 
 def units(store: Store, table: Table, robot: str | None = None) -> dict[str, str | None]:
-    """Each column's unit, None where none was given."""
+    """Return each column's unit, None where none was given."""
     found: dict[str, str | None] = {}
     for location in _locations(store, table, robot):
         found |= store.units(location)
@@ -34,7 +34,7 @@ def units(store: Store, table: Table, robot: str | None = None) -> dict[str, str
 
 
 def files(store: Store, table: Table, robot: str | None = None) -> Iterator[DataFile]:
-    """Every file of the newest version, from the log alone."""
+    """Yield every file of the newest version, from the log alone."""
     for location in _locations(store, table, robot):
         try:
             delta = store.table(location)

@@ -91,7 +91,7 @@ class Channel(msgspec.Struct, frozen=True):
 def sessions(
     store: Store, robot: str | None = None, waiting: Iterable[Mapping[str, Any]] = ()
 ) -> list[Session]:
-    """Every session, oldest first; of one robot where it is named. `waiting`: rows that are not there yet."""
+    """Return every session, or one robot's, oldest first. `waiting`: rows that are not there yet."""
     extents: dict[tuple[str, str], list[DataFile]] = {}
     for file in reading.files(store, TELEMETRY, robot):
         extents.setdefault((file.robot or "", file.session or ""), []).append(file)
@@ -111,7 +111,7 @@ def sessions(
 
 
 def untold(robot: str, session: str, extent: Extent, uploaded: bool = True) -> Session:
-    """A session of which there is telemetry, and no row that says anything of it."""
+    """Return a session of which there is telemetry, and no row that says anything of it."""
     return made({"robot": robot, "session": session, "notes": UNTOLD}, extent, uploaded)
 
 
@@ -125,7 +125,7 @@ def in_order(found: Iterable[Session]) -> list[Session]:
 
 
 def find(store: Store, name: str, robot: str | None = None) -> Session:
-    """The session whose name is this, or alone begins so.
+    """Return the session whose name is this, or alone begins so.
 
     Raises:
         NoSuchSession: none, or several do.
@@ -135,7 +135,7 @@ def find(store: Store, name: str, robot: str | None = None) -> Session:
 
 
 def among(known: Sequence[Session], name: str, where: str) -> Session:
-    """The one of these whose name is this, or alone begins so; raises as `find`."""
+    """Return the one of these whose name is this, or alone begins so; raises as `find`."""
     exactly = [session for session in known if session.session == name]
     found = exactly or [session for session in known if session.session.startswith(name)]
     if not found:
@@ -152,12 +152,12 @@ def newest(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 
 def unstored(rows: Iterable[Mapping[str, Any]]) -> list[Session]:
-    """Those that are told of in rows which are in no store; their telemetry is not counted."""
+    """Return those that are told of in rows which are in no store; their telemetry is not counted."""
     return [made(row, Extent(()), uploaded=False) for row in newest(rows)]
 
 
 def made(fields: Mapping[str, Any], extent: Extent, uploaded: bool = True) -> Session:
-    """A session from its row in the table, and its telemetry's extent."""
+    """Return a session from its row in the table, and its telemetry's extent."""
     known = {name: value for name, value in fields.items() if value is not None}
     tables = {
         name: msgspec.json.decode(known.pop(name, "{}")) for name in ("parameters", "units", "versions")
@@ -173,7 +173,7 @@ def made(fields: Mapping[str, Any], extent: Extent, uploaded: bool = True) -> Se
 
 
 def channels(store: Store, session: Session) -> list[Channel]:
-    """The channels that have values in this session, from its files' footers."""
+    """Return the channels that have values in this session, from its files' footers."""
     known = reading.units(store, TELEMETRY, session.robot)
     samples: dict[str, int] = {}
     with ThreadPoolExecutor(_AT_ONCE, "footers") as pool:
@@ -189,7 +189,7 @@ def channels(store: Store, session: Session) -> list[Channel]:
 
 
 def footer(store: Store, file: DataFile) -> pq.FileMetaData:
-    """What the file says of itself; raises `StoreError` where it is not there or damaged."""
+    """Return what the file says of itself; raises `StoreError` where it is not there or damaged."""
     with (
         translated(f"{store.url}/{file.location}/{file.path} cannot be read"),
         store.files.open_input_file(f"{file.location}/{file.path}") as opened,
@@ -197,15 +197,15 @@ def footer(store: Store, file: DataFile) -> pq.FileMetaData:
         return pq.read_metadata(opened)
 
 
-def happenings(store: Store, session: Session, table: Table = EVENTS) -> list[dict[str, Any]]:
-    """The session's rows of `events`, or of `labels`, in the order in which they were recorded."""
+def rows_of(store: Store, session: Session, table: Table = EVENTS) -> list[dict[str, Any]]:
+    """Return the session's rows of `events`, or of `labels`, in the order in which they were recorded."""
     named = pyarrow.dataset.field("session") == session.session
     return recorded_order(_rows(store, table, session.robot, named))
 
 
 def labels(store: Store, session: Session) -> list[dict[str, Any]]:
-    """What somebody says that robot and wearer did, as far as it has not been taken back."""
-    return holding(happenings(store, session, LABELS))
+    """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
+    return holding(rows_of(store, session, LABELS))
 
 
 def telemetry(
@@ -215,7 +215,7 @@ def telemetry(
     begin: datetime | None = None,
     end: datetime | None = None,
 ) -> Iterator[pa.Table]:
-    """The rows from `begin` up to before `end`, in the order of the robot's clock, some at a time.
+    """Yield the rows from `begin` up to before `end`, in the order of the robot's clock, some at a time.
 
     The columns are `utc`, `stamp_ns` and these channels; rows in which all of them are null are left out.
     """
@@ -225,7 +225,7 @@ def telemetry(
 
 
 def stored(store: Store, session: Session) -> Source:
-    """The session's telemetry in the store, for `merged`."""
+    """Return the session's telemetry in the store, for `merged`."""
     files = _files(store, session)
     rows = _of_session(store, session)
     pieces = [Piece(each.first, each.last, each.first_ns, each.last_ns, each.rows) for each in files]

@@ -28,7 +28,7 @@ class Snapshot(Store):
         return found
 
     def has(self, location: str, writer: str, sequence: int) -> bool:
-        """Whether this transaction of the writer is in the table."""
+        """Return whether this transaction of the writer is in the table."""
         try:
             return (self.table(location).transaction_version(writer) or 0) >= sequence
         except NoSuchTable:

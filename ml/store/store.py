@@ -92,7 +92,7 @@ class Store:
 
     @classmethod
     def existing(cls, url: str | None = None) -> Self:
-        """A store that somebody has used already, to read or tidy it; nothing is made.
+        """Open a store that has been used already, to read or tidy it; make nothing.
 
         Raises:
             NoSuchTable: there is none.
@@ -165,7 +165,7 @@ class Store:
             return filesystem(self.url)
 
     def table(self, location: str, version: int | None = None) -> DeltaTable:
-        """The table as it is now, or was at `version`.
+        """Return the table as it is now, or was at `version`.
 
         Raises:
             NoSuchTable: nothing has been written there, or not that version.
@@ -230,17 +230,17 @@ class Store:
                 durable.mark([made])
 
     def dataset(self, location: str, version: int | None = None) -> pyarrow.dataset.Dataset:
-        """The table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
+        """Return the table's rows for pyarrow and duckdb, lazily; units are in the fields' metadata."""
         delta = self.table(location, version)
         with translated(f"{self.url}/{location}"):
             return as_dataset(delta, location, self.files)
 
     def units(self, location: str) -> dict[str, str | None]:
-        """Each column's unit, None where none was given; nothing where there is no table yet."""
+        """Return each column's unit, None where none was given; nothing where there is no table yet."""
         return {name: known.unit for name, known in self.columns(location).items()}
 
     def columns(self, location: str) -> dict[str, Known]:
-        """What is known of each column; nothing where there is no table yet."""
+        """Return what is known of each column; nothing where there is no table yet."""
         try:
             delta = self._open.get(location) or self.table(location)
         except NoSuchTable:
@@ -248,7 +248,7 @@ class Store:
         return _known(delta.schema())
 
     def identity(self, location: str) -> str:
-        """What the table is called for ever, in copies of the store too."""
+        """Return what the table is called for ever, in copies of the store too."""
         return str((self._open.get(location) or self.table(location)).metadata().id)
 
     # --- inside
@@ -368,7 +368,7 @@ def _known(schema: DeltaSchema) -> dict[str, Known]:
 
 
 def writer_properties(schema: pa.Schema) -> WriterProperties:
-    """How Parquet is written: measured in docs/adr/0009."""
+    """Return how Parquet is written: measured in docs/adr/0009."""
     plain = ColumnProperties(dictionary_enabled=False, statistics_enabled="CHUNK")
     split = ColumnProperties(
         dictionary_enabled=False, statistics_enabled="CHUNK", encoding="BYTE_STREAM_SPLIT"
@@ -384,7 +384,7 @@ def writer_properties(schema: pa.Schema) -> WriterProperties:
 
 
 def checked_url(url: str) -> str:
-    """The URL without a slash at its end.
+    """Return the URL without a slash at its end.
 
     Raises:
         StoreError: it is of another kind, or has credentials in it.

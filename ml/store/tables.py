@@ -31,11 +31,11 @@ class Table:
     sharded: bool = False  # several tables, chosen by the robot; see docs/explanation/scale.md
 
     def locations(self, shards: int) -> list[str]:
-        """Where it lies, below the store's URL."""
+        """Return where it lies, below the store's URL."""
         return [f"{self.name}/{shard:03}" for shard in range(shards)] if self.sharded else [self.name]
 
     def location(self, robot: str, shards: int) -> str:
-        """Where this robot's rows lie."""
+        """Return where this robot's rows lie."""
         return self.locations(shards)[shard_of(robot, shards)] if self.sharded else self.name
 
     def rows(self, fields: Sequence[Mapping[str, Any]]) -> pa.Table:
@@ -62,12 +62,12 @@ class Table:
 
 
 def shard_of(robot: str, shards: int) -> int:
-    """Which of `shards` tables holds this robot; the same for ever."""
+    """Return which of `shards` tables holds this robot; the same for ever."""
     return zlib.crc32(robot.encode()) % shards
 
 
 def field(name: str, kind: Any, unit: str | None = None, channel: str | None = None) -> pa.Field:
-    """A column; in its metadata are its unit, and the channel that it is of where its name may mislead."""
+    """Make a column with its unit in its metadata, and its channel where the column's name may mislead."""
     told = {key: text for key, text in (("unit", unit), ("channel", channel)) if text is not None}
     return pa.field(name, kind, metadata=told or None)
 
@@ -80,7 +80,7 @@ class Known(NamedTuple):
 
 
 def columns(schema: pa.Schema) -> dict[str, Known]:
-    """What its fields tell."""
+    """Return what its fields tell."""
     found: dict[str, Known] = {}
     for each in schema:
         told = each.metadata or {}

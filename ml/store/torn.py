@@ -58,7 +58,7 @@ class Torn:
 
 
 def find(table: Path) -> Torn | None:
-    """What keeps the table from being read, or makes what is read wrong."""
+    """Return what keeps the table from being read, or makes what is read wrong."""
     return next(
         itertools.chain(*(look(table) for look in (_end, _checkpoint, _hint, _earlier, _beginning))), None
     )
@@ -86,7 +86,7 @@ def set_aside(table: Path) -> list[Path]:
 
 
 def whole(entry: bytes) -> bool:
-    """Whether an entry has all of its lines, as far as it says itself how many there are."""
+    """Return whether an entry has all of its lines, as far as it says itself how many there are."""
     try:
         actions: list[dict[str, Any]] = [json.loads(line) for line in entry.splitlines()]
     except ValueError:
@@ -105,7 +105,7 @@ def whole(entry: bytes) -> bool:
 
 
 def newest(table: Path) -> int:
-    """The newest version that has an entry; -1 without any."""
+    """Return the newest version that has an entry; -1 without any."""
     return max(map(_version, _entries(table)), default=-1)
 
 

@@ -115,7 +115,7 @@ def unpin(store: Store, location: str, version: int, by: str) -> None:
 
 
 def pins(store: Store) -> list[Pin]:
-    """Every version that somebody names.
+    """Return every version that somebody names.
 
     Raises:
         StoreError: one of these objects cannot be read, so nobody knows which version it keeps.

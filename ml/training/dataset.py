@@ -18,7 +18,7 @@ from ml.features.recipe import Features, Recipe, features
 from ml.features.windows import Samples
 from ml.registry.registry import Registry
 from ml.robot.groups import unit
-from ml.robot.learned import NONE, STRANGE, Learned
+from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import TASKS, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
@@ -226,7 +226,7 @@ def _teach(ask: Ask, store: Store, known: tuple[npt.NDArray[Any], Names], stamps
     rows = recorded(store, ask.robot, ask.session, card.channels, _version(store, ask))
     found, its_stamps_ns, _ = _decisions(teacher.recipe, rows)
     verdicts = teacher.judge(found)
-    sure = (verdicts.label != NONE) & (verdicts.novelty < STRANGE)
+    sure = (verdicts.label != NONE) & (verdicts.novelty < ABNORMAL_FROM)
     sure &= verdicts.probabilities.max(axis=1) >= ask.least
     _, mine, its = np.intersect1d(stamps_ns, its_stamps_ns[sure], return_indices=True)
     free = source[mine] == NOBODY

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from ml.registry.card import Metrics
 from ml.registry.judged import calibrated, judged
-from ml.robot.learned import NONE, STRANGE, Learned, Verdicts
+from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import Task
 from ml.store.labels import Source
 from ml.training.dataset import Part
@@ -161,7 +161,7 @@ def _metrics(learned: Learned, parts: Sequence[Part], classes: Sequence[str]) ->
 
 def _label(verdicts: Sequence[Verdicts]) -> npt.NDArray[np.int_]:
     """What is said: nothing of what it does not know."""
-    return np.concatenate([np.where(one.novelty < STRANGE, one.label, NONE) for one in verdicts])
+    return np.concatenate([np.where(one.novelty < ABNORMAL_FROM, one.label, NONE) for one in verdicts])
 
 
 def _of_classes(

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import Final
 
-from gateway.cli.reach import choose
+from gateway.cli.connect import choose
 from ml.store.private import private_files
-from server_gui.cli.cloud_look import du, ls, verify
+from server_gui.cli.cloud_contents import du, ls, verify
+from server_gui.cli.cloud_maintenance import compact, retain, vacuum
 from server_gui.cli.cloud_mend import mend
-from server_gui.cli.cloud_move import download, upload
-from server_gui.cli.cloud_upkeep import compact, retain, vacuum
+from server_gui.cli.cloud_transfer import download, upload
 
 USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
 

@@ -4,15 +4,15 @@ import argparse
 import functools
 from pathlib import Path
 
-from gateway.cli.reach import ask
+from gateway.cli.connect import ask
 from gateway.cli.text import counted, say, say_json, warn
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore
 from ml.store.objects import Objects
 from ml.store.tables import TELEMETRY
-from server_gui.cli.cloud_reach import add_url, parser, progress, url
+from server_gui.cli.cloud_options import add_url, parser, progress, url
 from server_gui.core.cloud import mend as mending
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.again import Again
+from server_gui.core.cloud.repeated_upload import Again
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import load

@@ -152,7 +152,7 @@ def _status(spool: Path, *, as_json: bool) -> int:
 
 
 def status_text(report: CollectorReport) -> str:
-    """What a collector says of itself, for people."""
+    """Return what a collector says of itself, for people."""
     recorder, uploader = report.recorder, report.uploader
     rows = f"{recorder.recorded} rows since then, {recorder.waiting} wait for the disk, {recorder.lost} lost"
     batches = (

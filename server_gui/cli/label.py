@@ -13,7 +13,7 @@ from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
 from ml.store.private import private_files
 from ml.store.sessions import Session
-from server_gui.cli.cloud_reach import absolute, instant_or_seconds, parser
+from server_gui.cli.cloud_options import absolute, instant_or_seconds, parser
 from server_gui.core.archive.label_sources import from_events, from_table, from_truth
 from server_gui.core.archive.labelling import Kept, Labelling, span
 from server_gui.core.settings.server_file import ServerSettings, load

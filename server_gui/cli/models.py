@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import msgspec
 
-from gateway.cli.reach import choose
+from gateway.cli.connect import choose
 from gateway.cli.text import NONE, did_you_mean, say, say_json, table, warn
 from ml.errors import UnusableModel
 from ml.registry.card import Card, age_days
@@ -21,7 +21,7 @@ from ml.robot.task import TASKS
 from ml.store import StoreError
 from ml.store.private import private_files
 from ml.store.store import checked_url
-from server_gui.cli.cloud_reach import add_url, parser, url, when
+from server_gui.cli.cloud_options import add_url, parser, url, when
 from server_gui.cli.models_show import told
 from server_gui.core.settings.server_file import load
 

@@ -5,7 +5,7 @@ from typing import Final
 
 from gateway.cli.text import NONE, percent, table
 from ml.registry.card import Card, Metrics, age_days
-from server_gui.cli.cloud_reach import when
+from server_gui.cli.cloud_options import when
 
 SHOWN: Final = 6  # sessions by name; the rest is counted
 UNKNOWN: Final = "unknown"

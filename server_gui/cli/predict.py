@@ -18,7 +18,7 @@ from ml.registry.card import age_days
 from ml.store import Store, sessions
 from ml.store.private import private_files
 from ml.store.sessions import Session
-from server_gui.cli.cloud_reach import parser
+from server_gui.cli.cloud_options import parser
 from server_gui.cli.rehearse import rehearse
 from server_gui.core.prediction.live import Live
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
@@ -117,9 +117,9 @@ def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: ar
     ):
         while time.monotonic() < until_s:
             ending.check()
-            foreseen = live.look(LOOK_S)
-            predicted |= any(isinstance(one, Predicted) for one in foreseen)
-            show(live, foreseen)
+            news = live.look(LOOK_S)
+            predicted |= any(isinstance(one, Predicted) for one in news)
+            show(live, news)
             if arguments.json or not sys.stdout.isatty():  # the picture says it itself
                 linked(live)
     if not predicted:
@@ -154,21 +154,21 @@ def _shown(arguments: argparse.Namespace) -> Iterator[Show]:
             yield lambda live, _: picture.update(Text(_page(live)))
     else:
         said: dict[tuple[str, str], str] = {}
-        yield lambda _, foreseen: _show_new(foreseen, said)
+        yield lambda _, news: _show_new(news, said)
 
 
 def _page(live: Live) -> str:
     return "\n".join(told(name, watched) for name, watched in live.robots.items())
 
 
-def _show_json(_live: Live, foreseen: Sequence[PredictionNews]) -> None:
-    for one in foreseen:
+def _show_json(_live: Live, news: Sequence[PredictionNews]) -> None:
+    for one in news:
         say_json(fields(one))
 
 
-def _show_new(foreseen: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
+def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
     """A line for each change."""
-    for one in foreseen:
+    for one in news:
         match one:
             case Predicted(prediction=prediction):
                 key = (one.robot, prediction.task)
@@ -184,7 +184,7 @@ def _show_new(foreseen: Sequence[PredictionNews], said: dict[tuple[str, str], st
 
 
 def fields(one: PredictionNews) -> dict[str, Any]:
-    """What was foreseen, for machines."""
+    """Return what was predicted, for machines."""
     match one:
         case Predicted():
             trust = {"trust": one.trust.level.value, "drifted": one.trust.drifted}

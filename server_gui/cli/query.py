@@ -14,7 +14,7 @@ from gateway.cli.text import NONE, say, table, warn
 from gateway.plain import json_plain
 from ml.store.private import private_files
 from ml.store.query import Result, query
-from server_gui.cli.cloud_reach import add_url, parser, reach
+from server_gui.cli.cloud_options import add_url, parser, reach
 from server_gui.core.cloud.tabular import iso_8601
 
 SHOWN: Final = 100  # rows, for people

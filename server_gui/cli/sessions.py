@@ -11,11 +11,11 @@ from typing import Any, Final
 import msgspec
 import pyarrow as pa
 
-from gateway.cli.reach import choose as choose_command
+from gateway.cli.connect import choose as choose_command
 from gateway.cli.text import NONE, say, say_json, size, table, warn
 from ml.store.private import private_files
 from ml.store.sessions import Channel, Session
-from server_gui.cli.cloud_reach import (
+from server_gui.cli.cloud_options import (
     Advance,
     absolute,
     add_url,
@@ -27,7 +27,7 @@ from server_gui.cli.cloud_reach import (
     when,
 )
 from server_gui.cli.sessions_gait import gait
-from server_gui.cli.sessions_use import compare, resources
+from server_gui.cli.sessions_resources import compare, resources
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.selection import Choice, choose
@@ -125,7 +125,7 @@ def show(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
     recorded = known.open(known.find(arguments.session))
-    events, labels = known.happenings(recorded.session), known.labels(recorded.session)
+    events, labels = known.rows_of(recorded.session), known.labels(recorded.session)
     if arguments.json:
         more = {"waiting": recorded.waiting, "channels": recorded.channels}
         happened = {"events": list(map(_bare, events)), "labels": list(map(_bare, labels))}

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 
 from gateway.cli.text import NONE, say, say_json, table
-from server_gui.cli.cloud_reach import (
+from server_gui.cli.cloud_options import (
     absolute,
     add_url,
     instant_or_seconds,

@@ -7,7 +7,7 @@ import time
 from typing import Final
 
 from gateway.cli.arguments import seconds
-from gateway.cli.reach import add_robot
+from gateway.cli.connect import add_robot
 
 EPILOG: Final = """keys
   s, space     STOP: quick stop on every drive (software, not safety-rated)

@@ -14,7 +14,7 @@ from ml.store.private import private_files
 from ml.training.judging import Judged
 from ml.training.material import Wish
 from ml.training.training import Trained, told, train
-from server_gui.cli.cloud_reach import add_url, parser, url
+from server_gui.cli.cloud_options import add_url, parser, url
 from server_gui.cli.models import NOTHING
 
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")

@@ -39,7 +39,7 @@ class Output:
             self._held = (self._held + chunk)[-HELD_BYTES:]
 
     def lines(self) -> list[str]:
-        """The complete and incomplete lines held."""
+        """Return the complete and incomplete lines held."""
         return self._held.decode(errors="replace").splitlines()
 
     def close(self) -> None:
@@ -115,7 +115,7 @@ class Child:
         self._raise_if(self._listen())
 
     def last_words(self) -> str:
-        """The end of what it wrote to stderr."""
+        """Return the end of what it wrote to stderr."""
         lines = self._err.lines()[-LAST_LINES:]
         return (
             "It said last:\n" + "\n".join(f"  {line}" for line in lines)

@@ -100,7 +100,7 @@ class Controls:
 
 
 def step_of(low: float, high: float, largest: float | None) -> float:
-    """A round step (1, 2 or 5 times a power of ten) of about a twentieth of the range, within `largest`."""
+    """Return a round step (1, 2 or 5 times a power of ten), about 1/20 of the range and within `largest`."""
     wanted = (high - low) / STEPS
     wanted = min(wanted, largest) if largest else wanted
     power = 10.0 ** math.floor(math.log10(wanted) + 1e-9)
@@ -108,7 +108,7 @@ def step_of(low: float, high: float, largest: float | None) -> float:
 
 
 def neighbour(value: float, by: int, info: ParameterInfo) -> float | None:
-    """The next step above (+1) or below (−1) a value, within its limits; None where there are none."""
+    """Return the next step above (+1) or below (−1) a value, within its limits; None where there are none."""
     if info.min is None or info.max is None or info.max <= info.min:
         return None
     step = step_of(info.min, info.max, info.max_step)

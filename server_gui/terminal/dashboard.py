@@ -23,7 +23,7 @@ FRAME = 2  # lines of a panel that are its frame
 
 
 def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
-    """One frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24."""
+    """Draw a frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24."""
     robot, gait = station.robot, station.processing.derived().gait
     columns, lines = size
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW

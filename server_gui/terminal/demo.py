@@ -43,7 +43,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """The whole demo; returns the exit status.
+    """Run the whole demo, and return the exit status.
 
     Raises:
         ChildFailed: simulator or gateway ended, or never became ready.

@@ -74,7 +74,7 @@ class FollowedRobot:
         self._give_back_control()
 
     def is_whole(self) -> bool:
-        """Whether every component of the robot is there and its values are live."""
+        """Return whether every component of the robot is there and its values are live."""
         robot = self.station.robot
         return bool(robot.parts) and not robot.not_ok() and not robot.is_stale()
 

@@ -14,7 +14,7 @@ NONE = "–"
 
 
 def line(robot: Robot, gait: Gait, elapsed_s: float) -> str:
-    """What is now, in one line."""
+    """Return what is now, in one line."""
     joints = " ".join(_degrees(robot.values.get(f"{name}.position")) for name in robot.names("joint"))
     feet = "/".join(_newtons(robot.values.get(f"{name}.force")) for name in robot.names("insole"))
     tilts = " ".join(_degrees(robot.values.get(f"{name}.tilt_forward")) for name in robot.names("imu"))
@@ -35,7 +35,7 @@ def _link(robot: Robot) -> str:
 
 
 def table(summary: Summary, gait: Gait, robot: Robot) -> str:
-    """What the run showed."""
+    """Return what the run showed."""
     link = robot.link
     lines = [
         "",

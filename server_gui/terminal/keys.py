@@ -54,7 +54,7 @@ class KeyParser:
         self._held = b""
 
     def feed(self, data: bytes) -> list[Key]:
-        """The keys that `data` completes."""
+        """Return the keys that `data` completes."""
         held = self._held + data
         keys: list[Key] = []
         while held:
@@ -107,7 +107,7 @@ class Keyboard:
             termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
     def wait(self, timeout_s: float) -> list[Key]:
-        """The keys pressed; returns at the first ones, or after `timeout_s` with none."""
+        """Return the keys pressed; returns at the first ones, or after `timeout_s` with none."""
         watched = [] if self._fd is None else [self._fd]
         ready, _, _ = select.select(watched, [], [], max(0.0, timeout_s))
         if self._fd is None or not ready:

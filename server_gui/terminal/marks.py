@@ -56,14 +56,14 @@ def words(text: str, style: str = "") -> Text:
 
 
 def state_text(word: str, more: str = "") -> Text:
-    """A state as shape, colour and word, and what else there is to say of it."""
+    """Return a state as shape, colour and word, and what else there is to say of it."""
     said = word.replace("_", " ").lower()
     mark = STATES.get(said, UNKNOWN)
     return words(f"{mark.shape} {said} {more}".rstrip(), mark.colour)
 
 
 def sparkline(values: Iterable[float | None], low: float, high: float, width: int) -> str:
-    """The newest `width` values as blocks between `low` and `high`; a blank where there is none."""
+    """Return the newest `width` values as blocks between `low` and `high`; a blank where there is none."""
     newest = list(values)[-width:]
     span = (high - low) or 1.0
     return "".join(" " if value is None else BLOCKS[_eighth((value - low) / span)] for value in newest).rjust(
@@ -72,13 +72,13 @@ def sparkline(values: Iterable[float | None], low: float, high: float, width: in
 
 
 def bar(share: float | None, width: int) -> str:
-    """A bar of `width` cells filled to `share` (0–1)."""
+    """Return a bar of `width` cells filled to `share` (0–1)."""
     filled = 0 if share is None else round(min(max(share, 0.0), 1.0) * width)
     return "━" * filled + "╌" * (width - filled)
 
 
 def needle(value: float | None, low: float, high: float, width: int) -> str:
-    """Where a value lies between `low` and `high`; zero is marked when it lies between."""
+    """Return where a value lies between `low` and `high`; zero is marked when it lies between."""
     cells = ["─"] * width
     if low < 0.0 < high:
         cells[_cell(0.0, low, high, width)] = "┼"
@@ -88,14 +88,14 @@ def needle(value: float | None, low: float, high: float, width: int) -> str:
 
 
 def scale(low_rad: float, high_rad: float, width: int) -> str:
-    """The ends and the zero of a needle's range, in degrees, above where they lie."""
+    """Return the ends and the zero of a needle's range, in degrees, above where they lie."""
     ends = f"{math.degrees(low_rad):.0f}°", f"{math.degrees(high_rad):.0f}°"
     zero = _cell(0.0, low_rad, high_rad, width)
     return (ends[0].ljust(zero) + "0°").ljust(width - len(ends[1])) + ends[1]
 
 
 def degrees(value_rad: float | None) -> str:
-    """An angle for people."""
+    """Return an angle for people."""
     return NONE if value_rad is None else f"{math.degrees(value_rad):+.1f}°"
 
 

@@ -70,7 +70,7 @@ NARROW = Look(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
 
 
 def header(robot: Robot, where: str, look: Look) -> RenderableType:
-    """Which robot, how it is reached, how old what is shown is, what is wrong."""
+    """Return which robot, how it is reached, how old what is shown is, what is wrong."""
     row = Table.grid(expand=True, padding=(0, 2))
     row.add_column(ratio=1)
     row.add_column(justify="right")
@@ -102,7 +102,7 @@ def _link(robot: Robot, look: Look) -> Text:
 
 
 def joints(station: Station, look: Look) -> RenderableType:
-    """Every joint with its drive's state and its angle over the last seconds."""
+    """Return every joint with its drive's state and its angle over the last seconds."""
     robot = station.robot
     stale = robot.is_stale()
     grid = Table(box=None, expand=True, padding=(0, 1), header_style=DIM)
@@ -154,7 +154,7 @@ def _part_state(robot: Robot, name: str) -> Text:
 
 
 def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
-    """What each foot carries, how the trunk leans, and how the wearer walks."""
+    """Return what each foot carries, how the trunk leans, and how the wearer walks."""
     stale = robot.is_stale()
     grid = Table.grid(expand=True, padding=(0, 1))
     grid.add_column(no_wrap=True)
@@ -193,7 +193,7 @@ def _walk(gait: Gait, look: Look) -> str:
 
 
 def parameters(robot: Robot, controls: Controls, look: Look, rows: int) -> RenderableType:
-    """The parameters as the devices have them, as many as there are rows; the chosen one can be moved."""
+    """Return the parameters as the devices have them, as many as fit; the chosen one can be moved."""
     grid = Table.grid(expand=True, padding=(0, 1))
     for width in (1, None, 7, 4, None):
         grid.add_column(justify="right" if width == 7 else "left", no_wrap=True, min_width=width)
@@ -238,7 +238,7 @@ def _range(held: ParameterValue, info: ParameterInfo | None, unit: Unit, look: L
 
 
 def resources(station: Station, look: Look) -> RenderableType:
-    """The robot's computer: CPU, memory, and who uses them most."""
+    """Return the robot's computer: CPU, memory, and who uses them most."""
     robot, table = station.robot, station.processes
     seen = robot.resources
     if seen is None:
@@ -264,7 +264,7 @@ def resources(station: Station, look: Look) -> RenderableType:
 
 
 def footer(station: Station, controls: Controls, where: str) -> RenderableType:
-    """The keys, and the last thing that was said."""
+    """Return the keys, and the last thing that was said."""
     keys = Text.assemble(
         (" s ", "bold white on red"),
         " STOP   ",

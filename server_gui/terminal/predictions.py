@@ -30,7 +30,7 @@ SPELLS: Final = 40  # lines of what followed what
 
 
 def told(name: str, watched: Watched) -> str:
-    """A robot now: what its models say and how far to believe it; faults and rules beside."""
+    """Return a robot now: what its models say and how far to believe it; faults and rules beside."""
     known = watched.predictions
     shown = [known.by_task[task] for task in TASKS if task in known.by_task]
     lines = [f"{name}: {link(watched)}"]
@@ -81,13 +81,13 @@ def _right(found: Iterable[Shown]) -> Iterator[str]:
 
 
 def said(prediction: Prediction) -> str:
-    """The label, and further values where it says anything."""
+    """Return the label, and further values where it says anything."""
     values = {} if prediction.label in (UNKNOWN, ABNORMAL) else prediction.values
     return " ".join([prediction.label, *(f"{name} {value:.2f}" for name, value in values.items())])
 
 
 def made(card: Card) -> str:
-    """How old a model is."""
+    """Return how old a model is."""
     days = round(age_days(card))
     return f"{days} day{'s' * (days > 1)} ago" if days else "today"
 
@@ -96,7 +96,7 @@ def made(card: Card) -> str:
 
 
 def replay_told(found: Replayed) -> str:
-    """One task of a session."""
+    """Return one task of a session."""
     card, predictions = found.model.card, found.predictions
     lines = [f"{card.task}: {card.id}, made {made(card)}, {card.source.value}; {len(predictions)} decisions"]
     if predictions:

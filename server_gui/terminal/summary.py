@@ -57,7 +57,7 @@ class Summary:
 
     @classmethod
     def of(cls, joints: Iterable[str], feet: Iterable[str]) -> "Summary":
-        """An empty one for these components."""
+        """Return an empty one for these components."""
         return cls({name: Range() for name in joints}, {name: Foot() for name in feet})
 
     def take(self, batch: Batch) -> None:

@@ -136,7 +136,7 @@ class Audit(QWidget):
         self._filter()
 
     def save_csv(self, path: Path) -> None:
-        """What is shown, in its order."""
+        """Save what is shown, in its order."""
         places = (self.chosen.mapToSource(self.chosen.index(row, 0)) for row in range(self.chosen.rowCount()))
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)

@@ -14,7 +14,7 @@ CLIENTS: Final = 4  # those that cost the most
 
 
 def facts(station: Station, seen: ResourceSnapshot) -> str:
-    """A line each."""
+    """Return the facts, a line each."""
     load = " ".join(f"{one:.2f}" for one in seen.cpu.load)
     lines = [f"Load over 1, 5 and 15 minutes: {load}", f"Gateway: {seen.gateway.rss_bytes / MIB:.1f} MiB"]
     table = station.processes
@@ -29,7 +29,7 @@ def facts(station: Station, seen: ResourceSnapshot) -> str:
 
 
 def held_back(seen: ResourceSnapshot | None) -> str:
-    """How far the cores are held back because it is too hot, or for power."""
+    """Return how far the cores are held back because it is too hot, or for power."""
     if seen is None or seen.throttling is UNSET:
         return ""
     told = seen.throttling

@@ -1,4 +1,4 @@
-"""What is shown before there is a robot: how to get one, or a simulated one at once."""
+"""The page before there is a robot: how to get one, or a simulated one at once."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
@@ -51,7 +51,7 @@ class EmptyView(QWidget):
         everything.addStretch(2)
 
     def say(self, text: str, *, again: bool) -> None:
-        """How the start goes; `again`: it can be asked for once more."""
+        """Say how the start goes; `again`: it can be asked for once more."""
         self._said.setText(text)
         self.start.setEnabled(again)
 

@@ -115,7 +115,7 @@ class MainWindow(QMainWindow):
         theme.scaled.connect(self._scaled)
 
     def refresh(self) -> None:
-        """One frame: what moves each time, what is read now and then, and only what is visible."""
+        """Draw a frame: what moves each time, what is read now and then, and only what is visible."""
         self._frame += 1
         self._bar.frame()
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
@@ -149,7 +149,7 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def show_help(self) -> None:
-        """What the manual says of the panel that has the keyboard, or of the tab."""
+        """Show what the manual says of the panel that has the keyboard, or of the tab."""
         tab = self.tabs.tabText(self.tabs.currentIndex()).replace("&", "")
         self.help.show_section("Parameters" if _within(self.parameters) else tab)
         self._manual.show()

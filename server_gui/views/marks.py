@@ -46,14 +46,14 @@ NEWS: Final = {
 
 
 def state_mark(word: str | None) -> Mark:
-    """The mark of a component's or drive's state."""
+    """Return the mark of a component's or drive's state."""
     if word is None:
         return Mark("ring", "old", "not known")
     return STATES.get(word.lower(), Mark("triangle", "warn", word))
 
 
 def age_text(age_s: float | None) -> str:
-    """How old, for people."""
+    """Return an age for people."""
     if age_s is None:
         return "no data yet"
     if age_s < 1.0:
@@ -64,7 +64,7 @@ def age_text(age_s: float | None) -> str:
 
 
 def drives_mark(robot: Robot) -> Mark:
-    """All drives in one: enabled only where every one is, the worst otherwise."""
+    """Return all drives in one: enabled only where every one is, the worst otherwise."""
     joints = robot.names("joint")
     if not joints:
         return Mark("ring", "old", "no drives")
@@ -83,7 +83,7 @@ def drives_mark(robot: Robot) -> Mark:
 
 
 def station_mark(station: Station) -> Mark:
-    """A robot in one mark."""
+    """Return a robot in one mark."""
     robot = station.robot
     if not station.is_linked:
         return Mark("cross", "bad", "no link")
@@ -96,7 +96,7 @@ def station_mark(station: Station) -> Mark:
 
 
 def draw(painter: QPainter, mark: Mark, colour: QColor, box: QRectF) -> None:
-    """The mark's shape in a square."""
+    """Draw the mark's shape in a square."""
     painter.setPen(QPen(colour, max(1.2, box.width() / 7)))
     painter.setBrush(QBrush(colour))
     inset = box.width() * 0.12

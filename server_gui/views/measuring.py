@@ -49,7 +49,7 @@ class Measuring(Card):
         self.hide()
 
     def show_readings(self, a_s: float, b_s: float, active: int, rows: Sequence[Row]) -> None:
-        """The cursors' times (s, until the newest row), and every curve."""
+        """Show the cursors' times (s, until the newest row), and every curve."""
         apart_s = b_s - a_s
         rate = "" if apart_s == 0.0 else f" · 1/Δt {1 / abs(apart_s):.4g} Hz"
         marks = ["▸ " if place == active else "" for place in (0, 1)]

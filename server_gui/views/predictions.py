@@ -8,8 +8,8 @@ from typing import Final
 from ml.registry.card import Source
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level, Trust
+from server_gui.core.desk.leg_phase import LegPhase, phase_at
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.walk import LegPhase, phase_at
 from server_gui.core.prediction.current import Recalled, Told
 from server_gui.core.prediction.state import WITHIN_DAYS
 from server_gui.core.processing.gait_events import Leg
@@ -36,7 +36,7 @@ class Line:
 
 
 def said(shown: Told) -> Line:
-    """What a model says now: the label and how probable, or that it does not know."""
+    """Return what a model says now: the label and how probable, or that it does not know."""
     prediction = shown.prediction
     if shown.is_stale():
         return Line(Mark("ring", "old", "old"), "No prediction now", f"the last {shown.age_s():.0f} s ago")
@@ -55,7 +55,7 @@ def said(shown: Told) -> Line:
 
 
 def status(station: Station) -> Line | None:
-    """The one line that stands in the header: a fall before all, then activity; None without a model."""
+    """Return the one line of the header: a fall before all, then activity; None without a model."""
     shown = station.predictions.told
     falling = shown.get(FALLING)
     if falling is not None and not falling.is_stale():
@@ -66,7 +66,7 @@ def status(station: Station) -> Line | None:
 
 
 def lines(station: Station) -> Iterator[Line]:
-    """What the overview lists: each task with its model, what rules hold, what devices say of themselves."""
+    """Yield the overview's lines: tasks with their models, rules that hold, faults of devices."""
     predictions = station.predictions
     told_by_task = predictions.told
     for task, title in TITLES.items():
@@ -89,7 +89,7 @@ def lines(station: Station) -> Iterator[Line]:
 
 
 def model_phases(station: Station) -> dict[Leg, LegPhase | None]:
-    """Where each leg is in its stride by a model; None where it does not know."""
+    """Return where each leg is in its stride by a model; None where it does not know."""
     shown = station.predictions.told.get(GAIT_PHASE)
     if shown is None or shown.is_stale() or shown.prediction.label in (UNKNOWN, ABNORMAL):
         return dict.fromkeys(Leg)
@@ -99,12 +99,12 @@ def model_phases(station: Station) -> dict[Leg, LegPhase | None]:
 
 
 def label_text(label: str) -> str:
-    """A label for people."""
+    """Return a label for people."""
     return label.replace("_", " ").capitalize()
 
 
 def model_text(shown: Told) -> str:
-    """Which model, how old, from what it has learned; of a recording, that it was said then."""
+    """Return which model, how old, from what it has learned; of a recording, that it was said then."""
     if isinstance(shown, Recalled):
         return f"said then by {shown.prediction.model}"
     card = shown.predicted.card
@@ -114,7 +114,7 @@ def model_text(shown: Told) -> str:
 
 
 def quality_text(shown: Told) -> str:
-    """How right the model was on this robot of late, where somebody has labelled that."""
+    """Return how right the model was on this robot of late, where somebody has labelled that."""
     if isinstance(shown, Recalled) or shown.predicted.quality is None:
         return ""
     return f"last {WITHIN_DAYS} days: {shown.predicted.quality.text}"

@@ -156,7 +156,7 @@ class RobotsPanel(QWidget):
             self.added.emit(where)
 
     def say(self, text: str) -> None:
-        """What is wrong with the address that was typed."""
+        """Say what is wrong with the address that was typed."""
         self.said.setText(text)
         self.said.setVisible(bool(text))
 

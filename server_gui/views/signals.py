@@ -51,7 +51,7 @@ class Frozen:
     columns: dict[str, Floats]
 
     def times_of(self, seconds: float) -> Floats:
-        """Those of the last `seconds`."""
+        """Return those of the last `seconds`."""
         return (
             self.times[np.searchsorted(self.times, self.times[-1] - seconds) :]
             if len(self.times)
@@ -149,7 +149,7 @@ class Signals(QWidget):
         self._rebuild()
 
     def save_csv(self, path: Path) -> None:
-        """What is on screen, in SI units, a row a time."""
+        """Save what is on screen, in SI units, a row a time."""
         station = self._desk.selected
         if station is None:
             return
@@ -166,7 +166,7 @@ class Signals(QWidget):
                 writer.writerow([f"{time_s:.6f}", *("" if np.isnan(value) else value for value in values)])
 
     def save_png(self, path: Path) -> None:
-        """What is on screen, as a picture."""
+        """Save what is on screen, as a picture."""
         if not self.grab().save(str(path), "PNG"):
             raise OSError(f"the picture could not be written: is there room in {path.parent}, and may you?")
 

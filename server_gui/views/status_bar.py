@@ -44,7 +44,7 @@ class StatusBar(QStatusBar):
         self.setSizeGripEnabled(False)
 
     def frame(self) -> None:
-        """A frame was drawn."""
+        """Count a frame that was drawn."""
         self._frames.append(time.monotonic())
 
     def refresh(self) -> None:

@@ -174,7 +174,7 @@ class Theme(QObject):
         self.set(look, scale)
 
     def set(self, look: Look | None = None, scale: float | None = None) -> None:
-        """Another palette, or another size of all text between 80 and 200 %."""
+        """Take another palette, or another size of all text between 80 and 200 %."""
         before = self.scale
         self.look = self.look if look is None else look
         self.scale = self.scale if scale is None else min(max(scale, SMALLEST_SCALE), LARGEST_SCALE)
@@ -189,11 +189,11 @@ class Theme(QObject):
             self.scaled.emit()
 
     def colour(self, name: str) -> QColor:
-        """A colour of the palette by its name."""
+        """Return a colour of the palette by its name."""
         return QColor(getattr(self.colours, name))
 
     def px(self, pixels: float) -> int:
-        """A length that grows with the text."""
+        """Return a length that grows with the text."""
         return round(pixels * self.scale)
 
     def side(self, component: str) -> QColor:
@@ -202,14 +202,14 @@ class Theme(QObject):
         return self.colour(side) if side in ("left", "right") else self.colour("text")
 
     def number_font(self, factor: float = 1.0, *, bold: bool = False) -> QFont:
-        """For numbers that change: every digit as wide as the others."""
+        """Return the font for numbers that change: every digit as wide as the others."""
         font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
         font.setPointSizeF(BASE_POINTS * self.scale * factor)
         font.setBold(bold)
         return font
 
     def text_font(self, factor: float = 1.0, *, bold: bool = False) -> QFont:
-        """For everything else."""
+        """Return the font for everything else."""
         font = QFont(self._family)
         font.setPointSizeF(BASE_POINTS * self.scale * factor)
         font.setBold(bold)

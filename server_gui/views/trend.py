@@ -44,7 +44,7 @@ class Trend(Card):
         *,
         live: bool,
     ) -> None:
-        """A column a curve over the times (s, rising); nothing where there are none."""
+        """Draw a column a curve over the times (s, rising); nothing where there are none."""
         if not len(times):
             return
         span = next((seconds for seconds in SPANS_S if times[-1] - times[0] < seconds), SPANS_S[-1])
@@ -71,6 +71,6 @@ class Trend(Card):
 
 
 def since_restart(rows: Floats) -> Floats:
-    """The rows since the robot's clock has begun anew; the time is their first column."""
+    """Return the rows since the robot's clock has begun anew; the time is their first column."""
     restarts = np.flatnonzero(np.diff(rows[:, 0]) < 0)
     return rows[restarts[-1] + 1 :] if len(restarts) else rows

@@ -38,7 +38,7 @@ class UnitPlot(Card):
         self.setMinimumHeight(theme.px(120))
 
     def show_values(self, values: Sequence[float | None]) -> None:
-        """The newest value of each curve, behind its name."""
+        """Show the newest value of each curve, behind its name."""
         names = (
             f'<span style="color:{css(self._theme, curve.colour)}">━ {rich(curve.channel)} '
             f"<b>{rich(self.unit.text(value))}</b></span>"

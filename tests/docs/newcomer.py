@@ -1,7 +1,6 @@
 """A newcomer who types what a page shows, with a home in which nothing is yet."""
 
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -78,7 +77,13 @@ class Terminal:
 
 
 class Newcomer:
-    """Types block after block; leaving ends every terminal that was opened."""
+    """Types block after block; leaving ends every terminal that was opened.
+
+    `stand_ins` are what is typed here in the place of what a page names and only a real robot has.
+    """
+
+    def __init__(self, stand_ins: Mapping[str, str]) -> None:
+        self._stand_ins = stand_ins
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -95,10 +100,20 @@ class Newcomer:
     def type(self, block: Block) -> None:
         """Do what a block shows, and compare what comes of it."""
         if block.file is not None:
-            (self.home / block.file).write_text(self._here(block.text), encoding="utf-8")
+            file = self.home / block.file.removeprefix("~/")
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(self._here(block.text), encoding="utf-8")
         elif block.is_shell and not block.by_hand:
             for command in commands(block):
                 self._run(command, block)
+
+    def start(self, command: Command) -> None:
+        """Let it run in a terminal of its own, until it has said what it is to show."""
+        log = self.home / "bin" / f"terminal-{len(self._terminals)}.log"
+        terminal = Terminal(command, self.home, self._environment, log)
+        self._stack.callback(terminal.end)
+        self._terminals.append(terminal)
+        terminal.wait()
 
     def end(self) -> None:
         """Ctrl-C in every terminal, the newest first: each ends well."""
@@ -109,11 +124,7 @@ class Newcomer:
     def _run(self, command: Command, block: Block) -> None:
         here = Command(self._here(command.typed), command.shown)
         if block.terminal:
-            log = self.home / "bin" / f"terminal-{len(self._terminals)}.log"
-            terminal = Terminal(here, self.home, self._environment, log)
-            self._stack.callback(terminal.end)
-            self._terminals.append(terminal)
-            terminal.wait()
+            self.start(here)
             return
         ran = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", here.typed],
@@ -132,7 +143,9 @@ class Newcomer:
         assert wrong is None, f"{here.typed}\n{wrong}"
 
     def _here(self, text: str) -> str:
-        return text.replace(PORT, str(self._port))
+        for word, stand_in in {PORT: str(self._port), **self._stand_ins}.items():
+            text = text.replace(word, stand_in)
+        return text
 
     def _prepare(self) -> dict[str, str]:
         folder = self.home / "bin"
@@ -150,8 +163,3 @@ def _free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
-
-
-def bring(file: Path, home: Path) -> None:
-    """Something that a page takes for granted, such as a vendor's file."""
-    shutil.copy(file, home)

@@ -13,7 +13,7 @@ from typing import Final, Self
 from ml.store import NoSuchTable, Store, StoreError, reading, upkeep
 from ml.store.query import query
 from ml.store.tables import TELEMETRY
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from tests.explore_store import exporting, judging
 from tests.explore_store.damages import NAMES
 from tests.explore_store.disk import Ended
@@ -234,7 +234,7 @@ def _spoil(world: World, s: int, file: int, how: int) -> None:
     """A batch that waits is emptied, cut off, or, where there is one before it, removed."""
     server = world.servers[SERVERS[s]]
     world.end(SERVERS[s], 0, power=False)
-    waiting = spooled.waiting(server.folder)
+    waiting = spool_reader.waiting(server.folder)
     files = [server.folder / f"{number:08}.db" for number in waiting[how == 2 : -1]]
     files = [each for each in files if not each.with_name(f"{each.name}-wal").exists()]
     if not files:

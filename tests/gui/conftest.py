@@ -15,6 +15,14 @@ from PySide6.QtWidgets import QApplication
 from server_gui.core.desk.desk import Desk
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
+from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
+    archive,
+    full_window,
+    posted,
+    settings,
+    shown,
+    whole,
+)
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import described
 

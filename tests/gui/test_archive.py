@@ -1,187 +1,31 @@
-"""Recordings and cloud in the window: listed, played apart from what is live, labelled, uploaded."""
+"""Recordings in the window: listed, played apart from what is live, labelled, exported."""
 
-import dataclasses
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import pytest
-from PySide6.QtCore import QPoint, QSettings, Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QApplication,
     QComboBox,
     QLineEdit,
     QPushButton,
-    QTabWidget,
-    QTreeWidgetItem,
     QWidget,
 )
 
 from gateway.wire.stop import Stopped
-from ml.store import Store, StoreError
-from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive
-from server_gui.core.cloud.jobs import Job, JobState
-from server_gui.core.desk.recording import By, Recording
-from server_gui.core.fleet.live_prediction import record as record_of
+from server_gui.core.cloud.jobs import JobState
 from server_gui.core.recording.recorder import Recorder
-from server_gui.core.recording.records import Facts
-from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.upload import send
-from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.cloud.panel import Cloud
 from server_gui.views.main_window import MainWindow
-from server_gui.views.recordings.panel import Recordings
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
-from tests.gui.fakes import Bench, destroy
-from tests.gui.foreseen import predicted
-from tests.gui.running import wait
-from tests.gui.test_recording import FakeKeeper, report
+from tests.gui.archives import RATE_HZ, SECONDS, Shown, cell, play, record
+from tests.gui.fakes import Bench
 from tests.support.desk import walking
 from tests.support.journals import RobotsJournal
-
-SECONDS = 12
-RATE_HZ = 50
-
-
-def record(settings: ServerSettings, *, sent: bool = True) -> str:
-    """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker."""
-    walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
-    with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
-        with Recorder(spool) as recorder:
-            units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}
-            session = recorder.begin("exo-01", Facts(units=units, operator="Ada", notes="new insoles"))
-            recorder.record("exo-01", 1, walk, 0)
-            recorder.add(
-                *(foretold(session, at_ns) for at_ns in walk.stamps_ns[: len(walk.stamps_ns) // 2 : 5])
-            )
-            recorder.mark("exo-01", "stairs")
-        for number in spool.waiting() if sent else ():
-            send(spool, number, Store(settings.store.url))
-    return session
-
-
-def foretold(session: str, stamp_ns: int) -> Record:
-    """That a model said then that somebody walks."""
-    utc_ns = stamp_ns + time.time_ns() - time.monotonic_ns()
-    told = predicted("walk", {"walk": 0.94})
-    prediction = dataclasses.replace(told.prediction, stamp_ns=stamp_ns)
-    return record_of(session, dataclasses.replace(told, prediction=prediction, utc_ns=utc_ns))
-
-
-@pytest.fixture
-def settings(tmp_path: Path, folder_url: str) -> ServerSettings:
-    return ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path / "spool"))
-
-
-@pytest.fixture
-def posted() -> list[Callable[[], None]]:
-    """What threads have posted to the window's."""
-    return []
-
-
-@pytest.fixture
-def archive(settings: ServerSettings, bench: Bench, posted: list[Callable[[], None]]) -> Iterator[Archive]:
-    made = Archive(settings, bench.desk, posted.append)
-    yield made
-    assert made.close(30.0)
-
-
-@pytest.fixture
-def window(
-    qt: QApplication, theme: Theme, bench: Bench, archive: Archive, tmp_path: Path
-) -> Iterator[MainWindow]:
-    """The window with recordings and cloud."""
-    kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
-    made = MainWindow(bench.desk, theme, kept, archive)
-    made.resize(1480, 900)
-    made.show()
-    yield made
-    destroy(made)
-
-
-class Tabs(QTabWidget):
-    """The two tabs without the rest of the window, which takes its time to be made."""
-
-    def __init__(self, archive: Archive, bench: Bench, theme: Theme) -> None:
-        super().__init__()
-        self.recordings = Recordings(archive, bench.desk.recording, theme)
-        self.cloud = Cloud(archive, bench.desk.recording, theme)
-        self.tabs = self
-        self.addTab(self.recordings, "Recordings")
-        self.addTab(self.cloud, "Cloud")
-        self.resize(900, 700)
-
-    def refresh(self) -> None:
-        view = self.currentWidget()
-        if isinstance(view, Recordings | Cloud):
-            view.refresh()
-
-
-class Shown:
-    """The window, or its two tabs, drawn with whatever threads have posted."""
-
-    def __init__(self, window: MainWindow | Tabs, posted: list[Callable[[], None]]) -> None:
-        self.window = window
-        self._posted = posted
-
-    def draw(self) -> None:
-        while self._posted:
-            self._posted.pop(0)()
-        for _ in range(7):
-            self.window.refresh()
-        QApplication.processEvents()
-
-    def until(self, so: Callable[[], object], what: str) -> None:
-        def drawn() -> bool:
-            self.draw()
-            return bool(so())
-
-        wait(drawn, what)
-
-    def open(self, tab: str) -> None:
-        tabs = self.window.tabs
-        tabs.setCurrentIndex(
-            next(place for place in range(tabs.count()) if tabs.tabText(place).replace("&", "") == tab)
-        )
-        self.draw()
-
-
-@pytest.fixture
-def whole(window: MainWindow, posted: list[Callable[[], None]]) -> Shown:
-    return Shown(window, posted)
-
-
-@pytest.fixture
-def shown(
-    qt: QApplication, theme: Theme, bench: Bench, archive: Archive, posted: list[Callable[[], None]]
-) -> Iterator[Shown]:
-    tabs = Tabs(archive, bench, theme)
-    tabs.show()
-    yield Shown(tabs, posted)
-    destroy(tabs)
-
-
-def cell(shown: Shown, column: int) -> str:
-    """What stands in the row of the newest job."""
-    item = shown.window.cloud.jobs.item(0, column)
-    return "" if item is None else item.text()
-
-
-def play(shown: Shown, archive: Archive) -> None:
-    """Open the newest recording and play it."""
-    shown.open("Recordings")
-    page = shown.window.recordings.list
-    shown.until(lambda: page.sessions.rowCount(), "listed it")
-    page.table.selectRow(0)
-    shown.until(lambda: archive.tape, "looked into it")
-    page.play.click()
-    shown.until(lambda: not archive.playback.is_loading, "showed it")
 
 
 def test_recordings_of_store_and_spool_are_listed_with_what_is_in_them(
@@ -215,22 +59,24 @@ def test_nothing_recorded_yet_says_what_to_do(shown: Shown, archive: Archive) ->
 
 
 def test_recordings_can_be_looked_at_without_a_robot(
-    whole: Shown, window: MainWindow, bench: Bench, settings: ServerSettings, archive: Archive
+    whole: Shown, full_window: MainWindow, bench: Bench, settings: ServerSettings, archive: Archive
 ) -> None:
     record(settings)
     bench.desk.select(None)
     whole.draw()
-    assert window.empty.isVisible()
-    next(button for button in window.empty.findChildren(QPushButton) if "recordings" in button.text()).click()
-    page = window.recordings.list
+    assert full_window.empty.isVisible()
+    next(
+        button for button in full_window.empty.findChildren(QPushButton) if "recordings" in button.text()
+    ).click()
+    page = full_window.recordings.list
     whole.until(lambda: page.sessions.rowCount(), "listed it")
     assert page.isVisible()
     whole.open("Overview")
-    assert window.empty.isVisible()
+    assert full_window.empty.isVisible()
 
 
 def test_playback_is_marked_and_never_mixed_with_what_is_live(
-    whole: Shown, window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
+    whole: Shown, full_window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:
     record(settings)
     bench.station.take([walking(50)])
@@ -238,7 +84,7 @@ def test_playback_is_marked_and_never_mixed_with_what_is_live(
     play(whole, archive)
     tape = archive.playback.tape
     assert tape is not None
-    player = window.recordings.player
+    player = full_window.recordings.player
     archive.playback.seek(tape.first_ns + 5 * 10**9)
     whole.until(lambda: not archive.playback.is_loading, "jumped")
     whole.until(lambda: "PLAYBACK, not live: exo-01" in player.banner.text(), "said what it is")
@@ -246,7 +92,7 @@ def test_playback_is_marked_and_never_mixed_with_what_is_live(
     assert bench.station.robot.values == live
     played = archive.playback.desk.stations[0]
     assert played.robot.values["left_knee.position"] != live["left_knee.position"]
-    QTest.mousePress(window.header.stop, Qt.MouseButton.LeftButton)
+    QTest.mousePress(full_window.header.stop, Qt.MouseButton.LeftButton)
     assert bench.first.named("stop") == [], "the app does that"
     bench.station.stop("test")
     bench.first.answer(Stopped({"left_knee": "confirmed"}, True))
@@ -255,11 +101,11 @@ def test_playback_is_marked_and_never_mixed_with_what_is_live(
 
 
 def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
-    whole: Shown, window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
+    whole: Shown, full_window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:
     record(settings)
     play(whole, archive)
-    tape, player = archive.playback.tape, window.recordings.player
+    tape, player = archive.playback.tape, full_window.recordings.player
     assert tape is not None
     archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
     whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk  0.94"), "showed it")
@@ -272,7 +118,7 @@ def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
 
 
 def test_the_audit_shows_the_journal_of_a_robot_that_is_away(
-    whole: Shown, window: MainWindow, settings: ServerSettings, tmp_path: Path
+    whole: Shown, full_window: MainWindow, settings: ServerSettings, tmp_path: Path
 ) -> None:
     (tmp_path / "robot").mkdir()
     journal = RobotsJournal(tmp_path / "robot")
@@ -281,8 +127,8 @@ def test_the_audit_shows_the_journal_of_a_robot_that_is_away(
         recorder.journal("exo-07", journal.told().journal.entries)
     journal.close()
     whole.open("Audit")
-    whole.until(lambda: window.audit.chosen.rowCount() == 1, "showed it")
-    assert "exo-07: collected were 1 entry" in window.audit.verdict.text()
+    whole.until(lambda: full_window.audit.chosen.rowCount() == 1, "showed it")
+    assert "exo-07: collected were 1 entry" in full_window.audit.verdict.text()
 
 
 def test_the_bar_of_time_is_used_by_keys_and_by_mouse(
@@ -360,105 +206,6 @@ def test_the_chosen_span_is_exported_in_the_background(
     assert cell(shown, 2).endswith("walk.csv: 100 rows")
 
 
-def test_the_store_is_shown_with_where_its_keys_come_from_and_never_the_keys(
-    shown: Shown, archive: Archive, settings: ServerSettings
-) -> None:
-    record(settings)
-    shown.open("Cloud")
-    cloud = shown.window.cloud
-    shown.until(lambda: "Reached" in cloud.state.text(), "reached it")
-    assert cloud._facts["URL"].text() == settings.store.url
-    assert cloud._facts["Keys"].text() == "none needed: it is a folder"
-    tops = below(cloud.browser.invisibleRootItem())
-    assert [top.text(0) for top in tops] == ["telemetry", "sessions", "events", "predictions"]
-    tops[0].setExpanded(True)
-    robot = below(tops[0])[0]
-    assert robot.text(0) == "exo-01"
-    robot.setExpanded(True)
-    shown.until(lambda: below(robot)[0].text(0).endswith(".parquet"), "listed its files")
-
-
-def below(item: QTreeWidgetItem) -> list[QTreeWidgetItem]:
-    found = [item.child(row) for row in range(item.childCount())]
-    return [child for child in found if child is not None]
-
-
-def test_a_store_that_is_away_says_so_and_is_tried_again(
-    shown: Shown, archive: Archive, settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(library, "AGAIN_S", 0.0)
-    existing = Store.existing
-    away = [True]
-
-    def reach(url: str | None = None) -> Store:
-        if away[0]:
-            raise StoreError("s3://lab cannot be reached: Connection refused")
-        return existing(url)
-
-    monkeypatch.setattr(Store, "existing", reach)
-    record(settings)
-    shown.open("Cloud")
-    shown.until(lambda: "Connection refused" in shown.window.cloud.state.text(), "said so")
-    shown.open("Recordings")
-    assert "it is tried again" in shown.window.recordings.list.said.text()
-    away[0] = False
-    shown.until(lambda: shown.window.recordings.list.sessions.rowCount(), "came back")
-    shown.open("Cloud")
-    assert "Reached" in shown.window.cloud.state.text()
-
-
-def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
-    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
-) -> None:
-    record(settings, sent=False)
-    shown.open("Cloud")
-    cloud = shown.window.cloud
-    cloud.upload.click()
-    job = archive.jobs.jobs[0]
-    shown.until(lambda: job.is_over, "uploaded it")
-    assert "nothing waits" in job.said
-    shown.until(lambda: any("nothing waits" in item.text for item in bench.desk.news.items), "told it")
-    keeper = FakeKeeper(report(problem="the store cannot be reached", waiting=2))
-    cloud._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
-    cloud._recording.look()
-    shown.draw()
-    assert "2 batches wait" in cloud.waiting.text()
-    assert "It is tried again by itself: the store cannot be reached" in cloud.waiting.text()
-    cloud.upload.click()
-    assert keeper.asked == ["upload"]
-
-
-def test_a_job_shows_how_far_it_is_and_can_be_cancelled(shown: Shown, archive: Archive) -> None:
-    def long(job: Job) -> str:
-        job.expect(10, "files")
-        job.done = 4
-        while True:
-            job.check()
-            time.sleep(0.001)
-
-    job = archive.jobs.add("Verify", long)
-    shown.open("Cloud")
-    table = shown.window.cloud.jobs
-    shown.until(lambda: cell(shown, 2) == "4 of 10 files", "showed how far it is")
-    cancel = table.cellWidget(0, 3)
-    assert isinstance(cancel, QPushButton)
-    cancel.click()
-    shown.until(lambda: job.state is JobState.CANCELLED, "cancelled it")
-    shown.until(lambda: table.cellWidget(0, 3) is None, "took the button away")
-
-
-def test_a_store_is_downloaded_and_verified(
-    shown: Shown, archive: Archive, settings: ServerSettings, tmp_path: Path
-) -> None:
-    record(settings)
-    shown.open("Cloud")
-    shown.window.cloud.download_to(tmp_path / "copy", ())
-    shown.window.cloud._verify(deep=True)
-    shown.until(lambda: all(job.is_over for job in archive.jobs.jobs), "did both")
-    assert [job.state for job in archive.jobs.jobs] == [JobState.DONE, JobState.DONE]
-    assert Store((tmp_path / "copy").as_uri()).dataset("sessions").count_rows() > 0
-
-
 def test_everything_that_can_be_reached_has_a_name(
     shown: Shown, archive: Archive, settings: ServerSettings
 ) -> None:
@@ -477,19 +224,21 @@ def test_everything_that_can_be_reached_has_a_name(
 
 
 def test_the_controls_of_the_player_stay_in_sight_at_every_size(
-    whole: Shown, window: MainWindow, archive: Archive, settings: ServerSettings, theme: Theme
+    whole: Shown, full_window: MainWindow, archive: Archive, settings: ServerSettings, theme: Theme
 ) -> None:
     record(settings)
     play(whole, archive)
-    player = window.recordings.player
+    player = full_window.recordings.player
     for width, height, scale in ((1366, 768, 1.0), (1920, 1080, 2.0)):
         if scale != theme.scale:
             theme.set(Look.LIGHT, scale)
-        window.resize(width, height)
+        full_window.resize(width, height)
         whole.draw()
-        assert (window.width(), window.height()) == (width, height)
+        assert (full_window.width(), full_window.height()) == (width, height)
         for control in (player.timeline, player.play, player.labels.give):
-            assert window.tabs.rect().contains(control.mapTo(window.tabs, control.rect().bottomLeft()))
+            assert full_window.tabs.rect().contains(
+                control.mapTo(full_window.tabs, control.rect().bottomLeft())
+            )
 
 
 def test_both_tabs_are_drawn_dark_and_light(

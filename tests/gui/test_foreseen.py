@@ -49,7 +49,7 @@ def shown(window: MainWindow, so: Callable[[], bool]) -> None:
 def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     window: MainWindow, station: Station
 ) -> None:
-    station.foresee(predicted("walk", WALKS))
+    station.take_prediction(predicted("walk", WALKS))
     shown(window, lambda: chip(window) == "Walk  0.94\npredicted · next turn 0.04")
     model = "activity-3fa2c1, 3 days old, simulated model"
     said = f"Does: Walk  0.94 · next turn 0.04 · {model}"
@@ -59,7 +59,7 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
     quality = Quality(312, 292, 1, 19, {})
-    station.foresee(dataclasses.replace(predicted("walk", WALKS), quality=quality))
+    station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
     told = "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled"
     assert next(lines(station)).detail.endswith(f"simulated model · last 7 days: {told}")
 
@@ -74,19 +74,19 @@ def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> N
 def test_a_model_that_does_not_know_says_so(
     window: MainWindow, station: Station, label: str, novelty: float, said: str
 ) -> None:
-    station.foresee(predicted(label, {"walk": 0.41, "stand": 0.4}, novelty=novelty))
+    station.take_prediction(predicted(label, {"walk": 0.41, "stand": 0.4}, novelty=novelty))
     shown(window, lambda: chip(window) == said)
     assert window.overview._ring._word == label.capitalize()
     assert "p 0" not in window.overview._ring._below, "that is another class's"
 
 
 def test_a_fall_stands_before_all_else(station: Station) -> None:
-    station.foresee(predicted("walk", WALKS))
-    station.foresee(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
+    station.take_prediction(predicted("walk", WALKS))
+    station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
     line = status(station)
     assert line is not None
     assert line.text == "Walk  0.94"
-    station.foresee(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
+    station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None
     assert (line.mark.shape, line.mark.colour, line.text) == ("square", "bad", "Fall  0.97")
@@ -94,14 +94,14 @@ def test_a_fall_stands_before_all_else(station: Station) -> None:
 
 def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station) -> None:
     drifted = Trust(600, 0.0, 0.0, 0.5, {"left_hip.position": 0.4})
-    station.foresee(predicted("walk", WALKS, trust=drifted, source=Source.RECORDED))
+    station.take_prediction(predicted("walk", WALKS, trust=drifted, source=Source.RECORDED))
     line = status(station)
     assert line is not None
     assert "DRIFTED: left_hip.position" in line.detail
 
 
 def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, station: Station) -> None:
-    station.foresee(predicted("walk", WALKS))
+    station.take_prediction(predicted("walk", WALKS))
     newest = station.predictions.by_task["activity"]
     station.predictions.by_task["activity"] = dataclasses.replace(
         newest, came_ns=time.monotonic_ns() - 5 * 10**9
@@ -114,7 +114,9 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, statio
 def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(
     window: MainWindow, station: Station
 ) -> None:
-    station.foresee(Serves("exo-01", {}, {"activity": "no model serves activity: gwrms models promote ID"}))
+    station.take_prediction(
+        Serves("exo-01", {}, {"activity": "no model serves activity: gwrms models promote ID"})
+    )
     shown(
         window,
         lambda: chip(window).endswith("not predicted: no model serves activity: gwrms models promote ID"),
@@ -125,7 +127,9 @@ def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(
 
 
 def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, station: Station) -> None:
-    station.foresee(predicted("stride", {"stride": 0.9}, "gait_phase", values={"left": 0.25, "right": 0.75}))
+    station.take_prediction(
+        predicted("stride", {"stride": 0.9}, "gait_phase", values={"left": 0.25, "right": 0.75})
+    )
     phases = model_phases(station)
     assert [(phase.percent, phase.phase) for phase in phases.values() if phase] == [
         (25.0, "mid-stance"),
@@ -137,15 +141,17 @@ def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, s
     shown(
         window, lambda: window.overview.status_lines.texts[0].startswith("Stride: L 25 % · R 75 %  0.90 · ")
     )
-    station.foresee(predicted("unknown", {"stride": 0.2}, "gait_phase", values={"left": 0.25, "right": 0.75}))
+    station.take_prediction(
+        predicted("unknown", {"stride": 0.2}, "gait_phase", values={"left": 0.25, "right": 0.75})
+    )
     assert model_phases(station) == dict.fromkeys(Leg)
 
 
 def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow, station: Station) -> None:
     fall = predicted("fall", {"fall": 0.97, "steady": 0.03}, "falling")
     rule = RuleSettings("falling", "fall", 0.9, action=Action.ALARM)
-    station.foresee(fall)
-    station.foresee(Ruled("exo-01", rule, began=True, cause=fall))
+    station.take_prediction(fall)
+    station.take_prediction(Ruled("exo-01", rule, began=True, cause=fall))
     station.take([looked(state="fault", problem="i²t at 83 %")])
     shown(window, lambda: len(window.overview.status_lines.texts) == 3)
     texts = window.overview.status_lines.texts
@@ -158,7 +164,7 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow,
 
 
 def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: MainWindow, station: Station) -> None:
-    station.foresee(predicted("walk", WALKS))
+    station.take_prediction(predicted("walk", WALKS))
     station.take([LinkChanged(ConnectionState.WAITING, "no route", 0)])
     assert status(station) is None
     shown(window, lambda: not any("Walk" in text for text in window.overview.status_lines.texts))

@@ -15,18 +15,9 @@ from PySide6.QtGui import QImage
 from gateway.wire.resource import ProcessUse
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
+from tests.gui.archives import Shown, play, record
 from tests.gui.fakes import Bench, stop_is_whole
 from tests.gui.foreseen import predicted
-from tests.gui.test_archive import (  # noqa: F401  # fixtures
-    Shown,
-    archive,
-    play,
-    posted,
-    record,
-    settings,
-    whole,
-    window,
-)
 from tests.support.desk import looked, resources, walking
 
 FOLDER = Path(__file__).parents[2] / "build" / "screenshots"
@@ -65,8 +56,8 @@ def busy(bench: Bench) -> None:
 def live(bench: Bench) -> None:
     """What a robot that walks has just told, and which is not stale before it has been drawn."""
     bench.station.take([walking(1000, -60.0)])
-    bench.station.foresee(predicted("walk", {"walk": 0.94, "turn": 0.04, "stand": 0.02}))
-    bench.station.foresee(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
+    bench.station.take_prediction(predicted("walk", {"walk": 0.94, "turn": 0.04, "stand": 0.02}))
+    bench.station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
 
 
 def colours(image: QImage) -> set[int]:
@@ -98,7 +89,7 @@ def test_every_tab_is_whole_on_every_screen(
     screens: tuple[tuple[str, int, int], ...],
 ) -> None:
     page: Shown = request.getfixturevalue("whole")
-    full: MainWindow = request.getfixturevalue("window")
+    full: MainWindow = request.getfixturevalue("full_window")
     busy(bench)
     record(request.getfixturevalue("settings"))
     play(page, request.getfixturevalue("archive"))

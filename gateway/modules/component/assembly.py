@@ -20,7 +20,7 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.settings import JointSettings
 from drivers.site import Site
 from gateway.config.robot import RobotConfig
-from gateway.process.lean import standing_in, without
+from gateway.process.light_imports import standing_in, without
 
 T = TypeVar("T")
 

@@ -7,7 +7,7 @@ from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Number, scaled
 from gateway.config.objects import STORE
 from gateway.config.robot import ParameterSettings, RobotConfig
-from gateway.modules.control.offer import offered
+from gateway.modules.control.eds_parameters import offered
 from gateway.modules.control.parameters import Parameter, contradiction
 from gateway.streaming.sources import Wanted, check_globs
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from drivers.errors import DriverError, NotPermitted
 from gateway.modules.control.ledger import WriteLedger
 from gateway.modules.control.objects import Change, device_error, download, read
+from gateway.modules.control.reverting import AS_IT_SHOULD_BE, TAKEN_BACK, Attempt
 from gateway.modules.control.rules import Rules, allowed_states
-from gateway.modules.control.taking_back import AS_IT_SHOULD_BE, TAKEN_BACK, Attempt
 from gateway.modules.stop.authority import Address, Permit
 from gateway.wire.framing import Kind, RpcError, internal_error, refuse
 from gateway.wire.parameter import PARAMETER_WRITE

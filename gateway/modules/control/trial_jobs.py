@@ -11,8 +11,8 @@ import msgspec
 
 from drivers.errors import DriverError
 from gateway.modules.control.objects import result
+from gateway.modules.control.reverting import CLAIMED, Attempt, TakenBack
 from gateway.modules.control.rules import OutOfReach, Rules
-from gateway.modules.control.taking_back import CLAIMED, Attempt, TakenBack
 from gateway.modules.control.writer import Turn, Writer
 from gateway.modules.stop.authority import Authority
 from gateway.process.futures import outcome

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from gateway.modules.control.taking_back import TakenBack
+from gateway.modules.control.reverting import TakenBack
 from gateway.modules.control.trial_jobs import TrialJobs
 from gateway.modules.control.writer import Turn, Writer
 from gateway.process.futures import back, done, outcome, then

@@ -5,9 +5,9 @@ from concurrent.futures import Future
 from typing import Any, Protocol
 
 from drivers.joint.cia402 import DriveState, drive_state
-from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
+from drivers.joint.transitions import Led
 from drivers.latest import Latest
 from drivers.samples import Channel
 from gateway.process.futures import failed

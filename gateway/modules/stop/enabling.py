@@ -9,8 +9,8 @@ from concurrent.futures import Future
 
 from drivers.joint.cia402 import MODES, DriveState, option_text
 from drivers.joint.commands import WAY_UP
-from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
+from drivers.joint.transitions import Led
 from gateway.modules.stop.drive import Drive, quick_stop
 from gateway.modules.stop.reset import as_led, state_words
 from gateway.process.futures import back, done, failed, gather, then

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from drivers.joint.cia402 import DriveState
-from drivers.joint.leading import OVERTAKEN, Led
+from drivers.joint.transitions import OVERTAKEN, Led
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.machine import Finding

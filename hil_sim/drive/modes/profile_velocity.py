@@ -11,7 +11,7 @@ from hil_sim.node.dictionary import Key
 
 
 def within_limits(servo: Servo, wanted: float) -> float:
-    """The velocity (rad/s) that neither exceeds the limits nor runs over the end of the software range."""
+    """Return a velocity (rad/s) within the limits that does not run over the end of the software range."""
     settings = servo.settings
     left = settings.high_limit - servo.position if wanted > 0.0 else servo.position - settings.low_limit
     most = min(settings.max_velocity, math.sqrt(2.0 * settings.deceleration * max(left, 0.0)))

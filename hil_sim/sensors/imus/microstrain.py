@@ -17,7 +17,7 @@ VALID = 1
 
 
 def packet(descriptor_set: int, fields: dict[int, bytes]) -> bytes:
-    """Its checksum (Fletcher): the sum of all bytes, and the sum of those sums."""
+    """Return a packet with its checksum (Fletcher): the sum of all bytes, and the sum of those sums."""
     body = b"".join(bytes([2 + len(data), descriptor]) + data for descriptor, data in fields.items())
     whole = bytes([0x75, 0x65, descriptor_set, len(body)]) + body
     sums = list(itertools.accumulate(whole))

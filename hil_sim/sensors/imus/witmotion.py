@@ -24,7 +24,7 @@ SCALES = {  # counts a unit
 
 
 def vectors(motion: Motion) -> dict[int, list[int]]:
-    """The frames that the serial and the CAN variant share: type and three words."""
+    """Return the frames that the serial and the CAN variant share: type and three words."""
     measured = {ACCELERATION: motion.acceleration, ANGULAR_RATE: motion.rate, ANGLE: motion.angles}
     return {kind: [_word(part * SCALES[kind]) for part in vector] for kind, vector in measured.items()}
 

@@ -15,7 +15,7 @@ _TICK_NS = 100_000
 
 
 def message(kind: int, payload: bytes) -> bytes:
-    """One message; all bytes behind FAh add up to 0 modulo 256."""
+    """Return one message; all bytes behind FAh add up to 0 modulo 256."""
     body = bytes([0xFF, kind, len(payload)]) + payload
     return b"\xfa" + body + bytes([-sum(body) & 0xFF])
 

@@ -54,7 +54,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def frame(flags: int, sequence: int, time_us: int, cells: Sequence[int], adc_bits: int = ADC_BITS) -> bytes:
-    """One frame as it goes over the line."""
+    """Return one frame as it goes over the line."""
     head = struct.pack(
         "<BBHIBB", FRAME_TYPE, flags, sequence & 0xFFFF, time_us & 0xFFFF_FFFF, len(cells), adc_bits
     )

@@ -8,7 +8,7 @@ from server_gui.core.archive.collected_journals import KeptJournals
 from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.archive.library import Library
 from server_gui.core.archive.playback import Playback
-from server_gui.core.archive.recall import said
+from server_gui.core.archive.recorded_predictions import said
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Desk

@@ -19,7 +19,7 @@ from ml.store.errors import translated
 from ml.store.tables import JOURNAL
 from server_gui.core.audit import chains
 from server_gui.core.audit.chains import Entry
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
@@ -94,10 +94,10 @@ class KeptJournals:
 
 
 def look(settings: ServerSettings) -> Found:
-    """What store and spool have now; blocks."""
+    """Return what store and spool have now; blocks."""
     entries: dict[str, list[Entry]] = {}
     try:
-        waiting = spooled.rows(settings.recorder.spool, JOURNAL)
+        waiting = spool_reader.rows(settings.recorder.spool, JOURNAL)
     except RecordingError:
         waiting = []
     try:

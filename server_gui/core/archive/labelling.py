@@ -62,12 +62,12 @@ class Labelling:
         self._spool = settings.recorder.spool
 
     def session(self, name: str, robot: str | None = None) -> Session:
-        """The session whose name is this, or alone begins so, uploaded or not; raises `NoSuchSession`."""
+        """Find the session that alone is called or begins so, uploaded or not; raises `NoSuchSession`."""
         known = self._recordings()
         return known.counted(known.find(name, robot))
 
     def ls(self, session: Session) -> list[Label]:
-        """The labels of a session that hold, in time's order."""
+        """Return the labels of a session that hold, in time's order."""
         return list(map(Label.of, self._recordings().labels(session)))
 
     def add(

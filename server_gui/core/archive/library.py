@@ -11,7 +11,7 @@ import msgspec
 from ml.store import NoSuchTable, Store, StoreError
 from ml.store.objects import Object
 from ml.store.sessions import UNTOLD, Session, in_order, sessions
-from server_gui.core.cloud import spooled, usage
+from server_gui.core.cloud import spool_reader, usage
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.settings.server_file import ServerSettings
@@ -65,12 +65,12 @@ class Library:
         when_done(self.reading.do(lambda: look(settings)), self._deliver, self._looked, self._failed)
 
     def session(self, robot: str, name: str) -> Session | None:
-        """The session of this name, as the newest look has found it."""
+        """Return the session of this name, as the newest look has found it."""
         named = (each for each in self.found.sessions if (each.robot, each.session) == (robot, name))
         return next(named, None)
 
     def files(self, folder: str) -> "Future[list[Object]]":
-        """Every object of the store below a folder."""
+        """Return every object of the store below a folder."""
         url = self.settings.store.url
         return self.reading.do(lambda: usage.below(Store.existing(url), folder))
 
@@ -89,7 +89,7 @@ class Library:
 
 
 def look(settings: ServerSettings) -> Found:
-    """What there is now; blocks."""
+    """Return what there is now; blocks."""
     waiting = _waiting(settings)
     try:
         store = Store.existing(settings.store.url)
@@ -105,7 +105,7 @@ def look(settings: ServerSettings) -> Found:
 
 def _waiting(settings: ServerSettings) -> list[Session]:
     try:
-        return spooled.sessions(settings.recorder.spool)
+        return spool_reader.sessions(settings.recorder.spool)
     except RecordingError:
         return []
 

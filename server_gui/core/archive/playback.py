@@ -15,7 +15,7 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
-from server_gui.core.archive.recall import Said
+from server_gui.core.archive.recorded_predictions import Said
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
 from server_gui.core.desk.station import Station
@@ -80,7 +80,7 @@ class Piece:
     said: Sequence[Said]
 
     def between(self, begin_ns: int, end_ns: int) -> "Piece":
-        """What is from `begin_ns` up to before `end_ns`."""
+        """Return what is from `begin_ns` up to before `end_ns`."""
         first, last = (bisect_left(self.said, at, key=lambda one: one.utc_ns) for at in (begin_ns, end_ns))
         return Piece(self.rows.between(begin_ns, end_ns), self.said[first:last])
 

@@ -28,7 +28,7 @@ def chained(entries: Iterable[Entry]) -> list[list[Entry]]:
 
 
 def journals(stretches: Iterable[list[Entry]]) -> list[list[Entry]]:
-    """The same by journal: one that was begun anew on its robot counts from one again."""
+    """Return the same by journal: one that was begun anew on its robot counts from one again."""
     found: list[list[Entry]] = []
     for stretch in stretches:
         if found and found[-1][-1]["n"] < stretch[0]["n"]:
@@ -39,7 +39,7 @@ def journals(stretches: Iterable[list[Entry]]) -> list[list[Entry]]:
 
 
 def problem(stretches: Sequence[Sequence[Entry]]) -> str | None:
-    """Where a journal was altered, in words; None where nothing shows that it was."""
+    """Return where a journal was altered, in words; None where nothing shows that it was."""
     for stretch in stretches:
         previous = None
         for entry in stretch:
@@ -52,7 +52,7 @@ def problem(stretches: Sequence[Sequence[Entry]]) -> str | None:
 
 
 def fork(stretches: Sequence[Sequence[Entry]]) -> str | None:
-    """Where two entries claim one place, in words.
+    """Return where two entries claim one place, in words.
 
     Two entries cannot follow the same one; only a journal that was begun anew has another first one.
     """

@@ -46,7 +46,7 @@ class Audit:
         self.revision += 1
 
     def unbroken(self) -> Iterator[Entry]:
-        """The newest entries that follow each other without a hole."""
+        """Yield the newest entries that follow each other without a hole."""
         entries = list(self.entries)
         first = len(entries) - 1
         while first > 0 and entries[first - 1]["n"] == entries[first]["n"] - 1:

@@ -1,4 +1,4 @@
-"""What the window lets do with recordings: exported, uploaded, copied to another place, verified."""
+"""What the window can do with recordings: export, upload, copy to another place, verify."""
 
 import contextlib
 import dataclasses
@@ -14,7 +14,7 @@ from gateway.cli.text import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
 from ml.store.store import checked_url
-from server_gui.core.cloud import emptying, parts, transfer, verify
+from server_gui.core.cloud import partial_copy, spool_upload, transfer, verify
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recordings
@@ -33,7 +33,7 @@ PROBLEMS_TOLD: Final = 3
 
 
 def export(settings: ServerSettings, session: Session, choice: Choice, kind: str, file: Path) -> Work:
-    """A session, or a part of it, as one of `FORMATS`; there whole or not at all."""
+    """Export a session, or a part of it, as one of `FORMATS`: whole or not at all."""
 
     def work(job: Job) -> str:
         known = Recordings(settings.store.url, settings.recorder.spool)
@@ -49,12 +49,12 @@ def export(settings: ServerSettings, session: Session, choice: Choice, kind: str
 
 
 def upload(settings: ServerSettings) -> Work:
-    """What waits in a spool that nobody records into, to the store."""
+    """Upload what waits in a spool that nobody records into."""
 
     def work(job: Job) -> str:
         url = checked_url(settings.store.url)
         there = functools.partial(connect, settings.store)
-        done = emptying.empty(settings.recorder.spool, url, there, _steps(job, "batches"))
+        done = spool_upload.empty(settings.recorder.spool, url, there, _steps(job, "batches"))
         if done.waits:
             raise StoreError("; ".join((*done.waits, *done.problems)))
         if done.problems:
@@ -65,13 +65,13 @@ def upload(settings: ServerSettings) -> Work:
 
 
 def download(url: str, folder: Path, wanted: Sequence[Session] = ()) -> Work:
-    """A store into a folder, which is a store then: whole with its versions, or these sessions of it."""
+    """Copy a store into a folder: whole with its versions, or these sessions of it."""
 
     def work(job: Job) -> str:
         source, target = Store.existing(url), folder.absolute().as_uri()
         if wanted:
             job.expect(sum(session.rows for session in wanted), "rows")
-            rows = parts.copy(source, Store(target), wanted, (), job.advance)
+            rows = partial_copy.copy(source, Store(target), wanted, (), job.advance)
             return f"{folder}: {len(wanted)} sessions, {rows} rows of telemetry copied and counted"
         to = transfer.open_target(source, target)
         missing = transfer.missing(source.objects, to)
@@ -83,7 +83,7 @@ def download(url: str, folder: Path, wanted: Sequence[Session] = ()) -> Work:
 
 
 def check(settings: ServerSettings, *, deep: bool) -> Work:
-    """Whether every file of the store is there and whole, and every batch that the spool has sent."""
+    """Check that every file of the store is whole, and every batch there that the spool has sent."""
 
     def work(job: Job) -> str:
         store = Store.existing(settings.store.url)

@@ -24,7 +24,7 @@ class Digest:
         self._count = 0
 
     def of(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
-        """The same pieces, counted in."""
+        """Yield the same pieces, counted in."""
         for piece in pieces:
             self._whole.update(piece)
             self._pieces.update(hashlib.md5(piece, usedforsecurity=False).digest())
@@ -38,7 +38,7 @@ class Digest:
 
 
 def proven(objects: Objects, found: Object, digest: Digest, *, ours: bool) -> bool:
-    """Whether the object's content is proven to be what was read or written; False: its size alone is.
+    """Return whether the object's content is proven to be what was read or written; False: its size alone is.
 
     `ours` are tags of what we have written ourselves, which we know to make; what others have written in
     pieces cannot be told by its tag. Where a service that encrypts makes tags of its own, the object is read

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ml.store import damage, sums
+from ml.store import checksums, damage
 from ml.store.errors import StoreError, translated
 from ml.store.fragments import DataFile
 from ml.store.sessions import footer
@@ -78,7 +78,7 @@ class Claim:
         found = self.found
         is_rest = self.rest and self.went
         rows, total = (found.rest_rows, found.rest_sum) if is_rest else (found.rows, found.sum)
-        return rows, sums.told(total)
+        return rows, checksums.told(total)
 
     @property
     def is_open(self) -> bool:
@@ -199,12 +199,12 @@ def _plain(batch: pa.RecordBatch) -> pa.RecordBatch:
 class _Rows:
     """Of some rows, each one's sum, sum of its name, and time; what nobody asks for is None."""
 
-    each: sums.Sums | None
-    names: sums.Sums | None
+    each: checksums.Sums | None
+    names: checksums.Sums | None
     times_us: npt.NDArray[np.int64]
 
     def of(self, claim: Claim, mine: npt.NDArray[np.intp]) -> Count:
-        """Those of them that are the claim's."""
+        """Return those of them that are the claim's."""
         found = Count(len(mine), _total(self.each, mine), _total(self.names, mine))
         if claim.rest is not None:
             left = mine[self.times_us[mine] >= claim.rest.from_us]
@@ -212,7 +212,7 @@ class _Rows:
         return found
 
 
-def _total(each: sums.Sums | None, mine: npt.NDArray[np.intp]) -> int:
+def _total(each: checksums.Sums | None, mine: npt.NDArray[np.intp]) -> int:
     return 0 if each is None else int(each[mine].sum(dtype=np.uint64))
 
 
@@ -230,7 +230,7 @@ class _Streams:
             self._firsts[name] = np.array([_first(claim) for claim in mine], np.int64)
 
     def seen(self, batch: pa.RecordBatch, file: DataFile, values: bool) -> Sequence[_Seen]:
-        """What these rows of a file are of each claim."""
+        """Return what these rows of a file are of each claim."""
         connections, streams, seqs = (
             batch[name].to_numpy(zero_copy_only=False) for name in (*WHOSE, NAMING[0])
         )
@@ -272,16 +272,16 @@ def _told(batch: pa.RecordBatch, same: Mapping[str, str], values: bool) -> _Rows
     return _Rows(each, names, times_us(batch[TIME]))
 
 
-def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> sums.Sums:
+def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> checksums.Sums:
     """Of rows of telemetry, whatever types somebody may have given them."""
     names = [name for name in batch.schema.names if name not in same]
     columns = [batch[name].cast(_OWN.get(name, pa.float64()), safe=False) for name in names]
-    return sums.of_numbers(pa.record_batch(columns, names=names), same)
+    return checksums.of_numbers(pa.record_batch(columns, names=names), same)
 
 
 def _seen(claims: Mapping[Batch, Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
     """What these rows of another table are of each claim."""
-    each = sums.of_rows(pa.Table.from_batches([batch])) if values else None
+    each = checksums.of_rows(pa.Table.from_batches([batch])) if values else None
     rows = _Rows(each, None if values else named(batch, NUMBER), times_us(batch[TIME]))
     found: dict[Batch, list[int]] = defaultdict(list)
     for place, name in enumerate(zip(*(batch[column].to_pylist() for column in ORIGIN), strict=True)):

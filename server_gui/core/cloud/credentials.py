@@ -10,7 +10,7 @@ KEY: Final = "AWS_ACCESS_KEY_ID"
 
 
 def keys_told(url: str, environment: Mapping[str, str] = os.environ) -> str:
-    """Where the keys for this store come from."""
+    """Return where the keys for this store come from."""
     if url.startswith("file://"):
         return "none needed: it is a folder"
     if KEY in environment:
@@ -21,7 +21,7 @@ def keys_told(url: str, environment: Mapping[str, str] = os.environ) -> str:
 
 
 def endpoint_told(url: str, environment: Mapping[str, str] = os.environ) -> str:
-    """Which service is asked."""
+    """Return which service is asked."""
     if url.startswith("file://"):
         return "this computer"
     options = s3_options()

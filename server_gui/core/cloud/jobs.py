@@ -48,12 +48,12 @@ class Job:
     cancelled: threading.Event = field(default_factory=threading.Event)
 
     def expect(self, total: int, unit: str) -> None:
-        """How much there is to do, in rows, files or bytes."""
+        """Set how much there is to do, in rows, files or bytes."""
         self.done, self.total, self.unit = 0, total, unit
         self.check()
 
     def advance(self, count: int) -> None:
-        """So much more is done; raises `Cancelled` where nobody wants the rest."""
+        """Count what is done; raises `Cancelled` where nobody wants the rest."""
         self.done += count
         self.check()
 
@@ -63,7 +63,7 @@ class Job:
             raise Cancelled
 
     def cancel(self) -> None:
-        """It is not wanted any more: it ends at its next step."""
+        """End it at its next step: it is not wanted any more."""
         self.cancelled.set()
 
     @property

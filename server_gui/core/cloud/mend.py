@@ -19,9 +19,9 @@ from ml.store.fragments import DataFile
 from ml.store.private import FILE
 from ml.store.store import Store
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.again import Again, Untouched, Whose, whose
 from server_gui.core.cloud.counting import Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
+from server_gui.core.cloud.repeated_upload import Again, Untouched, Whose, whose
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt, Receipts
 from server_gui.core.recording.segment import Segment
@@ -154,7 +154,7 @@ def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object
 
 
 def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> None:
-    """From now on what is there counts as what was sent; what was said before is kept beside.
+    """Count what is there as what was sent; what was said before is kept beside.
 
     Raises:
         StoreError: something is damaged, so nobody can say what is there.

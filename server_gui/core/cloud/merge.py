@@ -60,7 +60,7 @@ class Merge:
 
     @contextlib.contextmanager
     def new(self) -> Iterator[pa.RecordBatchReader]:
-        """The source's rows that the target does not have."""
+        """Yield the source's rows that the target does not have."""
         with self._opened() as (connection, columns):
             schema = reading.dataset(self._source, self._table, self._robot).schema
             found = connection.sql(_new(_naming(self._table), columns, schema.names))

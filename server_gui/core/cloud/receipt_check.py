@@ -8,7 +8,7 @@ from typing import Final
 
 import msgspec
 
-from ml.store import sums, upkeep
+from ml.store import checksums, upkeep
 from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.fragments import DataFile
 from ml.store.store import Store
@@ -130,7 +130,7 @@ def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
 
 
 def tables(store: Store) -> set[str]:
-    """What the store's tables are called for ever."""
+    """Return what the store's tables are called for ever."""
     found = set()
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
         try:
@@ -196,7 +196,7 @@ def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) 
     return msgspec.structs.replace(
         part,
         rows=claim.found.rows,
-        sum=sums.told(claim.found.sum),
+        sum=checksums.told(claim.found.sum),
         names="",
         marks=(),
         units={name: there[name] for name in told.get(part.table, {}) if name in there},
@@ -208,7 +208,7 @@ def _claim(batch: Batch, part: Part, retained: datetime | None) -> Claim:
         return Claim(batch, part)
     from_us = (retained - _EPOCH) // _US
     if part.end_us is not None and part.end_us < from_us:
-        return Claim(batch, part, is_old=True, rest=Mark(from_us, 0, sums.told(0)))
+        return Claim(batch, part, is_old=True, rest=Mark(from_us, 0, checksums.told(0)))
     rest = next((mark for mark in part.marks if mark.from_us >= from_us), None)
     exact = rest is not None and (rest.from_us == from_us or not (retained - _EPOCH) % _MINUTE)
     return Claim(batch, part, is_old=True, rest=rest, is_all=exact)
@@ -237,7 +237,7 @@ def _problem(claim: Claim, *, values: bool) -> str | None:
 def _is_renamed(claim: Claim) -> bool:
     """Whether there are as many rows as were sent, and others; where values are not looked at."""
     part, found = claim.part, claim.found
-    return bool(part.names) and found.rows == part.rows and sums.told(found.names) != part.names
+    return bool(part.names) and found.rows == part.rows and checksums.told(found.names) != part.names
 
 
 def _time(us: int) -> datetime:

@@ -26,7 +26,7 @@ from ml.store.precedence import recorded_order
 from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.recording import missing_rows
 from server_gui.core.recording.columns import OWN, Columns
 from server_gui.core.recording.errors import SpoolUnusable
@@ -59,7 +59,7 @@ class Recordings:
         self.unread: SpoolUnusable | None = None
         self._url = url
         self._spool = spool
-        self._batches = self._listed(spooled.waiting)
+        self._batches = self._listed(spool_reader.waiting)
         self._writers: dict[int, str] = {}  # of the batches
         self._store: Snapshot | None = None
         self._reach()
@@ -71,18 +71,18 @@ class Recordings:
             if not self.sessions():
                 raise (self.unread or error) from None
         except (StoreRefused, StoreUnreachable) as error:
-            self._batches = self._listed(spooled.kept)
+            self._batches = self._listed(spool_reader.kept)
             if not self.sessions():
                 raise
             self.problem = error
 
     def sessions(self) -> list[Session]:
-        """Every session, oldest first; rows that wait for upload are not counted."""
+        """Return every session, oldest first; rows that wait for upload are not counted."""
         told: list[Row] = []
         names: dict[tuple[str, str], Session] = {}
         for batch in self._batches:
             try:
-                here = spooled.untold(self._spool, [batch], ())
+                here = spool_reader.untold(self._spool, [batch], ())
                 told += self._waiting(SESSIONS, [batch])
             except SpoolUnusable as error:
                 self.unread = self.unread or error
@@ -113,7 +113,7 @@ class Recordings:
         )
 
     def find(self, name: str, robot: str | None = None) -> Session:
-        """The session whose name is this, or alone begins so.
+        """Return the session whose name is this, or alone begins so.
 
         Raises:
             NoSuchSession: none, or several do.
@@ -126,20 +126,20 @@ class Recordings:
             raise why
         return sessions.among(known, name, self._url)
 
-    def happenings(self, session: Session, table: Table = EVENTS) -> list[Row]:
-        """The session's rows of this table, in the order in which they were recorded."""
-        stored = [] if self._store is None else sessions.happenings(self._store, session, table)
+    def rows_of(self, session: Session, table: Table = EVENTS) -> list[Row]:
+        """Return the session's rows of this table, in the order in which they were recorded."""
+        stored = [] if self._store is None else sessions.rows_of(self._store, session, table)
         mine = (session.robot, session.session)
         waiting = self._waiting(table, self._batches)
         told = [row for row in waiting if (row["robot"], row["session"]) == mine]
         return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
-        """What somebody says that robot and wearer did, as far as it has not been taken back."""
-        return holding(self.happenings(session, LABELS))
+        """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
+        return holding(self.rows_of(session, LABELS))
 
     def counted(self, session: Session) -> Session:
-        """The session with the extent of all of its rows."""
+        """Return the session with the extent of all of its rows."""
         return self._looked_into(session).added_to(session)
 
     def open(self, session: Session) -> "Recorded":
@@ -184,7 +184,7 @@ class Recordings:
         """The table's rows in these batches that it does not have."""
         found: list[Row] = []
         for batch in self._missing(table.name, batches):
-            rows = spooled.table_of(self._spool, table, [batch])
+            rows = spool_reader.table_of(self._spool, table, [batch])
             if rows.num_rows and self._store is not None and self._claims(table.name, batch):
                 lacking = missing_rows.of_rows(self._store, table, rows, _unheard).to_batches()
                 rows = pa.Table.from_batches(
@@ -196,7 +196,9 @@ class Recordings:
     def _missing(self, location: str, batches: list[int]) -> list[int]:
         """The batches of the spool of which this table may lack something."""
         return [
-            each for each in batches if not self._claims(location, each) or spooled.waits(self._spool, each)
+            each
+            for each in batches
+            if not self._claims(location, each) or spool_reader.waits(self._spool, each)
         ]
 
     def _lacking(self, location: str, batch: int, run: pa.RecordBatch) -> Sequence[pa.RecordBatch]:
@@ -211,7 +213,7 @@ class Recordings:
 
     def _writer(self, batch: int) -> str:
         if batch not in self._writers:
-            self._writers[batch] = spooled.writer(self._spool, batch)
+            self._writers[batch] = spool_reader.writer(self._spool, batch)
         return self._writers[batch]
 
 
@@ -228,7 +230,7 @@ class Recorded:
     def telemetry(
         self, names: Sequence[str], begin: datetime | None = None, end: datetime | None = None
     ) -> Iterator[pa.Table]:
-        """The rows from `begin` up to before `end`, as `ml.store.sessions.telemetry`."""
+        """Yield the rows from `begin` up to before `end`, as `ml.store.sessions.telemetry`."""
         with translated(f"the telemetry of {self.session.session} in {self._url} cannot be read"):
             yield from sessions.merged(self._sources, names, begin, end)
 
@@ -255,7 +257,7 @@ class _Waiting:
         self.rows = sum(piece.rows for piece in self._pieces.values())
 
     def source(self) -> Source:
-        """All of it, for `merged`."""
+        """Return all of it, for `merged`."""
         return Source([*self._pieces.values()], self._between)
 
     def _between(self, begin_ns: int, end_ns: int) -> pyarrow.dataset.Dataset:
@@ -278,7 +280,7 @@ class _Waiting:
         return self._there.get(column, Known()).unit
 
     def added_to(self, session: Session) -> Session:
-        """The session with the extent of all of its rows."""
+        """Return the session with the extent of all of its rows."""
         pieces = self._pieces.values()
         first = min(
             (time for time in (session.first, *(each.first for each in pieces)) if time), default=None
@@ -300,11 +302,11 @@ class _Waiting:
 
     def _table(self, batch: int) -> pa.Table:
         """With the columns to which the upload brings the batch, which has other robots' channels too."""
-        runs = list(spooled.runs(self._spool, self._session, batch))
+        runs = list(spool_reader.runs(self._spool, self._session, batch))
         here = TELEMETRY.location(self._session.robot, self._shards)
         layouts = [
             layout
-            for robot, layout in spooled.layouts(self._spool, batch)
+            for robot, layout in spool_reader.layouts(self._spool, batch)
             if TELEMETRY.location(robot, self._shards) == here
         ]
         found = Columns(layouts, self._before[batch])

@@ -58,6 +58,6 @@ def definition(kind: str) -> str:
 
 
 def header(utc_ns: int, frame_id: str) -> dict[str, Any]:
-    """A `std_msgs/Header`."""
+    """Return a `std_msgs/Header`."""
     sec, nanosec = divmod(utc_ns, 1_000_000_000)
     return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame_id}

@@ -24,7 +24,7 @@ class Choice:
     end: datetime | None = None
 
     def of(self, known: Sequence[Channel]) -> list[Channel]:
-        """The channels that are wanted; raises `StoreError` where a name or glob means none."""
+        """Return the channels that are wanted; raises `StoreError` where a name or glob means none."""
         names = [each.name for each in known]
         for glob in self.channels:
             if not any(fnmatch.fnmatchcase(name, glob) for name in names):
@@ -45,7 +45,7 @@ class Choice:
             )
 
     def holds(self, row: Row) -> bool:
-        """Whether the row's time is wanted."""
+        """Return whether the row's time is wanted."""
         utc = row["utc"]
         return (self.begin is None or utc >= self.begin) and (self.end is None or utc < self.end)
 
@@ -62,7 +62,7 @@ class Recording:
 
 
 def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Recording:
-    """What is wanted of a session that was opened among these; telemetry is read while `tables` is.
+    """Return what is wanted of a session that was opened among these; telemetry is read while `tables` is.
 
     Raises:
         StoreError: there is nothing of it or of that time, or the store cannot be read.
@@ -79,6 +79,6 @@ def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Record
         session,
         channels,
         recorded.telemetry(names, choice.begin, choice.end),
-        list(filter(choice.holds, recordings.happenings(session))),
+        list(filter(choice.holds, recordings.rows_of(session))),
         list(filter(choice.holds, recordings.labels(session))),
     )

@@ -34,7 +34,7 @@ def iso_8601(utc: pa.ChunkedArray | pa.Array) -> pa.ChunkedArray | pa.Array:
 
 
 def write_parquet(file: Path, recording: Recording) -> int:
-    """A column a channel with `unit` in its metadata; the session, as JSON, in the file's. How many rows."""
+    """Write a column a channel, with units and session in the metadata; return how many rows."""
     schema = _schema(recording.channels).with_metadata({"session": msgspec.json.encode(recording.session)})
     with draft(file) as written, pq.ParquetWriter(written, schema, compression="zstd") as writer:
         return _write(writer, (table.cast(schema) for table in recording.tables))

@@ -34,7 +34,7 @@ class Rows:
         return len(self.utc_ns)
 
     def between(self, begin_ns: int, end_ns: int) -> "Rows":
-        """Those from `begin_ns` up to before `end_ns`."""
+        """Return those from `begin_ns` up to before `end_ns`."""
         first, last = np.searchsorted(self.utc_ns, (begin_ns, end_ns))
         return self.part(slice(int(first), int(last)))
 
@@ -45,7 +45,7 @@ class Rows:
 
     @classmethod
     def joined(cls, parts: Sequence["Rows"]) -> "Rows":
-        """All of these, in the order of the robot's clock; a row that is in two of them is there once."""
+        """Join these in the order of the robot's clock; a row that is in two of them is there once."""
         names = list(dict.fromkeys(name for part in parts for name in part.columns))
         stamps_ns, utc = (
             np.concatenate([np.empty(0, np.int64), *found])
@@ -89,12 +89,12 @@ class Tape:
             raise NoSuchTable(
                 f"the session {session.session} has no telemetry, neither in the store nor in the spool"
             )
-        events, units = recordings.happenings(session), _units(session, recorded.channels)
+        events, units = recordings.rows_of(session), _units(session, recorded.channels)
         ends = utc_ns(session.first), utc_ns(session.last)
         return cls(session, units, events, *ends, recorded, settings)
 
     def read(self, begin_ns: int, end_ns: int) -> Rows:
-        """The rows from `begin_ns` up to before `end_ns`; blocks. Raises as `open`."""
+        """Return the rows from `begin_ns` up to before `end_ns`; blocks. Raises as `open`."""
         try:
             return self._read(begin_ns, end_ns)
         except (SpoolUnusable, StoreError):  # what waited may have gone to the store, and old files
@@ -151,5 +151,5 @@ def _column(part: Rows, name: str) -> Floats:
 
 
 def as_time(instant_ns: int) -> datetime:
-    """An instant as the store writes it."""
+    """Return an instant as the store writes it."""
     return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=instant_ns // US_NS)

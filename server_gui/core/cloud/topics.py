@@ -39,7 +39,7 @@ class Topic:
 
 
 def topics(robot: str, channels: Iterable[Channel]) -> list[Topic]:
-    """Every channel in one topic: joints, IMUs, insoles' cells, and what is left one by one."""
+    """Return every channel in one topic: joints, IMUs, insoles' cells, and what is left one by one."""
     root = f"/{ros_name(robot)}"
     left = {each.name: each.unit for each in channels}
     found = [*_joints(root, left), *_imus(root, left), *_cells(root, left)]
@@ -47,7 +47,7 @@ def topics(robot: str, channels: Iterable[Channel]) -> list[Topic]:
 
 
 def ros_name(name: str) -> str:
-    """A robot's or channel's name as a topic's: letters, digits, _ and /; no part begins with a digit."""
+    """Make a topic's name of ours: letters, digits, _ and /; no part begins with a digit."""
     plain = re.sub(r"[^A-Za-z0-9_/]", "_", name.replace(".", "/"))
     return "/".join(f"_{part}" if part[:1].isdigit() else part for part in plain.split("/"))
 

@@ -50,7 +50,7 @@ class Copied:
 
 
 def open_target(source: Store, url: str) -> Objects:
-    """Where a copy of this store may be; raises `UnsafeStore` where several writers could not write to it."""
+    """Open the place of a copy; raises `UnsafeStore` where several writers could not write to it."""
     target = Objects(url)
     if source.about.several_writers and not url.startswith("file://") and target.read(ABOUT) is None:
         probe(target)
@@ -58,7 +58,7 @@ def open_target(source: Store, url: str) -> Objects:
 
 
 def missing(source: Objects, target: Objects) -> list[Object]:
-    """What the target lacks, in the order in which it is to be copied.
+    """Return what the target lacks, in the order in which it is to be copied.
 
     Raises:
         StoreError: the target is no earlier state of the source, has another model, pointer to one or pin
@@ -133,7 +133,7 @@ def _folder(target: Objects) -> Path:
 
 
 def beneath(folder: Path, key: str) -> Path:
-    """Where an object goes in a folder, whatever whoever wrote to the store has called it.
+    """Return where an object goes in a folder, whatever whoever wrote to the store has called it.
 
     Raises:
         StoreError: that would be no file beneath the folder.

@@ -26,13 +26,13 @@ class Usage:
 
 
 def by_table(store: Store) -> list[Usage]:
-    """Each table that something was written to."""
+    """Return each table that something was written to."""
     found = {name: list(reading.files(store, table)) for name, table in TABLES.items()}
     return [_usage(name, None, files) for name, files in found.items() if files]
 
 
 def by_robot(store: Store) -> Iterator[Usage]:
-    """Each table's robots, where they have files of their own."""
+    """Yield each table's robots, where they have files of their own."""
     for name, table in TABLES.items():
         files: dict[str | None, list[DataFile]] = defaultdict(list)
         for file in reading.files(store, table):
@@ -42,7 +42,7 @@ def by_robot(store: Store) -> Iterator[Usage]:
 
 
 def below(store: Store, prefix: str) -> list[Object]:
-    """Every object there."""
+    """Return every object there."""
     return sorted(store.objects.listing(prefix), key=lambda found: found.path)
 
 

@@ -15,7 +15,7 @@ from ml.store.fragments import DataFile, data_files
 from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from ml.store.upkeep import Pin, pins
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.counting import AT_ONCE, Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
 from server_gui.core.cloud.verdict import Verdict
@@ -66,7 +66,7 @@ def whole(
 
 
 def receipts_of(spool: Path) -> list[Receipt | Altered]:
-    """The spool's receipts, oldest first.
+    """Return the spool's receipts, oldest first.
 
     Raises:
         SpoolUnusable: they are there, and cannot be read.
@@ -116,7 +116,9 @@ def _notes(
             f"bring {spool / RECEIPTS} back from a copy; without one, gwrms cloud mend --accept-loss goes on "
             "with the lines that are whole"
         )
-    if waiting := [number for number in spooled.waiting(spool) if not spooled.is_empty(spool, number)]:
+    if waiting := [
+        number for number in spool_reader.waiting(spool) if not spool_reader.is_empty(spool, number)
+    ]:
         yield f"not uploaded yet, and not looked at: {told_batches(waiting)} of the spool {spool}"
     again = [number for number, batch in second_copies(spool).items() if batch in proof.lacking]
     if again:
@@ -134,14 +136,14 @@ def _notes(
 def second_copies(spool: Path) -> dict[int, Batch]:
     """By which name the spool's second copies went to the store; without those that cannot be read."""
     found = {}
-    for number in spooled.uploaded(spool):
+    for number in spool_reader.uploaded(spool):
         with contextlib.suppress(SpoolUnusable):
-            found[number] = (spooled.writer(spool, number), number)
+            found[number] = (spool_reader.writer(spool, number), number)
     return found
 
 
 def sent_to(url: str, spool: Path) -> int:
-    """How many batches of the spool went to the store of this URL."""
+    """Return how many batches of the spool went to the store of this URL."""
     return len({(each.writer, each.batch) for each in went_to(_known(spool), url) if each.is_of_batch})
 
 
@@ -156,7 +158,7 @@ def no_store(url: str, spool: Path) -> str:
 
 
 def look(store: Store) -> tuple[list[DataFile], dict[str, str]]:
-    """Every file of the newest versions; which tables' logs cannot be read, and why."""
+    """Return every file of the newest versions; which tables' logs cannot be read, and why."""
     found: list[DataFile] = []
     problems = {}
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
@@ -203,12 +205,12 @@ def _needed(named: Pin) -> str:
 
 
 def files(store: Store) -> list[DataFile]:
-    """Every file that the newest versions of the tables consist of."""
+    """Return every file that the newest versions of the tables consist of."""
     return [file for table in TABLES.values() for file in reading.files(store, table)]
 
 
 def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> Iterator[str]:
-    """What is wrong with these files, in words: absent, of another size, unreadable, other rows.
+    """Yield what is wrong with these files, in words: absent, of another size, unreadable, other rows.
 
     Each file's footer is read, and with `deep` every value.
 
@@ -220,7 +222,7 @@ def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep:
 
 
 def broken(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> list[DataFile]:
-    """Which of these files are absent, cut off or unreadable; raises as `damages` does."""
+    """Return which of these files are absent, cut off or unreadable; raises as `damages` does."""
     told = _each(store, wanted, advance, deep=deep)
     return [file for file, problem in zip(wanted, told, strict=True) if problem]
 
@@ -238,12 +240,12 @@ def _each(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: b
 
 
 def batches_missing(store: Store, spool: Path) -> Iterator[str]:
-    """The spool's batches that were set aside, are nowhere, or have no receipt though they were uploaded.
+    """Return the spool's batches that were set aside, are nowhere, or were uploaded and have no receipt.
 
     Of those with a receipt `prove` knows more. Receipts are read last: a batch has its own before its file
     has another name.
     """
-    aside, before = spooled.damaged(spool), _there(spool)
+    aside, before = spool_reader.damaged(spool), _there(spool)
     found, problems = _second_batches(spool)
     receipts = [each for each in own_receipts(receipts_of(spool), spool) if each.is_of_batch]
     yield from _set_aside(aside, receipts)
@@ -256,7 +258,7 @@ def batches_missing(store: Store, spool: Path) -> Iterator[str]:
 
 
 def own_receipts(receipts: Iterable[Receipt | Altered], spool: Path) -> list[Receipt]:
-    """Those that the spool itself has written, as far as its name is known."""
+    """Return those that the spool itself has written, as far as its name is known."""
     own = identity(spool)
     return [each for each in receipts if isinstance(each, Receipt) and (not own or each.spool == own)]
 
@@ -289,36 +291,36 @@ def nowhere(spool: Path, receipts: Sequence[Receipt], before: Set[int] = frozens
 
 
 def _there(spool: Path) -> set[int]:
-    return {*spooled.kept(spool), *(number for number, _ in spooled.damaged(spool))}
+    return {*spool_reader.kept(spool), *(number for number, _ in spool_reader.damaged(spool))}
 
 
 def _has_name(spool: Path, number: int) -> bool:
     """Whether a batch was made since there are receipts."""
     try:
-        return spooled.writer(spool, number) != identity(spool)
+        return spool_reader.writer(spool, number) != identity(spool)
     except SpoolUnusable:
         return False
 
 
-def _second_batches(spool: Path) -> tuple[list[spooled.Batch], list[str]]:
+def _second_batches(spool: Path) -> tuple[list[spool_reader.Batch], list[str]]:
     """The second copies, and which cannot be read; not those that go meanwhile, to make room."""
     found, problems = [], []
-    for number in spooled.uploaded(spool):
+    for number in spool_reader.uploaded(spool):
         try:
-            found.append(spooled.batch(spool, number))
+            found.append(spool_reader.batch(spool, number))
         except SpoolUnusable as error:
-            if number in spooled.uploaded(spool):
+            if number in spool_reader.uploaded(spool):
                 problems.append(str(error))
     return found, problems
 
 
-def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spooled.Batch], list[str]]:
-    """The second copies that have no receipt, and which cannot be read."""
+def copies(spool: Path, known: Set[tuple[str, int]]) -> tuple[list[spool_reader.Batch], list[str]]:
+    """Return the second copies that have no receipt, and which cannot be read."""
     found, problems = _second_batches(spool)
     return [batch for batch in found if (batch.writer, batch.number) not in known], problems
 
 
-def _without_receipt(spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
+def _without_receipt(spool: Path, unproven: Sequence[spool_reader.Batch]) -> Iterator[str]:
     """Each had one before it was called uploaded; but for those from before there were any."""
     own = identity(spool)
     numbers = [batch.number for batch in unproven if batch.writer != own]
@@ -341,7 +343,7 @@ def told_batches(numbers: Iterable[int]) -> str:
     return f"batch {told}" if len(runs) == 1 and len(runs[0]) == 1 else f"the batches {told}"
 
 
-def _unknown(store: Store, spool: Path, unproven: Sequence[spooled.Batch]) -> Iterator[str]:
+def _unknown(store: Store, spool: Path, unproven: Sequence[spool_reader.Batch]) -> Iterator[str]:
     known: dict[tuple[str, str], int] = {}
     for batch in unproven:
         for location in _locations(store, batch):
@@ -351,7 +353,7 @@ def _unknown(store: Store, spool: Path, unproven: Sequence[spooled.Batch]) -> It
                 yield f"batch {batch.number} of the spool {spool} is not in {store.url}/{location}"
 
 
-def _locations(store: Store, batch: spooled.Batch) -> list[str]:
+def _locations(store: Store, batch: spool_reader.Batch) -> list[str]:
     telemetry = {TELEMETRY.location(robot, store.about.shards) for robot in batch.robots}
     return sorted(telemetry | batch.tables)
 

@@ -7,7 +7,6 @@ the same spool, the window follows robots without; it takes over when that progr
 import concurrent.futures
 import functools
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -17,13 +16,13 @@ from gateway.client import Address
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.fleet.collector import Collector, whole
 from server_gui.core.fleet.fleet import Subscriber
+from server_gui.core.fleet.live_prediction import TellPredictions
 from server_gui.core.fleet.remote_collector import RemoteCollector
 from server_gui.core.fleet.stop_links import StopRobot
 from server_gui.core.follow.events import Event, without_processes
 from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News
-from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings
@@ -33,8 +32,6 @@ from server_gui.core.threads.supervision import ThreadWatch
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first
 AGAIN_S: Final = 1.0  # between attempts
-
-Foresee = Callable[[Sequence[PredictionNews]], None]  # in the thread that predicts
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +55,14 @@ class Feeds:
         following: FollowSettings,
         record: Record | None,
         show: Subscriber,
-        foresee: Foresee,
+        tell_predictions: TellPredictions,
         stop: StopRobot,
     ) -> None:
         self._settings = settings
         self._following = following
         self._record = record
         self._show = show
-        self._foresee = foresee
+        self._tell_predictions = tell_predictions
         self._stop = stop
         self._robots: dict[str, Address] = {}
         self._tasks: list[concurrent.futures.Future[None]] = []  # that follow them where no collector does
@@ -80,7 +77,9 @@ class Feeds:
         else:
             self.network = self._own = Network()
             self._elsewhere = None if record is None else RemoteCollector(settings.recorder.spool)
-            self._predicting = PredictionService(settings, foresee) if settings.prediction.enabled else None
+            self._predicting = (
+                PredictionService(settings, tell_predictions) if settings.prediction.enabled else None
+            )
         predicting = () if self._predicting is None else self._predicting.workers
         self.others = ThreadWatch(())  # threads of the window itself
         self._watch = ThreadWatch((self.network.worker, *predicting))  # where no collector has one
@@ -109,7 +108,7 @@ class Feeds:
         return self._collector is not None and self._settings.recorder.rate_hz == 0
 
     def recording(self, deliver: Deliver, news: News) -> Recording:
-        """What there is to say of who records; `look` keeps it right."""
+        """Return what there is to say of who records; `look` keeps it right."""
         keeper = self._collector or self._elsewhere
         by = {Collector: By.WINDOW, RemoteCollector: By.OTHER}.get(type(keeper), By.NOBODY)
         return Recording(by, keeper, deliver, news, self._why)
@@ -146,7 +145,9 @@ class Feeds:
         nobody = replace(self._settings, robots={})  # each is told when the window follows it
         operator, notes = self._record.operator, self._record.notes
         try:
-            return Collector(nobody, operator, notes, following, [self._kept], self._foresee, self._stop), ""
+            return Collector(
+                nobody, operator, notes, following, [self._kept], self._tell_predictions, self._stop
+            ), ""
         except SpoolUnusable as error:
             return None, str(error)
 
@@ -191,7 +192,7 @@ class Feeds:
 
 
 def shown_and_recorded(shown: FollowSettings, recorder: RecordingSettings) -> FollowSettings:
-    """What is asked of a robot that the window shows and records: by one link, once."""
+    """Return what is asked of a robot that the window shows and records: by one link, once."""
     return replace(
         whole(recorder),
         client=shown.client,

@@ -26,7 +26,7 @@ class Measured:
 
 
 def nearest(times: Floats, at_s: float) -> int | None:
-    """The row whose time is nearest to `at_s`, both in s and `times` rising; None where there is none."""
+    """Return the row whose time is nearest to `at_s` (s, `times` rising); None where there is none."""
     if not len(times):
         return None
     after = min(int(np.searchsorted(times, at_s)), len(times) - 1)
@@ -35,7 +35,7 @@ def nearest(times: Floats, at_s: float) -> int | None:
 
 
 def measure(values: Floats, a: int, b: int, first: int, last: int) -> Measured:
-    """The values at rows `a` and `b`, and how they are from row `first` until before row `last`."""
+    """Return the values at rows `a` and `b`, and how they are from row `first` until before row `last`."""
     at_a, at_b = (None if np.isnan(values[row]) else float(values[row]) for row in (a, b))
     known = values[first:last]
     known = known[~np.isnan(known)]

@@ -10,7 +10,7 @@ class Pins:
         self._by_robot: dict[str, set[str]] = {}
 
     def of(self, robot: str) -> frozenset[str]:
-        """What is pinned of this robot."""
+        """Return what is pinned of this robot."""
         return frozenset(self._by_robot.get(robot, ()))
 
     def toggle(self, robot: str, name: str) -> None:

@@ -26,7 +26,7 @@ class Keeper(Protocol):
     """Who records: a collector in this process, or one that is asked through its door."""
 
     def report(self) -> "Future[CollectorReport]":
-        """How everything goes."""
+        """Return how everything goes."""
         ...
 
     def mark(self, text: str) -> "Future[int]":
@@ -113,7 +113,7 @@ class Recording:
         return self._keeper is not None and self.problem is None
 
     def is_alone(self, for_s: float) -> bool:
-        """Whether nobody has recorded for so long, as far as one can ask."""
+        """Return whether nobody has recorded for so long, as far as one can ask."""
         since_ns = self._alone_since_ns
         return since_ns is not None and time.monotonic_ns() - since_ns >= for_s * 1e9
 
@@ -132,7 +132,7 @@ class Recording:
         self._ask(lambda keeper: keeper.upload(), lambda _: "what was recorded until now goes to the store")
 
     def said(self, address: str | None) -> Said:
-        """How it goes, for who looks at the robot with this address."""
+        """Return how it goes, for who looks at the robot with this address."""
         report = self.report
         if self._keeper is None:
             return Said(Tone.OFF, "Not recording", self.why)

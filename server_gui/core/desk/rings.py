@@ -57,7 +57,7 @@ class Rings:
         return times[int(np.searchsorted(times, times[-1] - seconds)) :]
 
     def values(self, channel: str, count: int) -> Floats:
-        """The newest `count` values of a channel, NaN where there is none. The ring's own: do not keep it."""
+        """Return a channel's newest `count` values, NaN where there is none; not to be kept."""
         place = self._places.get(channel)
         if place is None:
             return np.full(min(count, self._count), np.nan)

@@ -26,7 +26,7 @@ class Sole:
 
 
 def sole(robot: Robot, side: str) -> Sole:
-    """The cells of the insole of one side."""
+    """Return the cells of the insole of one side."""
     component = f"{side}_insole"
     count = 0
     while f"{component}.cell_{count}" in robot.values:
@@ -42,7 +42,7 @@ def sole(robot: Robot, side: str) -> Sole:
 
 
 def cells_of(count: int, *, right: bool) -> tuple[Cell, ...] | None:
-    """Where so many cells are on a foot by the layouts that ship; None where none has as many."""
+    """Return where so many cells are on a foot by the layouts that ship; None where none has as many."""
     left = _left_cells(count)
     if left is None:
         return None

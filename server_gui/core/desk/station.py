@@ -159,7 +159,7 @@ class Station:
             snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
             self.processing.apply(dataclasses.replace(event, snapshot=snapshot))
 
-    def foresee(self, news: PredictionNews) -> None:
+    def take_prediction(self, news: PredictionNews) -> None:
         """Apply what models say of this robot."""
         self.predictions.take(news)
         if isinstance(news, Ruled):
@@ -172,11 +172,11 @@ class Station:
         self.note_stop(self.send_stop(reason))
 
     def send_stop(self, reason: str) -> "Future[Stopped]":
-        """The same from any thread, at once; its answer is for `note_stop`."""
+        """Send a quick stop from any thread, at once; its answer is for `note_stop`."""
         return self._commands.stop(reason)
 
     def note_stop(self, future: "Future[Stopped]") -> None:
-        """A STOP was sent: follow what becomes of it."""
+        """Follow what becomes of a STOP that was sent."""
         number = self.stopping.sent()
         when_done(
             future,
@@ -240,7 +240,7 @@ class Station:
     # --- parameters
 
     def difference(self, units: Units) -> tuple[Change, ...]:
-        """What would be written."""
+        """Return what would be written."""
         return self.edits.difference(self.robot.parameters, self.known, units)
 
     def write(self, changes: tuple[Change, ...], trial_s: float | None = None) -> None:
@@ -329,7 +329,7 @@ class Station:
         self.tell(NewsKind.PARAMETER, f"{self.writing.state.value}: {error}")
 
     def is_stored(self, name: str) -> bool:
-        """Whether the value that is held is in flash, as far as the journal shows it; else nobody knows."""
+        """Return whether the present value is in flash, as far as the journal shows it; else nobody knows."""
         description, held = self.robot.description, self.robot.parameters.get(name)
         if description is None or held is None or held.value is None:
             return False

@@ -16,7 +16,7 @@ SPARSE: Final = 0.5  # of the values there: fewer, and a row is one source's sam
 
 
 def at_ticks(rows: Rows, ticks_ns: Ints) -> Rows:
-    """A row a tick: of each channel the newest value that is not after it, and not too old."""
+    """Return a row a tick: of each channel the newest value that is not after it, and not too old."""
     here = np.searchsorted(rows.stamps_ns, ticks_ns, "right") - 1
     columns = {name: _held(rows.stamps_ns, column, ticks_ns, here) for name, column in rows.columns.items()}
     return Rows(rows.utc_ns[np.maximum(here, 0)], ticks_ns, columns)
@@ -39,7 +39,7 @@ class Ticks:
         self._told_ns: int | None = None
 
     def take(self, events: Iterable[Event]) -> list[Event]:
-        """The same events, with one of telemetry at their end that has the ticks that are whole."""
+        """Return the same events, with one of telemetry at their end that has the ticks that are whole."""
         telemetry: Telemetry | None = None
         others: list[Event] = []
         for event in events:

@@ -67,7 +67,7 @@ class Collector:
     Leaving ends the sessions, and uploads what waits, for a while: what is not in the store then stays in the
     spool. Where an upload hangs even so, `hangs` is set, and only the end of the process ends its thread.
     A window records with a `following` of its own; its `subscribers` are told of everything after it is
-    recorded, `foresee` in another thread of what is predicted; `stop` stops a robot where a rule wants it.
+    recorded. `tell_predictions` is called in another thread; `stop` stops a robot where a rule wants it.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Collector:
         notes: str = "",
         following: FollowSettings | None = None,
         subscribers: Iterable[Subscriber] = (),
-        foresee: TellPredictions | None = None,
+        tell_predictions: TellPredictions | None = None,
         stop: StopRobot | None = None,
     ) -> None:
         self.hangs = False
@@ -95,7 +95,7 @@ class Collector:
         self._stop_links = StopLinks(self.network, settings.rules if stop is None else ())
         self._prediction = (
             RecordedPrediction(
-                settings, self._recorder, self._fleet.session, stop or self._stop_links.stop, foresee
+                settings, self._recorder, self._fleet.session, stop or self._stop_links.stop, tell_predictions
             )
             if settings.prediction.enabled
             else None
@@ -141,7 +141,7 @@ class Collector:
             self._running.result()
 
     def report(self) -> "concurrent.futures.Future[CollectorReport]":
-        """How everything goes now."""
+        """Return how everything goes now."""
         return self._do(lambda: self._report(""))
 
     def follow(self, robot: str, address: Address) -> "concurrent.futures.Future[None]":
@@ -236,7 +236,7 @@ class Collector:
 
 
 def whole(recorder: RecordingSettings) -> FollowSettings:
-    """What is asked of each robot: everything that the store has a table for."""
+    """Return what is asked of each robot: everything that the store has a table for."""
     return FollowSettings(
         client="gwrms collect",
         channels=recorder.channels,
@@ -249,5 +249,5 @@ def whole(recorder: RecordingSettings) -> FollowSettings:
 
 
 def connect(store: StoreSettings) -> Store:
-    """The store that the server's file names."""
+    """Return the store that the server's file names."""
     return Store(store.url, store.shards, store.several_writers)

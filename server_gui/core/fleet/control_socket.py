@@ -63,7 +63,7 @@ async def door(folder: Path, answers: Answers) -> AsyncIterator[None]:
 
 
 def ask(folder: Path, what: str, text: str = "") -> bytes:
-    """The answer of the collector that works on this spool, as a line of JSON.
+    """Ask the collector that works on this spool; return its answer, a line of JSON.
 
     Raises:
         NobodyCollects: nobody answers there; says whether it hangs or does not run.

@@ -53,7 +53,7 @@ class Member:
         return self._keeping.session
 
     def report(self) -> LinkReport:
-        """How its link does now."""
+        """Return how its link does now."""
         return self.statistics.report(self._keeping.session)
 
 
@@ -89,11 +89,11 @@ class Fleet:
         self._joining.put_nowait(member)
 
     def session(self, robot: str) -> str:
-        """What a robot's recording that goes on is called."""
+        """Return what a robot's recording that goes on is called."""
         return self._members[robot].session
 
     def report(self) -> dict[str, LinkReport]:
-        """How each robot's link does now."""
+        """Return how each robot's link does now."""
         return {robot: member.report() for robot, member in self._members.items()}
 
     @property

@@ -86,7 +86,7 @@ class LinkStatistics:
                 self._monitor.state(event.state, event.problem, event.at_ns)
 
     def report(self, session: str) -> LinkReport:
-        """How it stands now."""
+        """Return how it stands now."""
         now_ns = time.monotonic_ns()
         return LinkReport(
             address=str(self._address),

@@ -72,7 +72,7 @@ def _said(answer: "concurrent.futures.Future[Stopped]") -> str:
 
 
 def record(session: str, news: Predicted) -> Record:
-    """A row of the table `predictions`."""
+    """Return a row of the table `predictions`."""
     said = news.prediction
     fields = {
         "robot": news.robot,

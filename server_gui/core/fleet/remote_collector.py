@@ -22,7 +22,7 @@ class RemoteCollector:
         self._asking.close(2 * ANSWER_S)
 
     def report(self) -> "Future[CollectorReport]":
-        """How everything goes there."""
+        """Return how everything goes there."""
         return self._asking.do(lambda: msgspec.json.decode(ask(self._spool, "status"), type=CollectorReport))
 
     def mark(self, text: str) -> "Future[int]":

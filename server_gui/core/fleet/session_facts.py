@@ -13,7 +13,7 @@ from server_gui.core.recording.records import Facts
 
 
 def facts(description: Description, operator: str, notes: str) -> Facts:
-    """What a session can begin with; parameters' values and the robot's kernel become known later."""
+    """Return what a session can begin with; parameters' values and the robot's kernel become known later."""
     return Facts(
         configuration_hash=configuration_hash(description),
         units={channel.name: channel.unit for channel in description.channels},
@@ -30,7 +30,7 @@ def versions(description: Description) -> dict[str, str]:
 
 
 def kernel(known: KernelFacts) -> dict[str, str]:
-    """The robot's operating system among the versions."""
+    """Return the robot's operating system among the versions."""
     return {"robot's kernel": " ".join((known.system, known.release, known.version))}
 
 

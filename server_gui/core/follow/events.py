@@ -97,14 +97,14 @@ Event = LinkChanged | Described | Telemetry | Looked | Resources | Costs | Journ
 
 
 def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[float | None]]) -> Telemetry:
-    """The same, with other rows."""
+    """Return the same, with other rows."""
     return dataclasses.replace(
         event, batch=dataclasses.replace(event.batch, stamps_ns=stamps_ns, columns=columns)
     )
 
 
 def without_processes(event: Event) -> Event:
-    """The same, without the table of processes."""
+    """Return the same, without the table of processes."""
     if not isinstance(event, Resources):
         return event
     return dataclasses.replace(

@@ -97,7 +97,7 @@ class Robot:
         return max(0, (time.monotonic_ns() if now_ns is None else now_ns) - self._newest_ns) / 1e9
 
     def is_stale(self, now_ns: int | None = None) -> bool:
-        """Whether the values are too old to be called live."""
+        """Return whether the values are too old to be called live."""
         age_s = self.age_s(now_ns)
         return age_s is None or age_s * 1e9 > STALE_NS
 
@@ -108,15 +108,15 @@ class Robot:
         return recent / (RATE_WINDOW_NS / 1e9)
 
     def names(self, kind: str) -> list[str]:
-        """The components of one kind, in the robot's order."""
+        """Return the components of one kind, in the robot's order."""
         return [part.name for part in self.parts.values() if part.kind == kind]
 
     def not_ok(self) -> list[Part]:
-        """The components whose values cannot be trusted now."""
+        """Return the components whose values cannot be trusted now."""
         return [part for part in self.parts.values() if part.state != "ok"]
 
     def word(self, channel: str) -> str | None:
-        """A state's word, None where there is none."""
+        """Return a state's word, None where there is none."""
         value = self.values.get(channel)
         words = self._words.get(channel)
         if value is None or words is None:

@@ -32,7 +32,7 @@ class Shown:
         return max(0, waited_ns + (self.predicted.took_ns or 0)) / 1e9
 
     def is_stale(self, now_ns: int | None = None) -> bool:
-        """Whether it is too old to be called live."""
+        """Return whether it is too old to be called live."""
         return self.age_s(now_ns) > STALE_S
 
 
@@ -48,7 +48,7 @@ class Recalled:
         return self.old_s
 
     def is_stale(self) -> bool:
-        """Whether it was too old to be called live then."""
+        """Return whether it was too old to be called live then."""
         return self.old_s > STALE_S
 
 

@@ -19,7 +19,7 @@ from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.settings.server_file import ServerSettings
 
-MOST: Final = 10_000  # foreseen, that wait for nobody
+MOST: Final = 10_000  # predictions, that wait for nobody
 
 
 class Watched:
@@ -45,11 +45,11 @@ class Live:
             resources=ResourceSnapshotParams(processes=False),
             resources_s=ONCE,
         )
-        self._foreseen: collections.deque[PredictionNews] = collections.deque(maxlen=MOST)
+        self._predicted: collections.deque[PredictionNews] = collections.deque(maxlen=MOST)
         self._mailboxes = {name: Mailbox() for name in robots}
         self._network = Network()
         self._came = threading.Event()
-        self._predicting = PredictionService(settings, self._foresee)
+        self._predicting = PredictionService(settings, self._take)
 
     def __enter__(self) -> Self:
         self._predicting.__enter__()
@@ -67,7 +67,7 @@ class Live:
         self._predicting.__exit__(*exc)
 
     def look(self, within_s: float) -> Sequence[PredictionNews]:
-        """Wait so long for something to be foreseen, and apply what has come; all that was foreseen since."""
+        """Wait so long for a prediction, apply what has come, and return all predictions since."""
         self._came.wait(within_s)
         self._came.clear()
         for name, mailbox in self._mailboxes.items():
@@ -75,11 +75,11 @@ class Live:
                 self.robots[name].robot.apply(event)
                 if isinstance(event, LinkChanged):
                     self.robots[name].predictions.clear()
-        found = [self._foreseen.popleft() for _ in range(len(self._foreseen))]
+        found = [self._predicted.popleft() for _ in range(len(self._predicted))]
         for one in found:
             self.robots[one.robot].predictions.take(one)
         return found
 
-    def _foresee(self, news: Sequence[PredictionNews]) -> None:
-        self._foreseen.extend(news)
+    def _take(self, news: Sequence[PredictionNews]) -> None:
+        self._predicted.extend(news)
         self._came.set()

@@ -10,7 +10,7 @@ from ml.serving.predictor import Prediction
 from server_gui.core.prediction.rules import Rule
 from server_gui.core.settings.prediction import RuleSettings
 
-FORESEEN_NS: Final = 1_500_000_000  # before what it foresees, a rule may begin so early
+LEAD_NS: Final = 1_500_000_000  # a rule may begin so long before what it warns of
 HOUR_NS: Final = 3_600_000_000_000
 
 
@@ -63,5 +63,5 @@ def _begins(rule: Rule, predictions: Iterable[Prediction]) -> Iterable[int]:
 
 
 def _caused(at_ns: int, causes: Sequence[tuple[int, int]]) -> bool:
-    """Whether there was cause then, or within what a rule may foresee."""
-    return any(begin_ns - FORESEEN_NS <= at_ns <= end_ns for begin_ns, end_ns in causes)
+    """Whether there was cause then, or so soon after it that a rule may warn of it."""
+    return any(begin_ns - LEAD_NS <= at_ns <= end_ns for begin_ns, end_ns in causes)

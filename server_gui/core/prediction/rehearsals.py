@@ -16,7 +16,7 @@ from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 
 SECOND_NS: Final = 1_000_000_000
 ALSO: Final[Mapping[str, frozenset[str]]] = MappingProxyType(
-    {"near_fall": frozenset({"near_fall", "fall"})}  # what foresees the one is right about the other
+    {"near_fall": frozenset({"near_fall", "fall"})}  # what warns of the one is right about the other
 )
 Read = Callable[[Path, Path | None], list[Told]]
 
@@ -32,7 +32,7 @@ class Benchmark:
         self._read = read
 
     def rehearse(self, rules: Iterable[RuleSettings], data: Path, falls: Path | None) -> list[Rehearsed]:
-        """Those rules of which these recordings can show anything.
+        """Rehearse the rules of which these recordings can show anything.
 
         Raises:
             UnusableData: it is no such file.
@@ -86,7 +86,7 @@ def of_sessions(
     settings: PredictionSettings,
     sessions: Sequence[tuple[str, Sequence[Replayed]]],
 ) -> list[Rehearsed]:
-    """Every rule over the sessions (robot, what was replayed) of the robots that it concerns."""
+    """Rehearse each rule over the sessions (robot, replay) of the robots that it concerns."""
     found = []
     for rule in rules:
         own = [

@@ -50,7 +50,7 @@ class Replayed:
 def replay(
     store: Store, session: Session, settings: PredictionSettings, models: Sequence[str] = ()
 ) -> list[Replayed]:
-    """Every task's replay, by the models that serve the robot now, or by those named.
+    """Replay every task, by the models that serve the robot now or by those named.
 
     Raises:
         UnusableModel: a model cannot be used, or not for this robot.
@@ -106,7 +106,7 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
 def _live(store: Store, session: Session, model: Model, found: Sequence[Prediction]) -> Live:
     """Of a session that goes on, only up to here: by now there may be more in the store."""
     try:
-        rows = sessions.happenings(store, session, PREDICTIONS)
+        rows = sessions.rows_of(store, session, PREDICTIONS)
     except NoSuchTable:
         rows = []
     until_ns = found[-1].stamp_ns if found and session.ended is None else math.inf

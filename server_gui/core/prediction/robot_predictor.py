@@ -56,7 +56,7 @@ class Watched:
     def predicted(
         self, robot: str, clock: "Clock", quality: Quality | None, predictions: Sequence[Prediction]
     ) -> Iterator[PredictionNews]:
-        """What these predictions, of what was due, say; `quality` is how right the model was of late."""
+        """Return what these predictions say of what was due; `quality` is how right the model was of late."""
         samples = [window.samples[0, :, -1] for window in self.due]
         self.due = []
         self._trusting.take(predictions, samples)
@@ -91,11 +91,11 @@ class Clock:
         return cls(batch.stamps_ns[-1] - batch.received_ns if batch.stamps_ns else 0)
 
     def utc_ns(self, stamp_ns: int) -> int:
-        """A moment of the robot's clock."""
+        """Return a moment of the robot's clock."""
         return stamp_ns - self.offset_ns + time.time_ns() - time.monotonic_ns()
 
     def age_ns(self, stamp_ns: int) -> int | None:
-        """How long ago that was."""
+        """Return how long ago that was."""
         return time.monotonic_ns() + self.offset_ns - stamp_ns if self.known else None
 
 

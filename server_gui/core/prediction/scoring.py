@@ -38,7 +38,7 @@ class Decisions:
 def compared(
     labels: Iterable[Label], clock: Recorded, task: Task, classes: Sequence[str], said: Decisions
 ) -> tuple[Names, Sequence[str]]:
-    """What was so when decisions are about, of these classes, or NOBODY; and what was said, in these words.
+    """Return the true class at each decision, or NOBODY, and the predicted one, both in these classes.
 
     `clock` relates the labels' times to the robot's. What a model itself has labelled proves nothing.
     """
@@ -72,13 +72,13 @@ def _phases(true: Samples, sources: Names, said: Decisions) -> tuple[Names, Sequ
 
 
 def counted(was: Names, said: Sequence[str]) -> Counts:
-    """How often what was said of what, where somebody knows."""
+    """Return how often what was said of what, where somebody knows."""
     pairs = zip(was.tolist(), said, strict=True)
     return Counter((so, label) for so, label in pairs if so != NOBODY)
 
 
 def quality(counts: Mapping[tuple[str, str], int]) -> Quality:
-    """What of that was right."""
+    """Return what of that was right."""
     confusion: dict[str, dict[str, int]] = {}
     for (was, said), count in sorted(counts.items()):
         confusion.setdefault(was, {})[said] = count

@@ -52,7 +52,7 @@ class TrackRecord:
         self._counts: Mapping[Stretch, Mapping[Key, Counts]] = {}
 
     def figures(self, robots: Set[str], now: datetime, ending: Callable[[], bool] = lambda: False) -> Figures:
-        """What was said of these robots within the last days; nothing new where it is `ending`.
+        """Return what was said of these robots within the last days; nothing new where it is `ending`.
 
         A session that a model has learned from proves nothing of it, and is left out.
 

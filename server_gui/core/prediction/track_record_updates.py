@@ -45,7 +45,7 @@ class TrackRecordUpdates:
         self._looking.__exit__(*exc)
 
     def quality(self, robot: str, model: Card) -> Quality | None:
-        """How right a model was on a robot; None where nobody has labelled anything. From any thread."""
+        """Return how right a model was on a robot, None without any labels. From any thread."""
         return (self.figures or {}).get(robot, {}).get(model.task, {}).get(model.id)
 
     def _look(self) -> None:

@@ -111,7 +111,7 @@ class LinkMonitor:
         self._calendar_ns = ahead_ns
 
     def quality(self, now_ns: int) -> LinkQuality:
-        """The link over the minute before `now_ns`."""
+        """Return the link over the minute before `now_ns`."""
         oldest = now_ns // 1_000_000_000 - SECONDS
         recent = [second for second in self._seconds if second.second > oldest]
         rows, lost = sum(second.rows for second in recent), sum(second.lost for second in recent)

@@ -98,7 +98,7 @@ class GaitMeasures:
         return stride
 
     def now(self, now_ns: int) -> Gait:
-        """The walk at `now_ns` on the robot's clock."""
+        """Return the walk at `now_ns` on the robot's clock."""
         strikes = [leg.strike_ns for leg in self._legs.values() if leg.strike_ns is not None]
         if not strikes or now_ns - max(strikes) > WALKING_NS:
             return Gait()
@@ -106,7 +106,7 @@ class GaitMeasures:
 
 
 def summary(strides: Mapping[Leg, Iterable[Stride]]) -> Gait:
-    """The measures of these strides of both legs."""
+    """Return the measures of these strides of both legs."""
     found = {leg: list(strides.get(leg, ())) for leg in Leg}
     legs = {leg: _leg_gait(taken) for leg, taken in found.items()}
     both = [stride for taken in found.values() for stride in taken]
@@ -135,7 +135,7 @@ class _Leg:
         self.off_ns: int | None = None
 
     def ended(self, strike: GaitEvent, other: "_Leg", ranges: Mapping[str, float]) -> Stride | None:
-        """The stride that `strike` ends, where its own toe off was seen."""
+        """Return the stride that `strike` ends, where its own toe off was seen."""
         began_ns, off_ns, ended_ns = self.strike_ns, self.off_ns, strike.stamp_ns
         if began_ns is None or off_ns is None or not began_ns < off_ns < ended_ns:
             return None

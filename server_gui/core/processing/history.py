@@ -60,7 +60,7 @@ class History:
         return self._fine.rows()
 
     def hours(self) -> Floats:
-        """The same, a row for each whole minute of the last hours."""
+        """Return the same, a row for each whole minute of the last hours."""
         return self._coarse.rows()
 
 

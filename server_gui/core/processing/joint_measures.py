@@ -21,7 +21,7 @@ class Extremes:
             self._high = angle
 
     def end(self) -> float | None:
-        """The range of all samples since the last call, None where there were none."""
+        """Return the range of all samples since the last call, None where there were none."""
         found = self._high - self._low
         self._low, self._high = math.inf, -math.inf
         return found if math.isfinite(found) else None
@@ -54,7 +54,7 @@ class TrackingError:
         block[2] = max(block[2], abs(error))
 
     def at(self, now_ns: int) -> Error | None:
-        """The error at `now_ns`, None where the window is empty."""
+        """Return the error at `now_ns`, None where the window is empty."""
         window_ns = BLOCKS * BLOCK_NS
         pairs = zip(self._begins, self._blocks, strict=True)
         fresh = [block for began_ns, block in pairs if 0 <= now_ns - began_ns <= window_ns]

@@ -46,7 +46,7 @@ class KinematicEvents:
 
 
 def foot_forward(hip: float, knee: float, trunk: float) -> float:
-    """How far the ankle is before the hip, in leg lengths; `hip` counts from a trunk leaning by `trunk`."""
+    """Return how far the ankle is before the hip, in leg lengths; `hip` is against the trunk, which leans."""
     thigh = hip - trunk
     return 0.5 * (math.sin(thigh) + math.sin(thigh - knee))
 

@@ -28,7 +28,7 @@ class RecordedGait:
 
 
 def summarise(stamps_ns: Ints, columns: Mapping[str, Floats]) -> RecordedGait:
-    """What rows of one robot show, in the order of time.
+    """Summarise rows of one robot, given in the order of time.
 
     `stamps_ns` are on the robot's monotonic clock; `columns` are as long, by channel, NaN where there is no
     value.

@@ -98,7 +98,7 @@ class ResourceProcessing:
                 self._seen(process)
 
     def top(self, limit: int = 8, by: str = "cpu") -> list[Consumer]:
-        """The greatest consumers of the last minute, by `cpu` or `memory`.
+        """Return the greatest consumers of the last minute, by `cpu` or `memory`.
 
         Raises:
             ValueError: `by` is neither.
@@ -126,7 +126,7 @@ class ResourceProcessing:
         self.devices.append(self._now_s, (*disks, *networks, hottest))
 
     def leaks(self) -> list[Leak]:
-        """The processes that surely leak, the fastest first."""
+        """Return the processes that surely leak, the fastest first."""
         found = [process.leak() for process in self._processes.values() if process.is_here(self._now_s)]
         return sorted((leak for leak in found if leak is not None), key=lambda leak: -leak.slope.value)
 
@@ -172,7 +172,7 @@ class _Process:
         self._minute.clear()
 
     def percentages(self, times: Iterable[float]) -> Floats:
-        """Its CPU at these looks."""
+        """Return its CPU at these looks."""
         known = dict(self._cpu)
         return np.array([known.get(at_s, np.nan) for at_s in times], np.float64)
 
@@ -199,7 +199,7 @@ class _Process:
 
 
 def leaking(memory: Sequence[tuple[float, float]]) -> Slope | None:
-    """The slope (bytes an hour) of memory that surely grows, from times (s) and bytes; None of other memory.
+    """Return the slope (bytes an hour) of memory that surely grows, of times (s) and bytes; else None.
 
     The 95 % interval of the Theil–Sen slope must lie above `LEAK_BYTES_PER_HOUR` over the whole and over the
     later half, so that one step up, as of a cache that is filled, is no leak.

@@ -47,11 +47,11 @@ class RobotProcessing:
                 pass  # writes and stops change nothing here
 
     def derived(self) -> Derived:
-        """What is known of wearer and joints, as of the newest row."""
+        """Return what is known of wearer and joints, as of the newest row."""
         return self.component.shown()
 
     def link(self, now_ns: int | None = None) -> LinkQuality:
-        """How well the robot is reached."""
+        """Return how well the robot is reached."""
         return self.communication.quality(time.monotonic_ns() if now_ns is None else now_ns)
 
     def _described(self, description: Description) -> None:

@@ -19,7 +19,7 @@ class Slope:
 
 
 def theil_sen(x: Floats, y: Floats) -> Slope | None:
-    """The median of the slopes between all pairs of points; None for fewer than `FEWEST` of them.
+    """Return the median of the slopes between all pairs of points; None for fewer than `FEWEST` of them.
 
     The interval is Sen's (1968, J. Am. Stat. Assoc. 63, 1379): ranks of the sorted slopes around the middle,
     by the variance of Kendall's S with its correction for ties. It takes the points' errors for independent.

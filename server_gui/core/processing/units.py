@@ -27,11 +27,11 @@ class Unit:
         return float(self.factor)
 
     def shown(self, value: float) -> Decimal:
-        """An SI value in this unit, to more digits than a float has."""
+        """Return an SI value in this unit, to more digits than a float has."""
         return _EXACT.multiply(Decimal(value), self.factor)
 
     def si_value(self, typed: Decimal | str) -> float:
-        """What was typed in this unit, as the nearest SI float.
+        """Return what was typed in this unit, as the nearest SI float.
 
         Raises:
             ValueError: it is no number, or too large or too small for a float.
@@ -119,14 +119,14 @@ class Units:
     body_mass: float | None = None
 
     def choices(self, si: str) -> tuple[Unit, ...]:
-        """What values of this SI unit can be shown in, the usual first; an unknown unit stands for itself."""
+        """Return the units to show this SI unit in, the usual first; an unknown unit stands for itself."""
         known = UNITS.get(si, (Unit(si, si, digits=3),))
         if si == "N" and self.body_mass is not None:
             return (*known, percent_body_weight(self.body_mass))
         return known
 
     def unit(self, quantity: str, si: str) -> Unit:
-        """The unit that this quantity is shown in.
+        """Return the unit that this quantity is shown in.
 
         Raises:
             ValueError: the one that was chosen cannot show it.

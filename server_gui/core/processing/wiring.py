@@ -32,7 +32,7 @@ class Wiring:
 
     @classmethod
     def of(cls, channels: Sequence[str]) -> "Wiring":
-        """The wiring of these channels, each named `component.quantity`."""
+        """Return the wiring of these channels, each named `component.quantity`."""
         fed = [(Fed(channel, component), quantity) for channel, component, quantity in map(_split, channels)]
         having = {name for name, quantity in fed if quantity == FOLLOWING_ERROR}
         told = {name.component for name in having}
@@ -62,7 +62,7 @@ class Wiring:
 
 
 def leg_of(component: str) -> Leg | None:
-    """The leg that a component is on, None where its name does not say."""
+    """Return the leg that a component is on, None where its name does not say."""
     side = component.partition("_")[0]
     return Leg(side) if side in tuple(Leg) else None
 

@@ -93,7 +93,7 @@ class Batching:
         return events
 
     def check(self, new: Notification) -> Layout:
-        """How its rows are laid out; raises as `take` would, and changes nothing."""
+        """Return how its rows are laid out; raises as `take` would, and changes nothing."""
         channels = tuple(new.batch.columns)
         layout = self._layouts.get(channels) or self._layout(channels)
         _check(new)

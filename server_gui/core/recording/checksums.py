@@ -9,7 +9,7 @@ DATA: Final = 8  # which of a run's columns is its rows; the one after it is its
 
 
 def of_layout(robot: str, description: bytes) -> int:
-    """What the checksums of a layout's runs begin with."""
+    """Return what the checksums of a layout's runs begin with."""
     return zlib.crc32(description, zlib.crc32(robot.encode()))
 
 
@@ -24,12 +24,12 @@ def of_head(robot: str, head: JournalHead) -> int:
 
 
 def unaltered(content: object, crc: int | None = None) -> bool:
-    """Whether a record is as it was written, as far as anybody knows."""
+    """Return whether a record is as it was written, as far as anybody knows."""
     return isinstance(content, bytes) and crc in (None, zlib.crc32(content))
 
 
 def is_sound(robot: str, description: bytes, *line: Any) -> bool:
-    """Whether a run is as it was written, by its layout's description and all of its columns."""
+    """Return whether a run is as it was written, by its layout's description and all of its columns."""
     data, crc = line[DATA], line[DATA + 1] if len(line) > DATA + 1 else None
     layout = of_layout(robot, description)
     return isinstance(data, bytes) and crc in (None, of_run(layout, line[:DATA], data))

@@ -112,14 +112,14 @@ class Clock:
         return found
 
     def recorded_ns(self, moment: Moment) -> int:
-        """An instant of ours in the UTC that this robot's rows have now."""
+        """Return an instant of ours in the UTC that this robot's rows have now."""
         if self._offset_ns is None:
             return moment.utc_ns
         to_utc_ns = self._now.robot_ns + self._offset_ns if self._now.known else self._base_ns
         return moment.utc_ns - moment.to_utc_ns + to_utc_ns
 
     def utc_ns(self, stamp_ns: int) -> int | None:
-        """An instant of the robot's clock in that UTC; None where no row has come."""
+        """Return an instant of the robot's clock in that UTC; None where no row has come."""
         return None if self._offset_ns is None else stamp_ns + self._offset_ns
 
     def _may_begin(self, first_ns: int, reading: Reading) -> bool:

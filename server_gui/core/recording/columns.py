@@ -65,7 +65,7 @@ class Columns:
         return taken == name and (unit is None or open_ or known == unit)
 
     def batch(self, run: Run) -> pa.RecordBatch:
-        """A run's rows."""
+        """Return a run's rows."""
         rows = len(run)
         found: dict[str, pa.Array] = {
             "robot": pa.repeat(run.robot, rows),

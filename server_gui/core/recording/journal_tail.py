@@ -18,7 +18,7 @@ class NewEntries:
 
 
 def news(entries: Sequence[Entry], head: JournalHead | None) -> NewEntries:
-    """What a tail (oldest first) says that was not known up to `head`.
+    """Return what a tail (oldest first) says that was not known up to `head`.
 
     A journal that does not hold the head, though it should, has been begun anew: then all of it is news.
     """

@@ -54,7 +54,7 @@ class Losses:
             self._found[robot][_ANY].add(rows, [utc_ns])
 
     def robots(self) -> Iterator[tuple[str, Loss, str]]:
-        """Each robot with all that it has lost, and that in words."""
+        """Yield each robot with all that it has lost, and that in words."""
         for robot, tables in self._found.items():
             whole = Loss()
             for lost in tables.values():
@@ -62,7 +62,7 @@ class Losses:
             yield robot, whole, "; ".join(_told(table, lost) for table, lost in tables.items())
 
     def lines(self) -> list[str]:
-        """A line a robot and table."""
+        """Return a line a robot and table."""
         return [f"{robot or 'no robot'}: {_told(table, lost)}" for robot, table, lost in self.each()]
 
     def join(self, others: "Losses") -> None:
@@ -85,5 +85,5 @@ def _told(table: str, lost: Loss) -> str:
 
 
 def told_time(utc_ns: int) -> str:
-    """A time for people, in UTC."""
+    """Return a time for people, in UTC."""
     return f"{datetime.fromtimestamp(utc_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S.%f}Z"

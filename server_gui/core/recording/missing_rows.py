@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
 
-from ml.store import sums, upkeep
+from ml.store import checksums, upkeep
 from ml.store.errors import translated
 from ml.store.store import Store
 from ml.store.tables import Table
@@ -31,7 +31,7 @@ def refuse(text: str) -> None:
 def of_telemetry(
     store: Store, location: str, batches: Iterable[pa.RecordBatch], hear: Hear = refuse
 ) -> list[pa.RecordBatch]:
-    """The rows of these runs that the table does not have; `hear` of one twice, or with other values.
+    """Return the rows of these runs that the table does not have; `hear` of one twice, or with other values.
 
     Raises:
         Contradicted: there is one, and nobody else wants to hear of it.
@@ -44,16 +44,16 @@ def of_telemetry(
 
 
 def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> pa.Table:
-    """The same of a batch's rows in another table."""
+    """Return the same of a batch's rows in another table."""
     mine = (_column("spool") == rows["spool"][0]) & (_column("batch") == rows["batch"][0])
     with translated(f"{store.url}/{table.name} cannot be read"):
         found = store.dataset(table.name).to_table(filter=mine)
     numbers = rows["number"].to_pylist()
     where = f"{store.url}/{table.name}"
-    known = _once(found["number"].to_pylist(), sums.of_rows(found).tolist(), where, hear)
+    known = _once(found["number"].to_pylist(), checksums.of_rows(found).tolist(), where, hear)
     wrong = [
         number
-        for number, ours in zip(numbers, sums.of_rows(rows).tolist(), strict=True)
+        for number, ours in zip(numbers, checksums.of_rows(rows).tolist(), strict=True)
         if number >= 0 and known.get(number, ours) != ours  # below: losses, as they were told the first time
     ]
     if wrong:
@@ -73,7 +73,7 @@ def by_key(store: Store, location: str, batch: pa.RecordBatch) -> pa.RecordBatch
 
 
 def newer(rows: Sequence[pa.RecordBatch], store: Store, location: str) -> list[pa.RecordBatch]:
-    """Those of them that retention does not mean to be gone; what has no time is never too old."""
+    """Return those of them that retention does not mean to be gone; what has no time is never too old."""
     until = upkeep.retained(store, location) if rows else None
     if until is None:
         return list(rows)
@@ -90,7 +90,7 @@ def name(writer: str, batch: int, rows: Sequence[pa.RecordBatch]) -> str:
 
 
 def numbers_alone(batch: pa.RecordBatch) -> tuple[pa.RecordBatch, dict[str, str]]:
-    """A run's columns of numbers, and the texts that its rows have in common."""
+    """Return a run's columns of numbers, and the texts that its rows have in common."""
     return batch.drop_columns(list(TEXTS)), {name: batch[name][0].as_py() for name in TEXTS}
 
 
@@ -98,11 +98,11 @@ def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str, h
     mine, same = numbers_alone(batch)
     found = rows.to_table(columns=mine.schema.names, filter=_like(batch)).combine_chunks()
     [theirs] = found.to_batches() or [mine.slice(0, 0)]
-    known = _once(_keys(theirs), sums.of_numbers(theirs, same).tolist(), where, hear)
+    known = _once(_keys(theirs), checksums.of_numbers(theirs, same).tolist(), where, hear)
     keys = list(_keys(mine))
     wrong = [
         key
-        for key, ours in zip(keys, sums.of_numbers(mine, same).tolist(), strict=True)
+        for key, ours in zip(keys, checksums.of_numbers(mine, same).tolist(), strict=True)
         if known.get(key, ours) != ours
     ]
     if wrong:

@@ -49,7 +49,7 @@ class Mark(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Part(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Rows of a batch in one table; of telemetry, those of one stream. `sum` is as `ml.store.sums` makes it.
+    """Rows of a batch in one table; of telemetry, those of one stream. `sum` is by `ml.store.checksums`.
 
     Their times are from `begin_us` to `end_us`, in µs since 1970; None where they have none. Receipts from
     before have none of what follows `stream`.
@@ -88,7 +88,7 @@ class Receipt(msgspec.Struct, frozen=True):
 
 
 def is_of_batch(writer: str) -> bool:
-    """Whether that is who brings batches to a store, and not events that tell something of them."""
+    """Return whether that is who brings batches to a store, and not events that tell something of them."""
     return writer.rpartition("/")[2] not in EVENT_WRITERS
 
 
@@ -136,7 +136,7 @@ class Receipts:
             raise SpoolUnusable(f"the spool's receipts {self.file} cannot be written: {reason}") from error
 
     def begun_anew(self, url: str, parts: Iterable[Part]) -> dict[str, str]:
-        """Where others went to another table than these parts: the location, and what that was called."""
+        """Return location and name of another table that others went to than these parts."""
         known = self._seen().tables.get(canonical(url), {})
         now = ((part.location, part.table) for part in parts)
         return {where: known[where] for where, table in now if known.get(where, table) != table}
@@ -149,11 +149,11 @@ class Receipts:
         return self._known
 
     def whole(self) -> Iterator[Receipt]:
-        """Those that are as they were written, oldest first."""
+        """Yield those that are as they were written, oldest first."""
         return (each for each in self.all() if isinstance(each, Receipt))
 
     def newest(self) -> Receipt | None:
-        """The last one of a batch that is as it was written and follows the line before it."""
+        """Return the last one of a batch that is as it was written and follows the line before it."""
         try:
             with self.file.open("rb") as opened:
                 _, lines = _tail(opened.fileno())
@@ -164,7 +164,7 @@ class Receipts:
         return next((each for each in found if isinstance(each, Receipt) and each.is_of_batch), None)
 
     def all(self) -> Iterator[Receipt | Altered]:
-        """Each line, oldest first."""
+        """Yield each line, oldest first."""
         before = 0
         try:
             with self.file.open("rb") as lines:
@@ -178,7 +178,7 @@ class Receipts:
 
 @functools.lru_cache(100)
 def canonical(url: str) -> str:
-    """A store's URL in one spelling."""
+    """Return a store's URL in one spelling."""
     parts = urlsplit(url)
     if parts.scheme == "file":
         return Path("/" + os.path.normpath(unquote(parts.path)).lstrip("/")).as_uri()
@@ -186,7 +186,7 @@ def canonical(url: str) -> str:
 
 
 def went_to(receipts: Iterable[Receipt], url: str) -> list[Receipt]:
-    """Those of what went to this store; however its URL is spelled, and before it was moved there."""
+    """Return those of what went to this store; however its URL is spelled, and before it was moved there."""
     all_, wanted = list(receipts), canonical(url)
     tables = {part.table for each in all_ if canonical(each.url) == wanted for part in each.parts}
     return [
@@ -223,7 +223,7 @@ class _Known:
                 self.units.setdefault(part.table, {}).update(part.units)
 
     def briefly(self, receipt: Receipt) -> Receipt:
-        """The receipt without units that were told already."""
+        """Return the receipt without units that were told already."""
         parts = [
             msgspec.structs.replace(part, units=self._new(part)) if part.units else part
             for part in receipt.parts

@@ -57,28 +57,28 @@ class Session(msgspec.Struct, frozen=True):
         return Record("sessions", fields)
 
     def amended(self, facts: Facts) -> "Session":
-        """The same session, of which more is known now."""
+        """Return the same session, of which more is known now."""
         return msgspec.structs.replace(self, facts=facts)
 
     def ended(self, utc_ns: int) -> "Session":
-        """The same session, ended at this time; never before it began."""
+        """Return the same session, ended at this time; never before it began."""
         return msgspec.structs.replace(self, ended_utc_ns=max(self.began_utc_ns, utc_ns))
 
 
 def begin(robot: str, facts: Facts) -> Session:
-    """A session that begins now; its name sorts by time."""
+    """Return a session that begins now; its name sorts by time."""
     now_ns = time.time_ns()
     name = f"{datetime.fromtimestamp(now_ns / 1e9, UTC):%Y%m%dT%H%M%SZ}-{uuid.uuid4().hex[:6]}"
     return Session(robot, name, now_ns, facts)
 
 
 def label(label: Label, *, removed: bool = False) -> Record:
-    """A row of `labels`: that the label holds, or holds no more."""
+    """Return a row of `labels`: that the label holds, or holds no more."""
     return Record("labels", label.row(time.time_ns(), removed=removed))
 
 
 def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot) -> Record:
-    """A row of `resources`: the robot's computer, with its processes."""
+    """Return a row of `resources`: the robot's computer, with its processes."""
     found = msgspec.to_builtins(snapshot)
     cpu, memory, gateway = found["cpu"], found["memory"], found["gateway"]
     more = {key: found[key] for key in MORE if key in found}
@@ -100,7 +100,7 @@ def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot)
 
 
 def journal(robot: str, entry: Mapping[str, Any]) -> Record:
-    """A row of `journal`: one entry of the robot's own journal, whole, with its hash."""
+    """Return a row of `journal`: one entry of the robot's own journal, whole, with its hash."""
     fields = {
         "robot": robot,
         "utc": entry.get("utc_ns"),

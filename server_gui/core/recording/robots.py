@@ -35,11 +35,11 @@ class Robots:
         self._told: set[tuple[str, str]] = set()  # robot and problem: each is said once
 
     def runs(self) -> list[Run]:
-        """The rows of all robots since the last time."""
+        """Return the rows of all robots since the last time."""
         return [run for robot in self._robots.values() for run in robot.runs()]
 
     def known(self, robot: str) -> Batching:
-        """One robot; a new one is known from now on."""
+        """Return one robot; a new one is known from now on."""
         return self._robots.setdefault(robot, Batching(robot))
 
     def take(self, robot: str, new: Notification) -> Iterable[Record]:
@@ -87,7 +87,7 @@ class Robots:
         return [record for robot in list(self._sessions) for record in self.end(robot, now)]
 
     def timed(self, record: Record) -> Record:
-        """A prediction with the UTC that the row has which it is about; any other record as it is."""
+        """Return a prediction with the UTC that the row has which it is about; any other record as it is."""
         robot, session, stamp_ns = (record.fields.get(name) for name in ("robot", "session", "stamp_ns"))
         known = self._robots.get(robot or "")
         if record.table != PREDICTIONS.name or known is None or stamp_ns is None:
@@ -117,12 +117,12 @@ class Robots:
         return [each for each, called in self._names.items() if called == name and each != robot]
 
     def resources(self, robot: str, now: Moment, snapshot: ResourceSnapshot) -> list[Record]:
-        """A look at the robot's computer."""
+        """Return a look at the robot's computer."""
         known = self.known(robot)
         return [records.resources(robot, known.session, known.clock.recorded_ns(now), snapshot)]
 
     def journal(self, robot: str, entries: Sequence[Entry], now: Moment) -> list[Record]:
-        """What is new in a tail of the robot's journal.
+        """Return what is new in a tail of the robot's journal.
 
         Raises:
             Unfit: it is no journal; what is recorded of it stays as it was.

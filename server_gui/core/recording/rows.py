@@ -71,7 +71,7 @@ def pack(run: Run) -> bytes:
 
 
 def unpack(robot: str, session: str, connection: str, stream: int, layout: Layout, data: bytes) -> Run:
-    """The run that was packed, or several with the same name."""
+    """Return the run that was packed, or several with the same name."""
     width = KEYS + len(layout.channels)
     rows = np.frombuffer(data, VALUE).reshape(-1, width)
     columns = np.empty((width, len(rows)), VALUE)

@@ -241,11 +241,11 @@ class Segment:
             raise
 
     def layouts(self) -> list[tuple[str, Layout]]:
-        """Each robot with each of its layouts."""
+        """Return each robot with each of its layouts."""
         return list(self._layouts)
 
     def runs(self) -> Iterator[Run]:
-        """Every row: robot by robot, connection by connection, stream by stream, in the order of `seq`.
+        """Yield every row: robot by robot, connection by connection, stream by stream, in the order of `seq`.
 
         Without the runs that are `damaged`. What follows each other with the same name and columns is one
         run, up to `ROWS_AT_ONCE`.
@@ -258,7 +258,7 @@ class Segment:
                     yield unpack(robot, session, connection, stream, layouts[layout], data)
 
     def damaged(self) -> list[DamagedRun]:
-        """The runs that are not as they were written: `runs` leaves them out."""
+        """Return the runs that are not as they were written: `runs` leaves them out."""
         with translated(self.path):
             if self._damaged is None:  # else somebody has read all of them already
                 collections.deque(self._lines(), maxlen=0)
@@ -286,18 +286,18 @@ class Segment:
         return crc is None or crc == of_run(self._sums.get(line[DATA - 1], 0), line[:DATA], data)
 
     def records(self) -> Iterator[Record]:
-        """Every record, in the order in which it was recorded; without those that are `damaged_records`."""
+        """Return every record in the order of recording, without those that are `damaged_records`."""
         return (record for _, record in self.numbered())
 
     def numbered(self) -> Iterator[tuple[int, Record]]:
-        """The same, each with its number: 0, 1, 2, …, also of those that are damaged."""
+        """Yield the same, each with its number: 0, 1, 2, …, also of those that are damaged."""
         with translated(self.path):
             for number, content, crc in self._contents():
                 if unaltered(content, crc):
                     yield number, _record_decoder.decode(content)
 
     def damaged_records(self) -> list[DamagedRecord]:
-        """The records that are not as they were written: `records` leaves them out."""
+        """Return the records that are not as they were written: `records` leaves them out."""
         with translated(self.path):
             found = [(n, content) for n, content, crc in self._contents() if not unaltered(content, crc)]
             return [DamagedRecord(number, self._whose(content)) for number, content in found]
@@ -306,7 +306,7 @@ class Segment:
         return self._database.execute("SELECT rowid - 1, content, crc FROM record ORDER BY rowid")
 
     def robots(self) -> set[str]:
-        """Every robot that something is of, or was before."""
+        """Return every robot of which something is recorded, now or before."""
         told = {str(record.fields["robot"]) for record in self.records() if record.fields.get("robot")}
         return {robot for robot, _ in self._layouts} | told | self._heads()[0].keys()
 
@@ -319,7 +319,7 @@ class Segment:
         return tuple(sorted(known))
 
     def heads(self) -> dict[str, JournalHead]:
-        """The newest journal entry of each robot that is known here.
+        """Return the newest journal entry of each robot that is known here.
 
         Where one is not as it was written, that is the newest of the entries that are here themselves.
         """
@@ -350,7 +350,7 @@ class Segment:
 
     @staticmethod
     def size_bytes(path: Path) -> int:
-        """What the database's files take on the disk."""
+        """Return what the database's files take on the disk."""
         size = 0
         for suffix in SUFFIXES:
             with contextlib.suppress(FileNotFoundError):  # SQLite removes its log when it is closed

@@ -158,7 +158,7 @@ class Spool:
     # --- any thread
 
     def earlier_writers(self) -> set[str]:
-        """What the openings before this one were called at the store, as far as anybody knows."""
+        """Return what the openings before this one were called at the store, as far as anybody knows."""
         newest = self.receipts.newest()
         return (self._writers | ({newest.writer} if newest else set())) - {self.writer}
 
@@ -168,7 +168,7 @@ class Spool:
         return [number for number in self._files.all_of(Kept.WAITING) if number < written]
 
     def read(self, number: int) -> Segment:
-        """A frozen segment; close it after use.
+        """Return a frozen segment; close it after use.
 
         Raises:
             Damaged: it cannot be read, or holds nothing: one that holds nothing is never frozen.
@@ -193,7 +193,7 @@ class Spool:
         self._files.rename(number, Kept.UPLOADED)
 
     def set_aside(self, number: int) -> Path:
-        """The segment cannot be read: it waits no longer, so that those after it are uploaded; its file."""
+        """Set aside a segment that cannot be read, so that those after it are uploaded; return its file."""
         self._files.rename(number, Kept.DAMAGED)
         return self._files.path(number, Kept.DAMAGED)
 
@@ -241,11 +241,11 @@ class Spool:
         self._settled |= found & known
 
     def is_aside(self, number: int) -> bool:
-        """Whether the segment was set aside, and is still there."""
+        """Return whether the segment was set aside, and is still there."""
         return self._files.path(number, Kept.DAMAGED).exists()
 
     def loss_name(self, number: int) -> str:
-        """What the loss of this batch is called at the store: the same whoever tells it how often.
+        """Return what the loss of this batch is called at the store: the same whoever tells it how often.
 
         Where an older copy of the spool takes its place, and a batch is lost under the number again, it is
         another. Raises `SpoolUnusable`.
@@ -258,7 +258,7 @@ class Spool:
         self._settled.add(number)
 
     def robots_beside(self, number: int) -> set[str]:
-        """Whose rows a batch that is lost may have had: those that the ones before and after it know."""
+        """Return whose rows a lost batch may have had: the robots of the batches before and after it."""
         found: set[str] = set()
         for beside, kept in self._files.own():
             if abs(beside - number) == 1 and kept is not Kept.DAMAGED and beside < self._current.number:
@@ -272,7 +272,7 @@ class Spool:
         return found
 
     def backlog_bytes(self) -> int:
-        """What waits for upload, with what is being written."""
+        """Return what waits for upload, with what is being written."""
         return sum(
             Segment.size_bytes(self._files.path(number)) for number in self._files.all_of(Kept.WAITING)
         )

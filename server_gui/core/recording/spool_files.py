@@ -51,7 +51,7 @@ class Files:
         self.folder = folder
 
     def path(self, number: int, kept: Kept = Kept.WAITING) -> Path:
-        """Where a segment is, or would be."""
+        """Return where a segment is, or would be."""
         return self.folder / f"{number:08}{kept.value}.db"
 
     def rename(self, number: int, kept: Kept) -> None:
@@ -72,7 +72,7 @@ class Files:
                 self.rename(number, kept)
 
     def segments(self) -> list[tuple[int, Kept]]:
-        """Their numbers, in order, and what has become of them; raises `SpoolUnusable`."""
+        """Return their numbers, in order, and what has become of them; raises `SpoolUnusable`."""
         try:
             names = [_NAME.fullmatch(path.name) for path in self.folder.iterdir()]
         except OSError as error:
@@ -82,11 +82,11 @@ class Files:
         return sorted(found, key=lambda each: (each[0], each[1].value))
 
     def own(self) -> list[tuple[int, Kept]]:
-        """The segments themselves, without copies."""
+        """Return the segments themselves, without copies."""
         return [(number, kept) for number, kept in self.segments() if kept is not Kept.CUT]
 
     def all_of(self, wanted: Kept) -> list[int]:
-        """The numbers of those of which this has become."""
+        """Return the numbers of those of which this has become."""
         return [number for number, kept in self.segments() if kept is wanted]
 
     def identify(self, name: str) -> None:
@@ -94,7 +94,7 @@ class Files:
         self._write("id", name)
 
     def name_loss(self, number: int, name: str) -> str:
-        """What the loss of this batch is called at the store; `name` where it has no name yet."""
+        """Return what the loss of this batch is called at the store; `name` where it has no name yet."""
         file = self.folder / f"{number:08}.lost"
         known = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
         if not _LOSS.fullmatch(known):
@@ -153,7 +153,7 @@ class Files:
 
 
 def identity(folder: Path) -> str:
-    """What the spool in this folder is called; nothing where there is none, or its `id` is damaged.
+    """Return what the spool in this folder is called; nothing where there is none, or its `id` is damaged.
 
     Raises:
         SpoolUnusable: it may not be read.
@@ -171,7 +171,7 @@ def identity(folder: Path) -> str:
 
 
 def is_identity(name: str) -> bool:
-    """Whether a spool may be called so."""
+    """Return whether a spool may be called so."""
     return _ID.fullmatch(name) is not None
 
 
@@ -186,13 +186,13 @@ def writing(folder: Path) -> Iterator[None]:
 
 
 def has_log(file: Path) -> bool:
-    """Whether something was written to a database and is not in its file yet."""
+    """Return whether something was written to a database and is not in its file yet."""
     log_ = file.with_name(f"{file.name}-wal")
     return log_.exists() and log_.stat().st_size > 0
 
 
 def take(folder: Path) -> IO[bytes]:
-    """The folder's lock, which ends with the process, however that ends."""
+    """Take the folder's lock, which ends with the process, however that ends."""
     try:
         closed_folder(folder)
         lock = open(folder / "lock", "ab", opener=opener)  # noqa: SIM115 - held as long as the spool

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from ml.store import sums
+from ml.store import checksums
 from ml.store.tables import UTC
 from server_gui.core.recording.missing_rows import numbers_alone
 from server_gui.core.recording.receipts import Mark, Part, Stream
@@ -25,10 +25,10 @@ _MOST: Final = 4  # marks of a part, where they are less than a minute apart
 _Name = tuple[str, str, str, int]  # robot, session, connection, stream
 
 
-def named(batch: pa.RecordBatch, naming: Sequence[str]) -> sums.Sums:
-    """A number a row of what names it, whatever type somebody may have given that."""
+def named(batch: pa.RecordBatch, naming: Sequence[str]) -> checksums.Sums:
+    """Return a number a row of what names it, whatever type somebody may have given that."""
     columns = [batch[name].cast(pa.int64()) for name in naming]
-    return sums.of_numbers(pa.record_batch(columns, names=list(naming)), {})
+    return checksums.of_numbers(pa.record_batch(columns, names=list(naming)), {})
 
 
 def times_us(column: pa.Array | pa.ChunkedArray) -> npt.NDArray[np.int64]:
@@ -43,7 +43,7 @@ class _Times:
 
     _found: dict[int, tuple[int, int]] = field(default_factory=dict)
 
-    def add(self, times: npt.NDArray[np.int64], each: sums.Sums) -> None:
+    def add(self, times: npt.NDArray[np.int64], each: checksums.Sums) -> None:
         places, which = np.unique(times // _WIDTHS_US[0], return_inverse=True)
         totals = np.zeros(len(places), np.uint64)
         np.add.at(totals, which, each)
@@ -64,7 +64,7 @@ class _Times:
         for place, before in itertools.pairwise(begins):
             rows, total = rows + self._found[place][0], total + self._found[place][1]
             if before // width < place // width:
-                marks.append(Mark(place // width * width * _WIDTHS_US[0], rows, sums.told(total)))
+                marks.append(Mark(place // width * width * _WIDTHS_US[0], rows, checksums.told(total)))
         return tuple(reversed(marks))
 
 
@@ -100,24 +100,24 @@ class Tally:
         known = self._streams.setdefault(name, _Counted(*ends))
         known.first, known.last = min(known.first, ends[0]), max(known.last, ends[1])
         known.begin_us, known.end_us = min(known.begin_us, ends[2]), max(known.end_us, ends[3])
-        each = sums.of_numbers(mine, same)
+        each = checksums.of_numbers(mine, same)
         known.rows += batch.num_rows
         known.sum += int(each.sum(dtype=np.uint64))
         known.names += int(named(batch, NAMING).sum(dtype=np.uint64))
         known.times.add(times, each)
 
     def parts(self, location: str, table: str, units: Units) -> list[Part]:
-        """What was counted, the first with the units of the columns."""
+        """Return what was counted, the first with the units of the columns."""
         found = [
             Part(
                 location,
                 table,
                 each.rows,
-                sums.told(each.sum),
+                checksums.told(each.sum),
                 each.begin_us,
                 each.end_us,
                 Stream(*name, each.first, each.last),
-                sums.told(each.names),
+                checksums.told(each.names),
                 each.times.marks(),
             )
             for name, each in self._streams.items()
@@ -128,17 +128,17 @@ class Tally:
 def tallied(rows: pa.Table, location: str, table: str, units: Units) -> Part:
     """Of a batch's rows of another table."""
     extent = pc.min_max(rows["utc"].cast(pa.int64())).as_py()
-    each, timed, times = sums.of_rows(rows), rows["utc"].is_valid().to_numpy(), _Times()
+    each, timed, times = checksums.of_rows(rows), rows["utc"].is_valid().to_numpy(), _Times()
     times.add(times_us(rows["utc"])[timed], each[timed])
     numbers = sum(int(named(batch, NUMBER).sum(dtype=np.uint64)) for batch in rows.to_batches())
     return Part(
         location,
         table,
         rows.num_rows,
-        sums.told(int(each.sum(dtype=np.uint64))),
+        checksums.told(int(each.sum(dtype=np.uint64))),
         extent["min"],
         extent["max"],
-        names=sums.told(numbers),
+        names=checksums.told(numbers),
         marks=times.marks(),
         units=dict(units),
     )

@@ -284,7 +284,7 @@ class _Lost:
     data: dict[str, int]
 
     def records(self, utc_ns: int) -> Iterator[tuple[int, Record]]:
-        """The events that tell it, one a robot."""
+        """Yield the events that tell it, one a robot."""
         for place, robot in enumerate(self.robots or ("",)):
             fields = {
                 "robot": robot,

@@ -37,7 +37,7 @@ class _Frame(NamedTuple):
 
 
 def lost_commits(log: Path, page_bytes: int) -> int:
-    """How many commits of this log SQLite will not read, because something before or in them is damaged.
+    """Count the commits of this log that SQLite will not read, for damage in or before them.
 
     Without the newest, where nothing says that it was synchronised: it was under way when the power went.
     0 where there is no log, or all of it is whole. `page_bytes` is for a log whose header is damaged.

@@ -43,7 +43,7 @@ def change(file: Path, changes: Changes) -> None:
 
 
 def changed(text: str, changes: Changes) -> str:
-    """The TOML document with these values; all else, comments and layout too, stays as it was.
+    """Return the TOML document with these values; all else, comments and layout too, stays as it was.
 
     Raises:
         SettingsError: a value is no number that can be meant.

@@ -71,7 +71,7 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
         return RELEASE * self.at_least if self.release is None else self.release
 
     def concerns(self, robot: str) -> bool:
-        """Whether it is about this robot."""
+        """Return whether it is about this robot."""
         return fnmatchcase(robot, self.robot)
 
 

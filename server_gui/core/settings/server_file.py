@@ -137,13 +137,13 @@ def load(path: Path | None = None) -> ServerSettings:
 
 
 def add_robots(settings: ServerSettings, robots: dict[str, str]) -> ServerSettings:
-    """The same settings with further robots, or other addresses for some; raises `SettingsError`."""
+    """Return the same settings with further robots, or other addresses for some; raises `SettingsError`."""
     known = {name: robot.address for name, robot in settings.robots.items()}
     return msgspec.structs.replace(settings, robots=_robots(known | robots))
 
 
 def name_of(address: str) -> str:
-    """A name in the store for a robot of which only the address is known."""
+    """Return a name in the store for a robot of which only the address is known."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", address).strip("-.")
 
 

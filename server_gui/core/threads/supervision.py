@@ -75,11 +75,11 @@ class Worker:
         return not self.is_alive()
 
     def is_alive(self) -> bool:
-        """Whether it runs."""
+        """Return whether it runs."""
         return self._thread is not None and self._thread.is_alive()
 
     def look(self) -> Trouble | None:
-        """What is wrong with it now; where it has died, it is begun anew."""
+        """Return what is wrong with it now; where it has died, it is begun anew."""
         with self._lock:
             return self._look(time.monotonic())
 
@@ -128,7 +128,7 @@ class ThreadWatch:
             self._workers += (worker,)
 
     def look(self) -> tuple[Trouble, ...]:
-        """What is wrong now; what has begun or is over since the last time is said in the log."""
+        """Return what is wrong now; what has begun or is over since the last time is said in the log."""
         with self._lock:
             found = {worker.name: trouble for worker in self._workers if (trouble := worker.look())}
             for name, trouble in found.items():

@@ -25,7 +25,7 @@ class Commands(Protocol):
         ...
 
     def write(self, changes: Mapping[str, float], trial_s: float | None) -> "Future[Written]":
-        """One transaction, read back; takes control first."""
+        """Write in one transaction, read back; take control first."""
         ...
 
     def confirm(self, write: int) -> "Future[Confirmed]":

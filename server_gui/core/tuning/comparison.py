@@ -43,7 +43,7 @@ class Comparison:
 
 
 def open_file(path: Path, description: Description, component: str | None) -> Comparison:
-    """What a file says of this robot; `component` is the device that a DCF is for where it does not say.
+    """Read what a file says of this robot; `component` is the device that a DCF is for where it does not say.
 
     Raises:
         FileProblem: it cannot be read, or is another device's.
@@ -80,5 +80,5 @@ def save_file(path: Path, description: Description, held: Held) -> int:
 
 
 def staged_as(rows: Iterable[Row]) -> dict[str, float]:
-    """What is staged to bring these about: each value as the device would hold it."""
+    """Return what is staged to bring these about: each value as the device would hold it."""
     return {row.name: row.file for row in rows if row.file is not None}

@@ -76,7 +76,7 @@ class Edits:
     def difference(
         self, held: Values, known: Mapping[str, ParameterInfo], units: Units
     ) -> tuple[Change, ...]:
-        """What would be written, and nothing else, in the robot's order of parameters."""
+        """Return what would be written, and nothing else, in the robot's order of parameters."""
         order = {name: place for place, name in enumerate(known)}
         names = sorted(self.staged, key=lambda name: order.get(name, len(order)))
         changes = (self._change(name, held.get(name), known.get(name), units) for name in names)
@@ -99,7 +99,7 @@ class Edits:
 
 
 def unit_of(name: str, si: str, units: Units) -> Unit:
-    """The unit that a parameter `component.quantity` is shown in."""
+    """Return the unit that a parameter `component.quantity` is shown in."""
     return units.unit(name.partition(".")[2], si)
 
 

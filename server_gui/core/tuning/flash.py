@@ -28,7 +28,7 @@ class Claim:
 
 
 def devices(description: Description) -> dict[str, Device]:
-    """Which device each component is, by bus and node: axes of one node store together."""
+    """Return which device each component is, by bus and node: axes of one node store together."""
     found: dict[str, Device] = {}
     for part in description.components:
         about = part.device if isinstance(part.device, dict) else {}
@@ -38,7 +38,7 @@ def devices(description: Description) -> dict[str, Device]:
 
 
 def claims(entries: Iterable[Entry], device_of: Mapping[str, Device]) -> dict[str, Claim]:
-    """What entries without a hole, oldest first, show of each parameter: its last write, stored since."""
+    """Return each parameter's last write, and whether it was stored since, of entries without a hole."""
     reading = _Reading(device_of)
     for entry in entries:
         effect = _EFFECTS.get(str(entry.get("what")))
@@ -135,7 +135,7 @@ class Flash:
         self._since.clear()
 
     def holds(self, name: str, value: Number, description: Description) -> bool:
-        """Whether this value is stored; False is *unknown*."""
+        """Return whether this value is stored; False is *unknown*."""
         if self._claimed != (self._audit.revision, description):
             self._claimed = self._audit.revision, description
             self._claims = claims(self._audit.unbroken(), devices(description))

@@ -27,7 +27,7 @@ class StopProgress:
     number: int = 0
 
     def sent(self) -> int:
-        """A STOP has gone out; its number."""
+        """Note that a STOP has gone out, and return its number."""
         self.number += 1
         self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", time.monotonic_ns()
         return self.number

@@ -25,7 +25,7 @@ class Storable:
 
 
 def storable(description: Description) -> list[Storable]:
-    """The devices whose EDS has the command, in the robot's order."""
+    """Return the devices whose EDS has the command, in the robot's order."""
     device_of = devices(description)
     told = [info for info in description.parameters if info.store]
     found = dict.fromkeys(device_of.get(info.component) for info in told)

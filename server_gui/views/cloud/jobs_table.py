@@ -100,7 +100,7 @@ def _centred(bar: QProgressBar) -> QWidget:
 
 
 def progress_text(job: Job) -> str:
-    """How far a job is, in its own unit."""
+    """Return how far a job is, in its own unit."""
     if job.total is None:
         return job.state.value
     if job.unit == "bytes":
@@ -115,5 +115,5 @@ def _steps(job: Job) -> int:
 
 
 def under_way(jobs: Sequence[Job]) -> int:
-    """How many are not over."""
+    """Return how many are not over."""
     return sum(not job.is_over for job in jobs)

@@ -228,7 +228,7 @@ class Cloud(QWidget):
         ask_folder(self, "Download into a folder", lambda folder: self.download_to(folder, wanted))
 
     def download_to(self, folder: Path, wanted: Sequence[Session]) -> None:
-        """The store, or these sessions of it, in the background."""
+        """Download the store, or these sessions of it, in the background."""
         what = wanted[0].session if wanted else "the store"
         self._archive.jobs.add(f"Download {what}", download(self._archive.settings.store.url, folder, wanted))
 

@@ -79,7 +79,7 @@ class Detail(Card):
         self.body.addWidget(self._brief)
 
     def be_short(self, is_short: bool) -> None:
-        """Where there is little room: seen when one is chosen; one line says what is known, its tip all."""
+        """Take little room: seen when one is chosen; one line says what is known, its tip all."""
         self._is_short = is_short
         self._facts.setVisible(not is_short)
         self._brief.setVisible(is_short)
@@ -156,7 +156,7 @@ class Detail(Card):
 
 
 def reach(info: ParameterInfo, current: Number | None) -> tuple[float, float] | None:
-    """What one write can reach, in SI; None where there are no limits."""
+    """Return what one write can reach, in SI; None where there are no limits."""
     if info.min is None or info.max is None or info.max <= info.min:
         return None
     if info.max_step is None or current is None:

@@ -82,7 +82,7 @@ class ParametersPanel(QWidget):
             self.storing.refresh()
 
     def be_short(self, is_short: bool) -> None:
-        """Where there is little room, what is done seldom is behind one button."""
+        """Put what is done seldom behind one button, where there is little room."""
         self.more.setVisible(is_short)
         for button in self._seldom:
             button.setVisible(not is_short)

@@ -96,7 +96,7 @@ class Review(QWidget):
         everything.addLayout(row)
 
     def show_changes(self, changes: tuple[Change, ...]) -> None:
-        """What would be written from now on."""
+        """Show what would be written from now on."""
         self.changes = changes
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):

@@ -260,19 +260,19 @@ class ParameterTree(QTreeView):
 
 
 def range_text(info: ParameterInfo, unit: Unit) -> str:
-    """The smallest and largest that are allowed, in four digits."""
+    """Return the smallest and the largest value that are allowed, in four digits."""
     low = "" if info.min is None else f"{info.min * unit.scale:.4g}"
     high = "" if info.max is None else f"{info.max * unit.scale:.4g}"
     return f"{low} … {high}" if low or high else "–"
 
 
 def brief(unit: Unit, value: float) -> str:
-    """For reading in a narrow column: six digits; editing and tooltips have them all."""
+    """Return six digits, for a narrow column; editing and tooltips have them all."""
     return f"{value * unit.scale:.6g}"
 
 
 def exact(unit: Unit, value: float | None) -> str:
-    """Every digit."""
+    """Return every digit."""
     return "" if value is None else unit.editable(value)
 
 

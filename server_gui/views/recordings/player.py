@@ -67,14 +67,14 @@ class Player(QWidget):
         everything.addWidget(self.labels)
 
     def show_tape(self) -> None:
-        """The playback has another recording."""
+        """Show another recording."""
         if self._playback.tape is not None:
             self.timeline.show_tape(self._playback.tape)
             self.timeline.setFocus()
             self._speed.setCurrentIndex(SPEEDS.index(self._playback.speed))
 
     def refresh(self) -> None:
-        """A frame: go on playing, and draw."""
+        """Go on playing, and draw a frame."""
         playback = self._playback
         playback.step()
         if playback.tape is None:
@@ -176,7 +176,7 @@ class Player(QWidget):
         ask_save(self, f"Export as {kind.upper()}", kind, lambda file: self.export_to(kind, file))
 
     def export_to(self, kind: str, file: Path) -> None:
-        """The chosen span, or all of it, in the background."""
+        """Export the chosen span, or all of it, in the background."""
         tape, span = self._playback.tape, self.timeline.span_ns
         if tape is None:
             return

@@ -56,19 +56,19 @@ class Timeline(QWidget):
         return QSize(400, self._theme.px(66))
 
     def show_tape(self, tape: Tape) -> None:
-        """Another recording."""
+        """Show another recording."""
         self._tape, self._labels, self.span_ns = tape, (), None
         self.show_position(tape.first_ns)
 
     def show_position(self, position_ns: int) -> None:
-        """Where it is played."""
+        """Show where it is played."""
         if position_ns != self._position_ns:
             self._position_ns = position_ns
             self.setAccessibleDescription(clock_text(self._since_s(position_ns)))
             self.update()
 
     def show_labels(self, labels: Sequence[Label]) -> None:
-        """What somebody says of it."""
+        """Show its labels."""
         self._labels = labels
         self.update()
 
@@ -79,19 +79,19 @@ class Timeline(QWidget):
         self.update()
 
     def begin_span(self) -> None:
-        """The span begins where it is played."""
+        """Begin the span where it is played."""
         if self._tape is not None:
             end_ns = self._tape.last_ns if self.span_ns is None else self.span_ns[1]
             self.choose(self._position_ns, max(end_ns, self._position_ns))
 
     def end_span(self) -> None:
-        """The span ends where it is played."""
+        """End the span where it is played."""
         if self._tape is not None:
             begin_ns = self._tape.first_ns if self.span_ns is None else self.span_ns[0]
             self.choose(min(begin_ns, self._position_ns), self._position_ns)
 
     def choose_all(self) -> None:
-        """The span is the whole recording."""
+        """Choose the whole recording."""
         if self._tape is not None:
             self.choose(self._tape.first_ns, self._tape.last_ns)
 
@@ -224,5 +224,5 @@ def clock_text(seconds: float, digits: int = 0) -> str:
 
 
 def day_text(instant_ns: int) -> str:
-    """A day and time of the clock on the wall here."""
+    """Return day and time by the local clock."""
     return f"{datetime.fromtimestamp(instant_ns / 1e9, UTC).astimezone():%Y-%m-%d %H:%M:%S}"

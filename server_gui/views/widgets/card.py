@@ -38,7 +38,7 @@ class Card(QFrame):
         return self._note.text()
 
     def set_note(self, text: str) -> None:
-        """What stands at the right of the title."""
+        """Set the note at the right of the title."""
         set_text(self._note, text)
 
 

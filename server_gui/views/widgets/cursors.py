@@ -32,7 +32,7 @@ class Cursors(QWidget):
             self.update()
 
     def near(self, x: float) -> int | None:
-        """The cursor that is at this place of ours, in pixels."""
+        """Return the cursor that is at this place of ours, in pixels."""
         found = [(abs(share * self.width() - x), place) for place, share in enumerate(self._at)]
         distance, place = min(found, default=(NEAR_PX + 1, 0))
         return place if distance <= NEAR_PX else None

@@ -13,7 +13,7 @@ from gateway.plain import plain
 def ask_open(
     parent: QWidget, title: str, kinds: Sequence[str], done: Callable[[Path], object]
 ) -> QFileDialog:
-    """A file that is there, of these kinds (`toml`, `dcf`)."""
+    """Ask for a file that is there, of these kinds (`toml`, `dcf`)."""
     dialog = _dialog(parent, title, kinds, done)
     dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptOpen)
     dialog.show()
@@ -21,7 +21,7 @@ def ask_open(
 
 
 def ask_save(parent: QWidget, title: str, kind: str, done: Callable[[Path], object]) -> QFileDialog:
-    """A file to be written; whether one may be overwritten is asked."""
+    """Ask for a file to be written, and whether one may be overwritten."""
     dialog = _dialog(parent, title, (kind,), lambda path: _unless_there(parent, path, done))
     dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
     dialog.setDefaultSuffix(kind)
@@ -30,7 +30,7 @@ def ask_save(parent: QWidget, title: str, kind: str, done: Callable[[Path], obje
 
 
 def ask_folder(parent: QWidget, title: str, done: Callable[[Path], object]) -> QFileDialog:
-    """A folder, which may be a new one."""
+    """Ask for a folder, which may be a new one."""
     dialog = _dialog(parent, title, (), done)
     dialog.setFileMode(QFileDialog.FileMode.Directory)
     dialog.setOption(QFileDialog.Option.ReadOnly, on=False)

@@ -11,7 +11,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from server_gui.core.desk.walk import PHASES, LegPhase
+from server_gui.core.desk.leg_phase import PHASES, LegPhase
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.theme import Theme
 

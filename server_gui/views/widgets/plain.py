@@ -25,7 +25,7 @@ class Tipped(Protocol):
     """What can have a tool tip: a widget, an action, an item."""
 
     def toolTip(self) -> str:
-        """What is shown where the pointer rests."""
+        """Return what is shown where the pointer rests."""
         ...
 
     def setToolTip(self, text: str) -> None:

@@ -112,7 +112,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         return QSize(200, 80)
 
     def set_seconds(self, seconds: float) -> None:
-        """How much of the past is shown."""
+        """Set how much of the past is shown."""
         self.seconds = seconds
         self.getViewBox().setLimits(xMin=-seconds, xMax=0.0)
         self.show_window(-seconds, 0.0)
@@ -133,12 +133,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         box.setMouseMode(box.RectMode if on else box.PanMode)
 
     def show_cursors(self, at: tuple[float, ...], active: int) -> None:
-        """Two cursors at these times (s until the newest row), or none."""
+        """Show two cursors at these times (s until the newest row), or none."""
         self._at, self._active = at, active
         self._mark()
 
     def set_curves(self, curves: Sequence[Curve]) -> None:
-        """Which lines there are."""
+        """Set which lines there are."""
         if list(curves) == list(self._curves):
             return
         self._curves = tuple(curves)
@@ -257,7 +257,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 
 
 def css(theme: Theme, name: str) -> str:
-    """A curve's colour for texts."""
+    """Return a curve's colour for texts."""
     return _colour(theme, name).name()
 
 

@@ -61,7 +61,7 @@ class PressureMap(QWidget):
         return QSize(100, 230)
 
     def set_cells(self, cells: tuple[Cell, ...] | None) -> None:
-        """Where the cells are (m); None where nobody knows. A larger foot is drawn as large as this one."""
+        """Set where the cells are (m), None where nobody knows. A larger foot is drawn as large as this."""
         self._size = size_of(cells or ())
         self._cells = None if cells is None else tuple((x / self._size, y / self._size) for x, y in cells)
         self._weights = None if self._cells is None else weights(self._cells)
@@ -169,7 +169,7 @@ class PressureMap(QWidget):
 
 
 def size_of(cells: Sequence[Cell]) -> float:
-    """How much larger than the outline a foot with these cells is; 1 where they are within it."""
+    """Return how much larger than the outline a foot with these cells is; 1 where they are within it."""
     return max([1.0, *(x / FARTHEST_M for x, _ in cells), *(abs(y) / WIDEST_M for _, y in cells)])
 
 
@@ -194,7 +194,7 @@ def colour_table() -> list[int]:
 
 
 def outline(sign: float) -> QPainterPath:
-    """The sole's edge in m, as it is drawn; `sign` is −1 for a right foot."""
+    """Return the sole's edge in m, as it is drawn; `sign` is −1 for a right foot."""
     points = [QPointF(-sign * y / 1000, -x / 1000) for x, y in OUTLINE]
     path = QPainterPath((points[-1] + points[0]) / 2)
     for here, following in zip(points, [*points[1:], points[0]], strict=True):

@@ -113,7 +113,7 @@ class Strip:
 
 
 def samples(times: Floats, values: Floats, scale: float, *, begins: bool) -> tuple[Floats, Floats]:
-    """The lines between the points, at places that are the same whenever they are drawn.
+    """Return the lines between the points, at places that are the same whenever they are drawn.
 
     The last point is one of them, and the first where nothing was before it.
     """

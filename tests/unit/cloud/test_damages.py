@@ -18,7 +18,7 @@ from gateway.main import main
 from ml.store import Store
 from ml.store.tables import RESOURCES, TABLES, TELEMETRY
 from ml.store.upkeep import compact, retain, vacuum
-from server_gui.core.cloud import spooled, verify
+from server_gui.core.cloud import spool_reader, verify
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.receipts import RECEIPTS
 from server_gui.core.recording.recorder import Recorder
@@ -292,14 +292,14 @@ def test_a_batch_that_goes_to_the_store_while_somebody_looks_is_no_problem(
 def test_a_second_copy_that_goes_while_somebody_looks_is_no_problem(
     place: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    listed = spooled.uploaded
+    listed = spool_reader.uploaded
 
     def late(spool: Path) -> list[int]:
         found = listed(spool)
         (spool / "00000001.uploaded.db").unlink(missing_ok=True)
         return found
 
-    monkeypatch.setattr(spooled, "uploaded", late)
+    monkeypatch.setattr(spool_reader, "uploaded", late)
     assert place.verify() == (0, "")
 
 

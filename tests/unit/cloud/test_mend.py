@@ -13,7 +13,7 @@ from ml.store.errors import StoreError
 from ml.store.tables import TELEMETRY
 from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import mend, verify
-from server_gui.core.cloud.again import Again
+from server_gui.core.cloud.repeated_upload import Again
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.recording.spool import Spool
 from tests.unit.cloud.damages import (

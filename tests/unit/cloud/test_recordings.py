@@ -65,7 +65,7 @@ def test_what_only_the_spool_has_is_exported_as_from_the_store(folder_url: str, 
         assert whole.waiting == (BATCHES * ROWS if name == "waiting" else 0)
         assert {each.name: each.unit for each in whole.channels} == UNITS
         assert {each.samples for each in whole.channels} == {BATCHES * ROWS}
-        assert [row["kind"] for row in known.happenings(whole.session)] == ["gap", "marker"]
+        assert [row["kind"] for row in known.rows_of(whole.session)] == ["gap", "marker"]
         assert [row["label"] for row in known.labels(whole.session)] == ["walk"]
         with Spool(tmp_path / "spool") as spool:
             for number in spool.waiting():
@@ -87,7 +87,7 @@ def test_a_session_half_in_the_store_is_whole_and_every_row_is_there_once(
             whole = sole(known := Recordings(folder_url, spool.folder))
             assert len(values(whole)) == whole.session.rows
             assert {each.samples for each in whole.channels} == {whole.session.rows}
-            assert [row["text"] for row in known.happenings(whole.session) if row["kind"] == "marker"] == [
+            assert [row["text"] for row in known.rows_of(whole.session) if row["kind"] == "marker"] == [
                 f"{6 * each + 5}" for each in range(piece + 1)
             ]
 
@@ -109,7 +109,7 @@ def test_a_batch_that_a_later_one_has_overtaken_is_read_in_the_spool(folder_url:
                 whole = sole(known := Recordings(folder_url, spool.folder))
                 assert len(values(whole)) == whole.session.rows == 11 * ROWS
                 assert whole.waiting == 6 * ROWS
-                texts = [row["text"] for row in known.happenings(whole.session) if row["kind"] == "marker"]
+                texts = [row["text"] for row in known.rows_of(whole.session) if row["kind"] == "marker"]
                 assert texts == ["5", "11"]
                 assert whole.session.operator == "anna"
 
@@ -126,7 +126,7 @@ def test_what_is_uploaded_while_somebody_reads_is_there_once(folder_url: str, tm
     for known in (before, Recordings(folder_url, tmp_path / "spool")):
         whole = sole(known)
         assert sorted(values(whole)) == ALL
-        assert len(known.happenings(whole.session, EVENTS)) == 2
+        assert len(known.rows_of(whole.session, EVENTS)) == 2
 
 
 def test_what_was_removed_while_somebody_reads_is_not_left_out_silently(
@@ -250,5 +250,5 @@ def test_records_are_read_also_where_the_column_of_their_numbers_has_lost_its_ty
     [file] = [each for each in (tmp_path / "spool").glob("0*.db") if b"marker" in each.read_bytes()]
     file.write_bytes(file.read_bytes().replace(b"number INTEGER", b"number INTEFER"))
     known = Recordings(folder_url, tmp_path / "spool")
-    assert [row["kind"] for row in known.happenings(sole(known).session)] == ["gap", "marker"]
+    assert [row["kind"] for row in known.rows_of(sole(known).session)] == ["gap", "marker"]
     assert [row["label"] for row in known.labels(sole(known).session)] == ["walk"]

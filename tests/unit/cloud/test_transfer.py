@@ -13,7 +13,7 @@ from ml.store.objects import Object, Objects
 from ml.store.sessions import find, sessions, telemetry
 from ml.store.tables import EVENTS, TELEMETRY, field
 from ml.store.upkeep import Pin, compact, pin, pins
-from server_gui.core.cloud import parts, transfer
+from server_gui.core.cloud import partial_copy, transfer
 from server_gui.core.cloud.transfer import Copied
 from tests.stores import SeaweedFS
 from tests.unit.cloud.recordings import BATCHES, ROWS, record
@@ -192,19 +192,19 @@ def test_sessions_are_copied_alone_with_everything_that_belongs_to_them(
     target = Store((tmp_path / "part").as_uri())
     wanted = [find(first.store, first.session)]
     for again in (BATCHES * ROWS, 0):  # the second time it is there
-        assert parts.copy(first.store, target, wanted, (), lambda _: None) == again
+        assert partial_copy.copy(first.store, target, wanted, (), lambda _: None) == again
         assert [session.session for session in sessions(target)] == [first.session]
         assert values(target, first.session) == values(first.store, first.session)
         assert target.dataset("events").count_rows() == 2
         assert target.dataset("labels").count_rows() == 1
         assert target.units("telemetry/000")[KNEE] == "rad"
-    parts.copy(first.store, target, [find(first.store, second.session)], {"exo-02"}, lambda _: None)
+    partial_copy.copy(first.store, target, [find(first.store, second.session)], {"exo-02"}, lambda _: None)
     assert sorted(session.robot for session in sessions(target)) == ["exo-01", "exo-02"]
     assert target.dataset("events").count_rows() == 4
 
 
 def all_of(source: Store, target: Store, robot: str = "exo-01") -> int:
-    return parts.copy(source, target, sessions(source, robot), {robot}, lambda _: None)
+    return partial_copy.copy(source, target, sessions(source, robot), {robot}, lambda _: None)
 
 
 def test_a_robots_rows_of_two_stores_come_together_in_one_folder(store_url: str, tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_other_contents_by_the_same_name_are_refused_and_nothing_is_copied(
     recorded = record(folder_url, tmp_path / "spool")
     record(folder_url, tmp_path / "later")
     target = Store((tmp_path / "part").as_uri())
-    parts.copy(recorded.store, target, [find(recorded.store, recorded.session)], (), lambda _: None)
+    partial_copy.copy(recorded.store, target, [find(recorded.store, recorded.session)], (), lambda _: None)
     target.table(table).update(change)
     before = {name: target.table(name).version() for name in ("sessions", "labels", "telemetry/000")}
     with pytest.raises(StoreError, match=named):

@@ -14,7 +14,7 @@ from ml.store import sessions as stored
 from ml.store.sessions import UNTOLD, Session
 from ml.training.recorded import recorded
 from server_gui.core.archive.library import look
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
@@ -52,7 +52,7 @@ def test_while_it_waits_it_is_listed_and_can_be_exported(tmp_path: Path, folder_
     known = Recordings(folder_url, tmp_path)  # there is no store yet
     [session] = known.sessions()
     assert (session.session, session.notes, session.uploaded) == (name, UNTOLD, False)
-    assert [each.session for each in spooled.sessions(tmp_path)] == [name]
+    assert [each.session for each in spool_reader.sessions(tmp_path)] == [name]
     [rows] = known.open(session).telemetry(CHANNELS)
     assert rows.num_rows == ROWS
 

@@ -11,7 +11,7 @@ import pytest
 from ml.store import Store, StoreError
 from server_gui.core.archive import playback as module
 from server_gui.core.archive.playback import Playback
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Shown
@@ -92,7 +92,7 @@ def test_a_session_half_in_the_store_and_half_in_the_spool_is_whole_and_nothing_
             recorder.record("exo-01", 1, batch(seq, ROWS), 0)
         recorder.cut(lambda: None)
         assert recorder.flush(WAIT_S)
-        before = Tape.open(settings, spooled.sessions(settings.recorder.spool)[0])
+        before = Tape.open(settings, spool_reader.sessions(settings.recorder.spool)[0])
         send(spool, spool.waiting()[0], Store(settings.store.url))
         for seq in range(10, 20):
             recorder.record("exo-01", 1, batch(seq, ROWS), 0)

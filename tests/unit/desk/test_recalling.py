@@ -10,7 +10,7 @@ from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from ml.store import Store
 from server_gui.core.archive.playback import NOT_PREDICTED, Playback
-from server_gui.core.archive.recall import said
+from server_gui.core.archive.recorded_predictions import said
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Shown
 from server_gui.core.fleet.live_prediction import record as record_of

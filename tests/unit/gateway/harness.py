@@ -22,9 +22,9 @@ from drivers.component import Component, Kind
 from drivers.errors import DeviceAbort, NotPermitted
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import WAY_UP
-from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
+from drivers.joint.transitions import Led
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from gateway.config import RobotConfig, load
@@ -339,6 +339,10 @@ class FakeDrive(FakeComponent):
         self.on_step(origin)
         return done(self.led_up.get(origin) or Led(WAY_UP[origin][1]))
 
+
+# Requests as they are on the wire: the id is to be put in, and the reason.
+CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
+STOP = b'{"jsonrpc":"2.0","id":"stop","method":"robot.stop","params":{"reason":"%s"}}\n'
 
 HEAD = """
 [robot]

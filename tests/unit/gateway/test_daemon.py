@@ -30,10 +30,9 @@ from gateway.wire.limits import BAD_LINES, LINE_LIMIT
 from tests.support.examples import examples
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import ROBOT, Answered, Bench, Client, config, serving
+from tests.unit.gateway.harness import CLOCK, ROBOT, Answered, Bench, Client, config, serving
 
 Connect = Callable[[], Client]
-CLOCK = b'{"jsonrpc":"2.0","id":%d,"method":"clock.read"}\n'
 
 
 def test_hello_names_the_robot_and_the_protocol(client: Client) -> None:
@@ -318,7 +317,7 @@ def test_what_a_resource_only_gateway_imports() -> None:
 
 def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards() -> None:
     code = (
-        "import sys; from gateway.process.lean import without\n"
+        "import sys; from gateway.process.light_imports import without\n"
         "with without('ssl', 'json'): import asyncio\n"
         "print('ssl' in sys.modules); import ssl; print(ssl.OPENSSL_VERSION_INFO[0] > 0)"
     )

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import WAY_UP
-from drivers.joint.leading import Led
+from drivers.joint.transitions import Led
 from gateway.process.futures import done
 from tests.support.waiting import until
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving

@@ -12,8 +12,8 @@ import pytest
 from drivers.component import Kind
 from drivers.errors import DeviceTimeout
 from drivers.joint.cia402 import DriveState
-from drivers.joint.leading import Led
 from drivers.joint.quick_stop import StopOutcome
+from drivers.joint.transitions import Led
 from gateway.modules.stop.target import Report
 from gateway.records.folder import RecordsFolder
 from tests.support.waiting import until

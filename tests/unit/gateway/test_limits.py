@@ -17,7 +17,7 @@ import pytest
 from drivers.joint.cia402 import DriveState
 from gateway import coding
 from gateway.config.robot import ParameterSettings
-from gateway.modules.control import catalogue, offer, parameters, rules
+from gateway.modules.control import catalogue, eds_parameters, parameters, rules
 from gateway.modules.control.parameters import Lock, Parameter
 from gateway.wire.framing import Kind, RpcError
 from tests.mutation.operators import mutants
@@ -422,7 +422,7 @@ CHECKS: list[tuple[Callable[[ModuleType], None], ModuleType, tuple[str, ...]]] =
     ),
     (check_coding, coding, ("scaled", "broken_limit", "coding_of", "decode", "encode", "nearest", "_finite")),
     (check_described, catalogue, ("described", "_scaled_limits")),
-    (check_locks, offer, ("_lock", "_axis", "_of_first_axis")),
+    (check_locks, eds_parameters, ("_lock", "_axis", "_of_first_axis")),
     (check_states, rules, ("check_value", "check_states", "allowed_states")),
     (check_enabling, rules, ("bars", "_may_be_enabled", "allowed_states")),
 ]

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.component import Kind
 from drivers.joint.cia402 import DriveState
-from drivers.joint.leading import Led
+from drivers.joint.transitions import Led
 from gateway.records.folder import RecordsFolder
 from tests.support.waiting import until
 from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, config, serving

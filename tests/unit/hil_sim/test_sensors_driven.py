@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.cli import listening, sensor
+from drivers.cli import listen, sensor
 from drivers.imu import rotation
 from hil_sim.clock import SECOND_NS
 from hil_sim.gait.wearer import Foot
@@ -209,7 +209,7 @@ def test_gwrms_sensor_finds_format_and_baud_rate_of_each_simulated_device(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(listening, "LISTEN_S", 0.5)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.5)
     bench = Bench(tmp_path, choice)
     with talking(bench):
         assert sensor.main([str(tmp_path / name), "--json"]) == 0

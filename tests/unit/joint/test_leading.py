@@ -7,7 +7,7 @@ import pytest
 from drivers.bus.sdo.channel import Interrupted
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import WAY_UP
-from drivers.joint.leading import OVERTAKEN, Errand, Led, lead_down, look, step_up
+from drivers.joint.transitions import OVERTAKEN, Errand, Led, lead_down, look, step_up
 from tests.unit.joint.sdo_drive import SdoDrive
 from tests.unit.joint.standard import LEAVES_BY_ITSELF, S
 

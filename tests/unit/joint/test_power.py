@@ -17,11 +17,11 @@ from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import CanSettings, Role
 from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
-from drivers.joint.leading import OVERTAKEN, Led
 from drivers.joint.power import PowerDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import StopRpdo
+from drivers.joint.transitions import OVERTAKEN, Led
 from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import Objects, drive_eds, drive_objects

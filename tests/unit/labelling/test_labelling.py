@@ -10,7 +10,7 @@ import pytest
 from ml.store import Store, StoreUnreachable
 from ml.store.labels import Label, Source, holding
 from ml.store.query import query
-from ml.store.sessions import NoSuchSession, happenings
+from ml.store.sessions import NoSuchSession, rows_of
 from ml.store.tables import LABELS
 from server_gui.core.archive.labelling import AT_ONCE, BadLabel, Kept, Labelling, Where
 from server_gui.core.fleet.collector import Collector
@@ -68,7 +68,7 @@ def held(labelling: Labelling) -> list[Label]:
 def rows(settings: ServerSettings) -> int:
     """How often anything was said about labels in the store."""
     store = Store(settings.store.url)
-    return len(happenings(store, Labelling(settings).session(SESSION), LABELS))
+    return len(rows_of(store, Labelling(settings).session(SESSION), LABELS))
 
 
 def test_a_label_of_an_uploaded_session_is_in_the_store_once(

@@ -11,7 +11,7 @@ import pytest
 from ml.errors import UnusableData, UnusableModel
 from ml.features import FeatureStream
 from ml.robot.learn import learn
-from ml.robot.learned import NONE, STRANGE, Learned, Verdicts
+from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import STRIDE, TASKS, Task, recipe_named
 from tests.unit.ml_robot.walkers import ACTIVITY, HIPS, PHASE, Lessons, lessons
 
@@ -30,7 +30,7 @@ def test_new_people_are_told_right() -> None:
     assert model.classes == ("stand", "walk", "sit")
     assert (np.array(model.classes)[verdicts.label] == new.truth).mean() > 0.95
     assert np.allclose(verdicts.probabilities.sum(axis=1), 1.0)
-    assert (verdicts.novelty < STRANGE).mean() > 0.95
+    assert (verdicts.novelty < ABNORMAL_FROM).mean() > 0.95
 
 
 def test_phases_of_new_people_are_near_and_silent_where_nobody_steps() -> None:
@@ -49,8 +49,8 @@ def test_phases_of_new_people_are_near_and_silent_where_nobody_steps() -> None:
 def test_what_nobody_has_learned_from_is_abnormal() -> None:
     model, new = learned(), lessons(ACTIVITY, [30])
     upside_down = model.judge(np.negative(3 * new.features))
-    assert (upside_down.novelty >= STRANGE).mean() > 0.9
-    assert (model.judge(new.features).novelty < STRANGE).mean() > 0.9
+    assert (upside_down.novelty >= ABNORMAL_FROM).mean() > 0.9
+    assert (model.judge(new.features).novelty < ABNORMAL_FROM).mean() > 0.9
 
 
 def test_a_model_that_is_unsure_abstains() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from ml.benchmarks import BENCHMARKS, sim, sim_activity, sim_phase
 from ml.errors import UnusableData
-from ml.robot import familiar, learn
+from ml.robot import learn, novelty
 from server_gui.cli.evaluate import main
 from tests.unit.ml_robot.recorded import written
 
@@ -17,8 +17,8 @@ from tests.unit.ml_robot.recorded import written
 def small_models(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(learn, "EPOCHS", 30)  # there are few rows to learn from
     monkeypatch.setattr(learn, "FOLDS", 2)
-    monkeypatch.setattr(familiar, "PROTOTYPES", 16)
-    monkeypatch.setattr(familiar, "COMPONENTS", 8)
+    monkeypatch.setattr(novelty, "PROTOTYPES", 16)
+    monkeypatch.setattr(novelty, "COMPONENTS", 8)
     monkeypatch.setattr(sim_activity, "VARIANTS", (sim.NO_TRUNK,))
     monkeypatch.setattr(sim_phase, "VARIANTS", (sim.HIPS,))
 

@@ -84,7 +84,7 @@ def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
 
     store = Store(server.store.url)
     (session,) = sessions.sessions(store)
-    rows = sessions.happenings(store, session, PREDICTIONS)
+    rows = sessions.rows_of(store, session, PREDICTIONS)
     assert len(rows) >= ENOUGH
     assert {(row["model"], row["task"]) for row in rows} == {(model, "activity")}
     assert Counter(row["label"] for row in rows).most_common(1)[0][0] == "walk"
@@ -94,7 +94,7 @@ def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
     assert stop["reason"].startswith(f"rule {WALKING.name} (stop) holds: walk")
     events = {
         row["text"].partition(" ")[0]: row
-        for row in sessions.happenings(store, session)
+        for row in sessions.rows_of(store, session)
         if row["kind"] == "rule"
     }
     assert events.keys() == {"rule", "stop"}

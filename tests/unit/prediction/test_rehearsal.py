@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from ml.serving.predictor import Prediction
 from server_gui.cli import predict
-from server_gui.core.prediction.rehearsal import FORESEEN_NS, HOUR_NS, Stretch, rehearse
+from server_gui.core.prediction.rehearsal import HOUR_NS, LEAD_NS, Stretch, rehearse
 from server_gui.core.settings.prediction import RuleSettings
 from server_gui.core.settings.server_file import SettingsError
 from tests.unit.ml import recordings
@@ -39,7 +39,7 @@ def test_what_has_a_cause_is_not_false() -> None:
 
 def test_too_early_is_no_foresight() -> None:
     cause = 100_000 * MS
-    early = (cause - FORESEEN_NS) // MS - 1
+    early = (cause - LEAD_NS) // MS - 1
     assert rehearse(RULE, EVERY_NS, [stretch(early, causes=[(cause, cause)])]).false == 1
     assert rehearse(RULE, EVERY_NS, [stretch(early + 1, causes=[(cause, cause)])]).false == 0
 

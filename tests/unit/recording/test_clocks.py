@@ -105,7 +105,7 @@ def rows_of(store: Store, session: Session) -> Recorded:
 
 
 def steps(store: Store, session: Session) -> list[dict[str, object]]:
-    found = [row for row in sessions.happenings(store, session) if row["kind"] == "clock_step"]
+    found = [row for row in sessions.rows_of(store, session) if row["kind"] == "clock_step"]
     return [json.loads(row["data"]) for row in found]
 
 
@@ -195,7 +195,7 @@ def test_events_and_resources_are_in_the_time_of_their_robots_rows(
         wall.set_by_ns -= 3_600 * S
         recorder.mark(ROBOT, "here")
     store, session = stored(spool, folder_url)
-    (marker,) = [row for row in sessions.happenings(store, session) if row["kind"] == "marker"]
+    (marker,) = [row for row in sessions.rows_of(store, session) if row["kind"] == "marker"]
     assert session.began is not None
     assert session.ended is not None
     assert session.began <= marker["utc"] <= session.ended
@@ -225,7 +225,7 @@ def test_a_label_that_was_taken_back_after_a_clock_was_set_back_is_gone(
         wall.set_by_ns -= 3_600 * S
         recorder.add(label(walk, removed=True))
     store, session = stored(spool, folder_url)
-    assert len(sessions.happenings(store, session, LABELS)) == 2
+    assert len(sessions.rows_of(store, session, LABELS)) == 2
     assert sessions.labels(store, session) == []
     with query(store, "SELECT count(*) AS labels FROM labels") as found:
         assert next(found.batches).to_pylist() == [{"labels": 0}]

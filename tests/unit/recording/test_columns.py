@@ -1,5 +1,7 @@
 """Each channel has a column of its own in the store, whatever robots and channels are called."""
 
+from pathlib import Path
+
 import pyarrow as pa
 import pyarrow.dataset
 import pytest

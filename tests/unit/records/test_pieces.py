@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gateway.records import durable, journal, pieces
+from gateway.records import durable, journal, journal_files
 from gateway.records.chain import Broken, Head, line
 from gateway.records.journal import Journal, Sizes, head_file, read_verified
 from gateway.records.reading import SHORTENED
@@ -37,7 +37,7 @@ def fill(path: Path, count: int = 40, sizes: Sizes = SMALL) -> None:
 
 
 def closed(path: Path) -> list[Path]:
-    return [piece.path for piece in pieces.closed_pieces(path)]
+    return [piece.path for piece in journal_files.closed_pieces(path)]
 
 
 def numbers(path: Path) -> list[int]:
@@ -284,7 +284,7 @@ class Copied(bytes):
 def test_lines_are_read_backwards_each_byte_once() -> None:
     lines = [b"%d " % number + b"x" * 997 for number in range(5000)]
     file = Counting(b"\n".join(lines) + b"\nhalf a line")
-    assert list(pieces.lines_backwards(file)) == lines[::-1]
+    assert list(journal_files.lines_backwards(file)) == lines[::-1]
     assert file.bytes_read <= 5_100_000
     assert file.copied == 0
 
@@ -292,15 +292,15 @@ def test_lines_are_read_backwards_each_byte_once() -> None:
 def test_a_long_line_is_put_together_once() -> None:
     line = b"x" * 8_000_000
     file = Counting(line + b"\n")
-    assert list(pieces.lines_backwards(file)) == [line]
+    assert list(journal_files.lines_backwards(file)) == [line]
     assert file.copied == 0
 
 
 def test_a_line_longer_than_any_that_was_written_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pieces, "LINE_BYTES", 1_000_000)
+    monkeypatch.setattr(journal_files, "LINE_BYTES", 1_000_000)
     file = Counting(b"x" * 8_000_000 + b"\n")
     with pytest.raises(Broken, match="more than 1000000 bytes"):
-        list(pieces.lines_backwards(file))
+        list(journal_files.lines_backwards(file))
     assert file.bytes_read <= 1_500_000
 
 
@@ -308,12 +308,12 @@ def test_a_line_longer_than_any_that_was_written_is_refused(monkeypatch: pytest.
 def test_lines_of_any_length_are_found(size: int) -> None:
     lines = [b"a" * size, b"", b"b" * size, b"c"]
     file = io.BytesIO(b"\n".join(lines) + b"\n")
-    assert list(pieces.lines_backwards(file)) == lines[::-1]
+    assert list(journal_files.lines_backwards(file)) == lines[::-1]
 
 
 def test_only_what_is_taken_is_read() -> None:
     file = Counting(b"".join(b"%d\n" % number for number in range(1_000_000)))
-    assert list(itertools.islice(pieces.lines_backwards(file), 3)) == [b"999999", b"999998", b"999997"]
+    assert list(itertools.islice(journal_files.lines_backwards(file), 3)) == [b"999999", b"999998", b"999997"]
     assert file.bytes_read <= 200_000
 
 
@@ -328,7 +328,7 @@ def test_a_tail_goes_over_pieces(path: Path) -> None:
 
 
 def test_a_tail_is_cut_at_its_bytes_and_says_so(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pieces, "TAIL_BYTES", 3000)
+    monkeypatch.setattr(journal_files, "TAIL_BYTES", 3000)
     fill(path)
     journal = Journal(path, "boot", sizes=SMALL)
     entries, cut = journal.tail(30).result(WAIT_S)
@@ -342,13 +342,13 @@ def test_whoever_reads_does_not_hold_the_writer(path: Path, monkeypatch: pytest.
     """What is appended while somebody reads is durable before that has ended."""
     journal = Journal(path, "boot")
     journal.append("tester", "first").result(WAIT_S)
-    tail = pieces.tail
+    tail = journal_files.tail
 
-    def slowly(*arguments: Any) -> pieces.Tail:
+    def slowly(*arguments: Any) -> journal_files.Tail:
         journal.append("tester", "while somebody reads").result(WAIT_S)
         return tail(*arguments)
 
-    monkeypatch.setattr(pieces, "tail", slowly)
+    monkeypatch.setattr(journal_files, "tail", slowly)
     entries, _ = journal.tail(10).result(WAIT_S)
     assert [entry["what"] for entry in entries] == ["first"]
     journal.close()
@@ -358,15 +358,15 @@ def test_a_piece_that_is_closed_while_it_is_read_is_not_given_twice(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fill(path)
-    listed = pieces.closed_pieces
+    listed = journal_files.closed_pieces
 
-    def rotating(journal: Path) -> list[pieces.Piece]:
+    def rotating(journal: Path) -> list[journal_files.Piece]:
         if journal.exists():
-            journal.replace(pieces.closed_piece(journal, 40).path)
+            journal.replace(journal_files.closed_piece(journal, 40).path)
         return listed(journal)
 
-    monkeypatch.setattr(pieces, "closed_pieces", rotating)
-    assert [entry["n"] for entry in pieces.tail(path, 100, 40).entries] == list(range(1, 41))
+    monkeypatch.setattr(journal_files, "closed_pieces", rotating)
+    assert [entry["n"] for entry in journal_files.tail(path, 100, 40).entries] == list(range(1, 41))
 
 
 def test_verifying_opens_anew_where_a_piece_was_closed_meanwhile(
@@ -376,8 +376,8 @@ def test_verifying_opens_anew_where_a_piece_was_closed_meanwhile(
     opened = Path.open
 
     def rotating(self: Path, *arguments: Any, **named: Any) -> Any:
-        if self == path and not pieces.closed_piece(path, 40).path.exists():
-            path.replace(pieces.closed_piece(path, 40).path)
+        if self == path and not journal_files.closed_piece(path, 40).path.exists():
+            path.replace(journal_files.closed_piece(path, 40).path)
         return opened(self, *arguments, **named)
 
     monkeypatch.setattr(Path, "open", rotating)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from drivers.cli import listening, look, sensor
+from drivers.cli import listen, live, sensor
 from drivers.errors import SettingsError, Unavailable
 from drivers.identify import Match
 from tests.support.waiting import until
@@ -123,7 +123,7 @@ def test_unknown_sensor_is_identified_and_shown_live(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(listening, "LISTEN_S", 0.4)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.4)
     with Talking(terminal, streams()[name]):
         assert sensor.main([str(terminal.path), "--seconds", "1"]) == 0
     out = capsys.readouterr().out
@@ -136,7 +136,7 @@ def test_unknown_sensor_is_identified_and_shown_live(
 def test_identified_sensor_as_json(
     terminal: Terminal, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(listening, "LISTEN_S", 0.4)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.4)
     with Talking(terminal, streams()["xsens"]):
         assert sensor.main([str(terminal.path), "--json"]) == 0
     (line,) = lines(capsys)
@@ -146,13 +146,13 @@ def test_identified_sensor_as_json(
 
 def test_which_foot_an_insole_is_under_is_asked_where_its_frames_do_not_say() -> None:
     lines_of_numbers = Match("insole-csv", None, 20, 1.0, 3)
-    assert look.table("/dev/x", 9600, lines_of_numbers).startswith("[insole.left_insole]  # or right_insole")
+    assert live.table("/dev/x", 9600, lines_of_numbers).startswith("[insole.left_insole]  # or right_insole")
 
 
 def test_silent_port_is_called_silent(
     terminal: Terminal, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(listening, "LISTEN_S", 0.05)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.05)
     assert sensor.main([str(terminal.path), "--baud", "9600"]) == 1
     assert "power" in capsys.readouterr().err
 
@@ -170,7 +170,7 @@ def test_what_is_recorded_is_replayed_at_its_pace(
         assert sensor.main(["record", str(terminal.path), str(file), "--seconds", "1"]) == 0
     assert file.stat().st_size > 500
     assert json.loads((tmp_path / "walk.bin.json").read_bytes())["format"] == "bno08x-rvc"
-    monkeypatch.setattr(listening, "LISTEN_S", 0.5)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.5)
     replaying = threading.Thread(target=sensor.main, args=(["replay", str(file), "--link", str(link)],))
     replaying.start()
     try:
@@ -195,7 +195,7 @@ def test_recording_never_overwrites(terminal: Terminal, tmp_path: Path) -> None:
 def test_recording_of_silence_leaves_no_file(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, why: str
 ) -> None:
-    monkeypatch.setattr(listening, "LISTEN_S", 0.05)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.05)
     with pytest.raises(Unavailable, match=why):
         sensor.main(["record", str(terminal.path), str(tmp_path / "walk.bin"), "--seconds", "0.1", how])
     assert not (tmp_path / "walk.bin").exists()
@@ -204,7 +204,7 @@ def test_recording_of_silence_leaves_no_file(
 def test_noise_as_at_a_wrong_baud_rate_is_recorded_only_where_that_is_said(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(listening, "LISTEN_S", 0.2)
+    monkeypatch.setattr(listen, "LISTEN_S", 0.2)
     file = tmp_path / "walk.bin"
     argv = ["record", str(terminal.path), str(file), "--seconds", "0.5", "--baud", "115200"]
     with Talking(terminal, random.Random(1).randbytes(4000)):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ml.store import Store
-from ml.store.sessions import NoSuchSession, channels, find, happenings, labels, sessions, telemetry
+from ml.store.sessions import NoSuchSession, channels, find, labels, rows_of, sessions, telemetry
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
@@ -26,7 +26,7 @@ def test_a_session_is_found_with_everything_that_is_known_of_it(store_url: str, 
     assert {each.name: (each.unit, each.samples) for each in channels(recorded.store, session)} == {
         name: (unit, BATCHES * ROWS) for name, unit in UNITS.items()
     }
-    assert [event["kind"] for event in happenings(recorded.store, session)] == ["gap", "marker"]
+    assert [event["kind"] for event in rows_of(recorded.store, session)] == ["gap", "marker"]
     assert [row["label"] for row in labels(recorded.store, session)] == ["walk"]
 
 

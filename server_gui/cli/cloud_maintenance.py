@@ -4,11 +4,11 @@ import argparse
 import math
 from datetime import UTC, datetime, timedelta
 
-from gateway.cli.reach import ask
+from gateway.cli.connect import ask
 from gateway.cli.text import counted, say, say_json, table
 from ml.store import TABLES, TELEMETRY, Store, UnsafeStore, upkeep
 from ml.store.tables import RESOURCES
-from server_gui.cli.cloud_reach import add_url, parser, reach, when
+from server_gui.cli.cloud_options import add_url, parser, reach, when
 
 COMPACT_EPILOG = """An upload brings a file a robot; some thousands of small files make a table slow to
 open. Once an hour or a day is enough. Nobody who writes or reads is disturbed, and older versions stay as

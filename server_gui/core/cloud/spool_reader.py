@@ -39,7 +39,7 @@ class Batch:
 
 
 def waiting(spool: Path) -> list[int]:
-    """The batches that wait for upload, and the one that is being recorded; oldest first.
+    """Return the batches that wait for upload, and the one that is being recorded; oldest first.
 
     Raises:
         SpoolUnusable: the folder is there, and cannot be read.
@@ -56,7 +56,7 @@ def waits(spool: Path, number: int) -> bool:
 
 
 def is_empty(spool: Path, number: int) -> bool:
-    """Whether nothing has been recorded into it yet; not where that cannot be read."""
+    """Return whether nothing has been recorded into it yet; not where that cannot be read."""
     try:
         return not any(_read(spool, number, f"SELECT 1 FROM {table} LIMIT 1") for table in ("run", "record"))
     except SpoolUnusable:
@@ -69,27 +69,27 @@ def kept(spool: Path) -> list[int]:
 
 
 def sessions(spool: Path) -> list[Session]:
-    """Those of which something waits for upload; their telemetry is not counted."""
+    """Return those of which something waits for upload; their telemetry is not counted."""
     batches = waiting(spool)
     told = unstored(rows(spool, SESSIONS, batches))
     return [*told, *untold(spool, batches, ((each.robot, each.session) for each in told))]
 
 
 def untold(spool: Path, batches: Iterable[int], known: Iterable[tuple[str, str]]) -> list[Session]:
-    """Those of which these batches have telemetry, and that are none of the known ones."""
+    """Return those of which these batches have telemetry, and that are none of the known ones."""
     sql = "SELECT DISTINCT robot, session FROM run"
     found = {name for batch in batches for name in _read(spool, batch, sql)} - set(known)
     return [sessions_.untold(robot, name, Extent(()), uploaded=False) for robot, name in sorted(found)]
 
 
 def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> list[dict[str, Any]]:
-    """A table's rows in these batches, or in all that wait."""
+    """Return a table's rows in these batches, or in all that wait."""
     made: list[dict[str, Any]] = table_of(spool, table, batches).to_pylist()
     return made
 
 
 def table_of(spool: Path, table: Table, batches: Iterable[int] | None = None) -> pa.Table:
-    """The same as the store has them."""
+    """Return the same as the store has them."""
     found = [
         record.fields | {"spool": name, "batch": batch, "number": number}
         for batch in (waiting(spool) if batches is None else batches)
@@ -101,7 +101,7 @@ def table_of(spool: Path, table: Table, batches: Iterable[int] | None = None) ->
 
 
 def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
-    """A session's telemetry in this batch, a run a stream and layout; without what is damaged."""
+    """Yield a session's telemetry in this batch, a run a stream and layout; without what is damaged."""
     sql = (
         "SELECT connection, stream, description, run.* FROM run JOIN layout ON layout = layout.id "
         "WHERE run.robot = ? AND session = ? ORDER BY connection, stream, layout, seq, row"
@@ -114,7 +114,7 @@ def runs(spool: Path, session: Session, batch: int) -> Iterator[Run]:
 
 
 def layouts(spool: Path, batch: int) -> list[tuple[str, Layout]]:
-    """Each robot in this batch with each of its layouts, in the order in which they came."""
+    """Return each robot in this batch with each of its layouts, in the order in which they came."""
     found: list[tuple[str, Layout]] = []
     sql = "SELECT CAST(robot AS BLOB), description FROM layout ORDER BY id"
     for robot, description in _read(spool, batch, sql):
@@ -130,18 +130,18 @@ def writer(spool: Path, number: int) -> str:
 
 
 def uploaded(spool: Path) -> list[int]:
-    """The batches that are kept as a second copy, oldest first."""
+    """Return the batches that are kept as a second copy, oldest first."""
     return sorted(set(kept(spool)) - set(waiting(spool)))
 
 
 def damaged(spool: Path) -> list[tuple[int, Path]]:
-    """The batches that were set aside or have lost commits, with their files."""
+    """Return the batches that were set aside or have lost commits, with their files."""
     files = (file for kind in ("damaged", "cut") for file in spool.glob(f"{_NUMBER}.{kind}.db"))
     return sorted((int(file.name[:8]), file) for file in files)
 
 
 def batch(spool: Path, number: int) -> Batch:
-    """What is in a batch."""
+    """Return what is in a batch."""
     robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))
     tables = frozenset(record.table for _, record in _records(spool, number))
     return Batch(writer(spool, number), number, robots, tables)

@@ -1,4 +1,4 @@
-"""Familiar: how far a row of features lies from everything that was learned from.
+"""Novelty: how far a row of features lies from everything that was learned from.
 
 Two distances, both over what held-out people's rows keep within: to the nearest of many prototypes in the
 features' principal components, and out of these components altogether.
@@ -49,12 +49,12 @@ def distances(parts: Parts, inputs: Rows) -> tuple[Floats, Floats]:
 
 
 def limits(held_out: tuple[Floats, Floats]) -> dict[str, float]:
-    """What nearly all rows of people that were not learned from keep within: the numbers for `novelty`."""
+    """What nearly all rows of people that were not learned from keep within: the numbers for `score`."""
     near, out = (float(np.quantile(one, WITHIN)) for one in held_out)
     return {"near": max(near, 1e-6), "out": max(out, 1e-6)}
 
 
-def novelty(parts: Parts, numbers: dict[str, float], inputs: Rows) -> Floats:
+def score(parts: Parts, numbers: dict[str, float], inputs: Rows) -> Floats:
     """(n,): 1 at the limit of what held-out people do."""
     near, out = distances(parts, inputs)
     farthest: Floats = np.maximum(near / numbers["near"], out / numbers["out"])

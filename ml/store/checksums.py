@@ -25,7 +25,7 @@ _encoder = msgspec.msgpack.Encoder()
 
 
 def of_numbers(rows: pa.RecordBatch, same: Mapping[str, str]) -> Sums:
-    """A number a row of numbers, times and texts; `same` are columns that are alike in all of them."""
+    """Return a number a row of numbers, times and texts; `same` are columns that are alike in all of them."""
     found = np.full(rows.num_rows, _of_texts(same), np.uint64)
     for name, column in zip(rows.schema.names, rows.columns, strict=True):
         if column.null_count == len(column):
@@ -42,12 +42,12 @@ def of_numbers(rows: pa.RecordBatch, same: Mapping[str, str]) -> Sums:
 
 
 def of_rows(rows: pa.Table) -> Sums:
-    """A number a row of whatever columns."""
+    """Return a number a row of whatever columns."""
     return np.array([_of_fields(fields) for fields in rows.to_pylist()], np.uint64)
 
 
 def told(total: int) -> str:
-    """The sum of such numbers, as it is written."""
+    """Return the sum of such numbers, as it is written."""
     return f"{total % (1 << 64):016x}"
 
 

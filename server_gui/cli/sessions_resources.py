@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from gateway.cli.text import NONE, say, say_json, size, table
 from ml.store.sessions import Session
 from ml.store.tables import RESOURCES
-from server_gui.cli.cloud_reach import add_url, parser, recordings
+from server_gui.cli.cloud_options import add_url, parser, recordings
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.processing.recorded_use import Looks, ProgramUse, looks, used
 from server_gui.core.processing.regression import Regression, SessionUse, regressions
@@ -69,7 +69,7 @@ def _version(session: Session) -> str:
 
 
 def _looks(known: Recordings, session: Session) -> Looks:
-    return looks(known.happenings(session, RESOURCES))
+    return looks(known.rows_of(session, RESOURCES))
 
 
 def _told(sides: list[list[SessionUse]], found: list[Regression]) -> Iterator[str]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from drivers.cli.listening import best, listen, nothing
+from drivers.cli.listen import best, listen, nothing
 from drivers.component import Component
 from drivers.identify import Match
 from drivers.imu.device import Imu

@@ -8,7 +8,7 @@ from typing import Final
 from gateway.cli.text import NONE, say, say_json, size, table, warn
 from ml.store.errors import NoSuchTable, StoreError
 from ml.store.objects import Object
-from server_gui.cli.cloud_reach import add_url, parser, progress, reach, spool, url, when
+from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool, url, when
 from server_gui.core.cloud import usage
 from server_gui.core.cloud import verify as checks
 from server_gui.core.cloud.usage import Usage

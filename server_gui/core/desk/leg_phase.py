@@ -28,7 +28,7 @@ class LegPhase:
 
 
 def leg_phase(derived: Derived, leg: Leg, now_ns: int) -> LegPhase | None:
-    """Where a leg is at `now_ns` on the robot's clock; None where nobody walks, or no stride is known yet."""
+    """Return where a leg is at `now_ns` on the robot's clock; None without a walk or a whole stride."""
     stride_s = derived.gait.legs[leg].stride_s
     strike = _newest_strike(derived.events, leg)
     if not derived.gait.walking or stride_s is None or strike is None:
@@ -38,7 +38,7 @@ def leg_phase(derived: Derived, leg: Leg, now_ns: int) -> LegPhase | None:
 
 
 def phase_at(percent: float) -> str:
-    """The phase's name at a percentage of the stride."""
+    """Return the phase's name at a percentage of the stride."""
     return next((name for name, end in PHASES if percent < end), PHASES[-1][0])
 
 

@@ -18,7 +18,7 @@ NOBODYS: Final = (None, None)
 
 
 def whose(of: DataFile | Part) -> Whose:
-    """Where the rows lie that a file or a batch's part holds."""
+    """Return where the rows lie that a file or a batch's part holds."""
     if isinstance(of, DataFile):
         return of.location, of.robot, of.session
     robot, session = (of.stream.robot, of.stream.session) if of.stream else NOBODYS

@@ -24,7 +24,7 @@ class Part:
     session: str | None = None
 
     def values(self, table: Table) -> dict[str, str]:
-        """What its rows in this table have in common; a robot's journal belongs to no session."""
+        """Return what its rows in this table have in common; a robot's journal belongs to no session."""
         named = {"robot": self.robot, "session": self.session}
         return {name: value for name, value in named.items() if value and name in table.schema.names}
 

@@ -13,7 +13,7 @@ from ml.store.errors import translated
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS
-from server_gui.core.cloud import spooled
+from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.tape import as_time
 from server_gui.core.settings.server_file import ServerSettings
 
@@ -29,7 +29,7 @@ class Said:
 
 
 def said(settings: ServerSettings, session: Session, begin_ns: int, end_ns: int) -> list[Said]:
-    """What was said from `begin_ns` up to before `end_ns`, in time's order; blocks.
+    """Return what was said from `begin_ns` up to before `end_ns`, in time's order; blocks.
 
     Raises:
         StoreError: the store cannot be reached, or the table not be read.
@@ -45,7 +45,7 @@ def said(settings: ServerSettings, session: Session, begin_ns: int, end_ns: int)
 
 
 def _waiting(settings: ServerSettings, session: Session) -> Iterator[Mapping[str, Any]]:
-    for row in spooled.rows(settings.recorder.spool, PREDICTIONS):
+    for row in spool_reader.rows(settings.recorder.spool, PREDICTIONS):
         if (row["robot"], row["session"]) == (session.robot, session.session):
             yield row
 

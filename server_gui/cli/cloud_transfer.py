@@ -11,8 +11,8 @@ from ml.store import sessions
 from ml.store.errors import StoreError
 from ml.store.sessions import Session
 from ml.store.store import Store, checked_url
-from server_gui.cli.cloud_reach import add_url, parser, progress, reach, url
-from server_gui.core.cloud import emptying, moving, parts, transfer
+from server_gui.cli.cloud_options import add_url, parser, progress, reach, url
+from server_gui.core.cloud import moved_store, partial_copy, spool_upload, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS
@@ -79,7 +79,7 @@ def _note(arguments: argparse.Namespace) -> None:
         return
     try:
         with Spool(folder) as spool:
-            moving.note(spool, Store.existing(url(arguments)))
+            moved_store.note(spool, Store.existing(url(arguments)))
     except SpoolUnusable as error:
         warn("cloud", f"that batches of this computer are in the copy is not noted in its spool: {error}")
 
@@ -92,7 +92,7 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
     else:
         there = functools.partial(Store, arguments.url)
     wanted = checked_url(arguments.url or settings.url)
-    done = emptying.empty(folder, wanted, there, functools.partial(progress, "batches"))
+    done = spool_upload.empty(folder, wanted, there, functools.partial(progress, "batches"))
     for problem in (*done.notes, *done.problems, *done.waits):
         warn("cloud", problem)
     batches = counted(done.uploaded, "batch", "batches")
@@ -143,7 +143,7 @@ def _copy(source: str, target: str, arguments: argparse.Namespace) -> int:
 def _copy_parts(source: Store, target: Store, arguments: argparse.Namespace) -> int:
     wanted, robots = _chosen(source, arguments)
     with progress("rows", sum(session.rows for session in wanted)) as advance:
-        rows = parts.copy(source, target, wanted, robots, advance)
+        rows = partial_copy.copy(source, target, wanted, robots, advance)
     text = f"{target.url}: {len(wanted)} sessions, {rows} rows of telemetry copied and counted"
     return _tell(arguments, text, sessions=len(wanted), rows=rows)
 

@@ -20,7 +20,7 @@ NO_SPOOL: Final = Path("/dev/null/spool")  # of a store that another server writ
 
 
 def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser:
-    """The arguments that all have: `--config` and `--json`."""
+    """Return the arguments that all have: `--config` and `--json`."""
     made = argparse.ArgumentParser(
         prog=f"gwrms {command}",
         description=what,
@@ -44,22 +44,22 @@ def add_url(made: argparse.ArgumentParser, name: str = "--url") -> None:
 
 
 def url(arguments: argparse.Namespace) -> str:
-    """The store's URL: given, of the server's file, or the default."""
+    """Return the store's URL: given, of the server's file, or the default."""
     return str(arguments.url or load(arguments.config).store.url)
 
 
 def reach(arguments: argparse.Namespace) -> Store:
-    """The store to look into; raises `StoreError` where there is none."""
+    """Return the store to look into; raises `StoreError` where there is none."""
     return Store.existing(url(arguments))
 
 
 def spool(arguments: argparse.Namespace) -> Path:
-    """The spool of the server on this computer."""
+    """Return the spool of the server on this computer."""
     return load(arguments.config).recorder.spool
 
 
 def recordings(command: str, arguments: argparse.Namespace) -> Recordings:
-    """What is in the server's store and in its spool, or in another store by its URL.
+    """Return what is in the server's store and in its spool, or in another store by its URL.
 
     Says so where the store cannot be reached.
     """
@@ -70,7 +70,7 @@ def recordings(command: str, arguments: argparse.Namespace) -> Recordings:
 
 
 def instant(text: str) -> datetime:
-    """A date or time as ISO 8601 writes it; UTC where it does not say otherwise."""
+    """Return a date or time as ISO 8601 writes it; UTC where it does not say otherwise."""
     try:
         found = datetime.fromisoformat(text)
     except ValueError as error:
@@ -81,7 +81,7 @@ def instant(text: str) -> datetime:
 
 
 def instant_or_seconds(text: str) -> datetime | float:
-    """The same, or seconds since a session's first sample."""
+    """Return the same, or seconds since a session's first sample."""
     try:
         return float(text)
     except ValueError:
@@ -89,7 +89,7 @@ def instant_or_seconds(text: str) -> datetime | float:
 
 
 def absolute(session: Session, time: datetime | float | None) -> datetime | None:
-    """A time; raises `StoreError` where there is no first sample to count seconds from."""
+    """Return a time; raises `StoreError` where there is no first sample to count seconds from."""
     if not isinstance(time, float):
         return time
     if session.first is None:
@@ -98,7 +98,7 @@ def absolute(session: Session, time: datetime | float | None) -> datetime | None
 
 
 def when(time: datetime | None) -> str:
-    """A time for people, in UTC."""
+    """Return a time for people, in UTC."""
     return "–" if time is None else f"{time.astimezone(UTC):%Y-%m-%d %H:%M:%S}"
 
 

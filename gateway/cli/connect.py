@@ -44,7 +44,7 @@ def add_robot(made: argparse.ArgumentParser) -> None:
     )
 
 
-def reach(arguments: argparse.Namespace, command: str) -> Robot:
+def connect(arguments: argparse.Namespace, command: str) -> Robot:
     """The robot that `--robot` names, connected.
 
     Raises:

@@ -1,0 +1,116 @@
+"""The store in the window: shown without its keys, uploaded to, verified; jobs can be cancelled."""
+
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QPushButton, QTreeWidgetItem
+
+from ml.store import Store, StoreError
+from server_gui.core.archive import library
+from server_gui.core.archive.archive import Archive
+from server_gui.core.cloud.jobs import Job, JobState
+from server_gui.core.desk.recording import By, Recording
+from server_gui.core.settings.server_file import ServerSettings
+from tests.gui.archives import Shown, cell, record
+from tests.gui.fakes import Bench
+from tests.gui.test_recording import FakeKeeper, report
+
+
+def test_the_store_is_shown_with_where_its_keys_come_from_and_never_the_keys(
+    shown: Shown, archive: Archive, settings: ServerSettings
+) -> None:
+    record(settings)
+    shown.open("Cloud")
+    cloud = shown.window.cloud
+    shown.until(lambda: "Reached" in cloud.state.text(), "reached it")
+    assert cloud._facts["URL"].text() == settings.store.url
+    assert cloud._facts["Keys"].text() == "none needed: it is a folder"
+    tops = below(cloud.browser.invisibleRootItem())
+    assert [top.text(0) for top in tops] == ["telemetry", "sessions", "events", "predictions"]
+    tops[0].setExpanded(True)
+    robot = below(tops[0])[0]
+    assert robot.text(0) == "exo-01"
+    robot.setExpanded(True)
+    shown.until(lambda: below(robot)[0].text(0).endswith(".parquet"), "listed its files")
+
+
+def below(item: QTreeWidgetItem) -> list[QTreeWidgetItem]:
+    found = [item.child(row) for row in range(item.childCount())]
+    return [child for child in found if child is not None]
+
+
+def test_a_store_that_is_away_says_so_and_is_tried_again(
+    shown: Shown, archive: Archive, settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(library, "AGAIN_S", 0.0)
+    existing = Store.existing
+    away = [True]
+
+    def reach(url: str | None = None) -> Store:
+        if away[0]:
+            raise StoreError("s3://lab cannot be reached: Connection refused")
+        return existing(url)
+
+    monkeypatch.setattr(Store, "existing", reach)
+    record(settings)
+    shown.open("Cloud")
+    shown.until(lambda: "Connection refused" in shown.window.cloud.state.text(), "said so")
+    shown.open("Recordings")
+    assert "it is tried again" in shown.window.recordings.list.said.text()
+    away[0] = False
+    shown.until(lambda: shown.window.recordings.list.sessions.rowCount(), "came back")
+    shown.open("Cloud")
+    assert "Reached" in shown.window.cloud.state.text()
+
+
+def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
+    shown: Shown, archive: Archive, settings: ServerSettings, bench: Bench
+) -> None:
+    record(settings, sent=False)
+    shown.open("Cloud")
+    cloud = shown.window.cloud
+    cloud.upload.click()
+    job = archive.jobs.jobs[0]
+    shown.until(lambda: job.is_over, "uploaded it")
+    assert "nothing waits" in job.said
+    shown.until(lambda: any("nothing waits" in item.text for item in bench.desk.news.items), "told it")
+    keeper = FakeKeeper(report(problem="the store cannot be reached", waiting=2))
+    cloud._recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
+    cloud._recording.look()
+    shown.draw()
+    assert "2 batches wait" in cloud.waiting.text()
+    assert "It is tried again by itself: the store cannot be reached" in cloud.waiting.text()
+    cloud.upload.click()
+    assert keeper.asked == ["upload"]
+
+
+def test_a_job_shows_how_far_it_is_and_can_be_cancelled(shown: Shown, archive: Archive) -> None:
+    def long(job: Job) -> str:
+        job.expect(10, "files")
+        job.done = 4
+        while True:
+            job.check()
+            time.sleep(0.001)
+
+    job = archive.jobs.add("Verify", long)
+    shown.open("Cloud")
+    table = shown.window.cloud.jobs
+    shown.until(lambda: cell(shown, 2) == "4 of 10 files", "showed how far it is")
+    cancel = table.cellWidget(0, 3)
+    assert isinstance(cancel, QPushButton)
+    cancel.click()
+    shown.until(lambda: job.state is JobState.CANCELLED, "cancelled it")
+    shown.until(lambda: table.cellWidget(0, 3) is None, "took the button away")
+
+
+def test_a_store_is_downloaded_and_verified(
+    shown: Shown, archive: Archive, settings: ServerSettings, tmp_path: Path
+) -> None:
+    record(settings)
+    shown.open("Cloud")
+    shown.window.cloud.download_to(tmp_path / "copy", ())
+    shown.window.cloud._verify(deep=True)
+    shown.until(lambda: all(job.is_over for job in archive.jobs.jobs), "did both")
+    assert [job.state for job in archive.jobs.jobs] == [JobState.DONE, JobState.DONE]
+    assert Store((tmp_path / "copy").as_uri()).dataset("sessions").count_rows() > 0
