@@ -1,7 +1,7 @@
 """The `gwrms` command: finds the subcommand and imports only what it needs.
 
-Exit codes: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr; `--debug`
-shows the traceback.
+Exit codes: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr, with `--json`
+also an object on stdout; `--debug` shows the traceback.
 """
 
 import importlib
@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "bench": ("gateway.cli.bench:main", "measure a robot's gateway: latency, CPU and memory of what it does"),
     "blame": ("gateway.cli.blame:main", "when the control loop is late, and what ran instead"),
     "watch": ("gateway.cli.watch:main", "follow channels live"),
+    "top": ("server_gui.cli.top:main", "one robot in the terminal, live: tune, stop, reset"),
     "get": ("gateway.cli.get:main", "read parameters from the devices"),
     "set": ("gateway.cli.set:main", "change parameters, all or none, read back"),
     "params": ("gateway.cli.params:main", "parameters as files: save, compare, apply"),
@@ -31,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
     "reset": ("gateway.cli.reset:main", "end a held stop: every drive switched off, none enabled"),
     "enable": ("gateway.cli.enable:main", "enable drives, as the master of a bench"),
+    "completion": ("gateway.cli.completion:main", "complete commands in bash, zsh and fish"),
     "eds": ("eds.cli.eds:main", "what an EDS or DCF file says, and what is wrong with it"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
@@ -84,11 +86,22 @@ def find(name: str) -> Callable[[list[str]], int]:
 def explain(error: Exception) -> str:
     """An exception as the sentences a user can act on."""
     if isinstance(error, ModuleNotFoundError) and error.name is not None:
-        return f"this command needs the package {error.name!r}; install gwrms[collect], [server] or [sim]"
+        from gateway import missing
+
+        return missing.explained(error.name)
     ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
     if ours or isinstance(error, OSError):
         return str(error)
     return f"internal error, {type(error).__name__}: {error} (run again with --debug and report it)"
+
+
+def _help_without(error: Exception, arguments: Sequence[str]) -> str | None:
+    """The help that was asked for, of a command of which a package is missing."""
+    if not isinstance(error, ModuleNotFoundError):
+        return None
+    from gateway import missing
+
+    return missing.help_of(arguments)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -104,7 +117,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.write(f"gwrms {__version__}\n")
         return 0
     if name not in COMMANDS:
-        sys.stderr.write(f"gwrms: there is no command {name!r}; gwrms --help lists them\n")
+        from gateway.cli.text import did_you_mean
+
+        meant = did_you_mean(name, COMMANDS)
+        sys.stderr.write(f"gwrms: there is no command {name!r}{meant or '; gwrms --help lists them'}\n")
         return 2
     try:
         return find(name)(rest)
@@ -115,6 +131,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:  # noqa: BLE001 - the one place where errors become words
+        if page := _help_without(error, arguments):
+            sys.stdout.write(page)
+            return 0
+        if "--json" in rest:  # who reads that finds the error where the answer would be
+            from gateway.cli.text import say_json
+
+            kind = getattr(error, "kind", None) or type(error).__name__
+            say_json({"error": {"kind": str(kind), "message": explain(error)}})
         if debug:
             traceback.print_exc()
         else:

@@ -1,6 +1,6 @@
-"""Draws the reference: `python -m tools.draw_reference [--check]`.
+"""Draws the reference, and what is packaged of it: `python -m tools.draw_reference [--check]`.
 
-With `--check` nothing is written; exit status 1 names the pages that are not what would be drawn.
+With `--check` nothing is written; exit status 1 names the files that are not what would be drawn.
 """
 
 import sys
@@ -8,24 +8,24 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
-from tools.draw import commands, robot_file, server_file, wire
+from tools.draw import commands, packaged, robot_file, server_file, wire
 
-REFERENCE: Final = Path(__file__).parents[1] / "docs" / "reference"
-PAGES: Final[Mapping[str, Callable[[], str]]] = {
-    page.PAGE: page.draw for page in (robot_file, server_file, wire, commands)
-}
+ROOT: Final = Path(__file__).parents[1]
+FILES: Final[Mapping[str, Callable[[], str]]] = {
+    f"docs/reference/{page.PAGE}": page.draw for page in (robot_file, server_file, wire, commands)
+} | {f"gateway/drawn/{name}": draw for name, draw in packaged.PAGES.items()}
 
 
 def stale() -> list[str]:
-    """The pages that are not what would be drawn."""
-    return [name for name, draw in PAGES.items() if _held(name) != draw()]
+    """The files that are not what would be drawn."""
+    return [name for name, draw in FILES.items() if _held(name) != draw()]
 
 
 def write() -> list[str]:
-    """Draw every page anew; which have changed."""
+    """Draw every file anew; which have changed."""
     changed = stale()
     for name in changed:
-        (REFERENCE / name).write_text(PAGES[name](), encoding="utf-8")
+        (ROOT / name).write_text(FILES[name](), encoding="utf-8")
     return changed
 
 
@@ -35,12 +35,12 @@ def main(argv: list[str]) -> int:
     found = stale() if check else write()
     for name in found:
         said = "is not up to date; run ./dev docs" if check else "is drawn anew"
-        sys.stderr.write(f"docs/reference/{name} {said}\n")
+        sys.stderr.write(f"{name} {said}\n")
     return int(check and bool(found))
 
 
 def _held(name: str) -> str:
-    page = REFERENCE / name
+    page = ROOT / name
     return page.read_text(encoding="utf-8") if page.exists() else ""
 
 

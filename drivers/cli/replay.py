@@ -13,6 +13,7 @@ from pathlib import Path
 
 import msgspec
 
+from drivers.cli.listen import best, listen, nothing
 from drivers.errors import Unavailable
 from drivers.port import SerialPort
 
@@ -25,13 +26,23 @@ class About(msgspec.Struct, frozen=True):
 
     baudrate: int
     seconds: float
+    format: str | None = None  # None: nobody has looked
 
 
 def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
-    parser.description = "Records a port's raw bytes, and beside them FILE.json with baud rate and duration."
+    parser.description = (
+        "Records a port's raw bytes, and beside them FILE.json with baud rate, format and duration. Listens "
+        "first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a "
+        "wrong baud rate."
+    )
     parser.add_argument("port", metavar="PORT")
     parser.add_argument("file", metavar="FILE", type=Path)
-    parser.add_argument("--baud", type=int, default=DEFAULT_BAUDRATE, help="default: %(default)s")
+    parser.add_argument("--baud", type=int, help="default: the first at which a format fits")
+    parser.add_argument(
+        "--raw",
+        action="store_true",
+        help=f"whatever comes, as of a sensor that nobody knows yet (without --baud at {DEFAULT_BAUDRATE})",
+    )
     parser.add_argument("--seconds", type=float, help="for so long; default: until Ctrl-C")
     return record
 
@@ -57,16 +68,20 @@ def record(options: argparse.Namespace) -> int:
     """Record until the time is up or Ctrl-C.
 
     Raises:
-        Unavailable: the port cannot be opened, or nothing came.
+        FileExistsError: there is such a file.
+        Unavailable: the port cannot be opened, nothing came, or nothing that a format explains.
 
     """
+    if options.file.exists():
+        raise FileExistsError(f"{options.file} is there already: give another name, or remove it")
+    baudrate, format_name = (options.baud or DEFAULT_BAUDRATE, None) if options.raw else _recognised(options)
     done = threading.Event()
     with options.file.open("xb") as file:
 
         def keep(data: bytes, _stamp_ns: int) -> None:
             file.write(data)
 
-        port = SerialPort(options.port, options.baud, keep)
+        port = SerialPort(options.port, baudrate, keep)
         began = time.monotonic()
         port.start()
         try:
@@ -80,10 +95,22 @@ def record(options: argparse.Namespace) -> int:
     if not size:
         options.file.unlink()
         raise Unavailable(problem or f"{options.port} sent nothing: check the sensor's power and its TX wire")
-    about = About(options.baud, time.monotonic() - began)
+    about = About(baudrate, time.monotonic() - began, format_name)
     _beside(options.file).write_bytes(msgspec.json.encode(about))
-    sys.stdout.write(f"{size} bytes in {about.seconds:.1f} s\n")
+    sys.stdout.write(f"{size} bytes in {about.seconds:.1f} s at {baudrate} baud\n")
     return 0
+
+
+def _recognised(options: argparse.Namespace) -> tuple[int, str]:
+    """Baud rate and format of what speaks at the port."""
+    heard = []
+    for one in listen(options.port, options.baud):
+        heard.append(one)
+        sys.stderr.write(f"{one.baudrate:>7} baud: {one}\n")
+    found = best(heard)
+    if found.match is None:
+        raise Unavailable(f"{nothing(options.port, heard)}; --raw records it all the same")
+    return found.baudrate, found.match.format_name
 
 
 def replay(options: argparse.Namespace) -> int:

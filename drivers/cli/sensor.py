@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Callable, Sequence
 
-from drivers.cli import decode, listen, replay
+from drivers.cli import decode, live, replay
 
 MORE = """\
 examples:
@@ -31,7 +31,7 @@ def main(arguments: Sequence[str]) -> int:
             epilog=MORE,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        run = listen.options(parser)
+        run = live.options(parser)
     return run_parsed(parser, run, rest)
 
 

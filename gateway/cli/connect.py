@@ -28,6 +28,13 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+    add_robot(made)
+    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    return made
+
+
+def add_robot(made: argparse.ArgumentParser) -> None:
+    """The argument `--robot`: which gateway."""
     made.add_argument(
         "--robot",
         metavar="HOST:PORT",
@@ -35,8 +42,6 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         default=Address(),
         help=f"the gateway to ask (default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
-    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
-    return made
 
 
 def connect(arguments: argparse.Namespace, command: str) -> Robot:
@@ -58,6 +63,12 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
             warn(command, f"the link to {address} dropped; trying again")
 
     return Robot(address, LinkSettings(client=f"gwrms {command}"), report)
+
+
+def widened(asked: Iterable[str], description: Description) -> list[str]:
+    """A component's name alone means all that it has: `left_knee` is `left_knee.*`."""
+    components = {each.name for each in description.components}
+    return [f"{name}.*" if name in components else name for name in asked]
 
 
 def check_names(what: str, asked: Iterable[str], known: Sequence[str]) -> None:

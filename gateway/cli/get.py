@@ -1,11 +1,11 @@
 """`gwrms get`: parameters, as the devices have them now."""
 
-from gateway.cli.connect import check_names, connect, parameter_names, parser
+from gateway.cli.connect import check_names, connect, parameter_names, parser, widened
 from gateway.cli.text import exact, say, say_json, table
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 EPILOG = """examples:
-  gwrms get 'gait.*'
+  gwrms get gait                      all of a component
   gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not
   gwrms get left_knee.0x6072:0       by its address in the device"""
 
@@ -17,13 +17,14 @@ def main(argv: list[str]) -> int:
         "names",
         metavar="GLOB",
         nargs="*",
-        help="names, addresses or globs (default: all that can be changed)",
+        help="names, addresses, globs, or a component (default: all that can be changed)",
     )
     arguments = made.parse_args(argv)
     with connect(arguments, "get") as robot:
         description = robot.describe()
-        check_names("parameter", arguments.names, parameter_names(description))
-        values = robot.read(*arguments.names).values
+        names = widened(arguments.names, description)
+        check_names("parameter", names, parameter_names(description))
+        values = robot.read(*names).values
     if arguments.json:
         say_json({"values": values})
     else:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from gateway.cli.connect import channel_names, check_names, connect, parser
+from gateway.cli.connect import channel_names, check_names, connect, parser, widened
 from gateway.cli.text import NONE, age, exact, measured, percent, say, say_json, size, table
 from gateway.client import Robot
 from gateway.wire.component import QualityInfo, Snapshot
@@ -141,8 +141,9 @@ def _facts(snapshot: ResourceSnapshot) -> Iterator[tuple[str, str]]:
 def _values(robot: Robot, arguments: argparse.Namespace) -> int:
     description = robot.describe()
     names = [name for name in channel_names(description) if not name.startswith("resource.")]
-    check_names("channel", arguments.channels, names)
-    snapshot = robot.components(*arguments.channels) if arguments.module == "component" else robot.status()
+    channels = widened(arguments.channels, description)
+    check_names("channel", channels, names)
+    snapshot = robot.components(*channels) if arguments.module == "component" else robot.status()
     if arguments.json:
         say_json(snapshot)
     else:

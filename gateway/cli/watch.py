@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 from gateway.cli.arguments import number
-from gateway.cli.connect import channel_names, check_names, connect, parser
+from gateway.cli.connect import channel_names, check_names, connect, parser, widened
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
 from gateway.wire.component import ChannelInfo
@@ -29,7 +29,9 @@ examples:
 def main(argv: list[str]) -> int:
     """Run `gwrms watch`."""
     made = parser("watch", "Follow channels live, one line for every tick.", EPILOG)
-    made.add_argument("channels", metavar="CHANNEL", nargs="+", help="names or globs")
+    made.add_argument(
+        "channels", metavar="CHANNEL", nargs="+", help="names, globs, or a component: all of its channels"
+    )
     made.add_argument(
         "--rate", type=_rate, default=10.0, metavar="HZ", help="ticks a second, 0.1 to 1000 (default 10)"
     )
@@ -37,9 +39,10 @@ def main(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     with connect(arguments, "watch") as robot:
         description = robot.describe()
-        check_names("channel", arguments.channels, channel_names(description))
-        modules = _modules(arguments.channels, description)
-        rows = itertools.islice(_rows(robot, arguments.channels, modules, arguments.rate), arguments.count)
+        channels = widened(arguments.channels, description)
+        check_names("channel", channels, channel_names(description))
+        modules = _modules(channels, description)
+        rows = itertools.islice(_rows(robot, channels, modules, arguments.rate), arguments.count)
         try:
             if arguments.json:
                 _follow_json(rows)

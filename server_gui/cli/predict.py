@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import msgspec
 
-from gateway.cli.text import say, say_json
-from gateway.client import Address, BadAddress
+from gateway.cli.text import say, say_json, warn
+from gateway.client import Address, ConnectionState
 from ml.registry.card import age_days
 from ml.store import Store, sessions
 from ml.store.private import private_files
@@ -24,9 +24,9 @@ from server_gui.core.prediction.live import Live
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rehearsals import BENCHMARKS
 from server_gui.core.prediction.replay import Replayed, replay
-from server_gui.core.settings.server_file import ServerSettings, SettingsError, load, name_of
+from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, load, name_of
 from server_gui.processes.ending import Ended, Ending
-from server_gui.terminal.predictions import replay_told, told
+from server_gui.terminal.predictions import link, replay_told, told
 
 LOOK_S: Final = 0.25  # a look at what has come waits at most so long
 
@@ -82,20 +82,31 @@ def _settings(arguments: argparse.Namespace) -> ServerSettings:
 
 def _addresses(settings: ServerSettings, asked: list[str]) -> dict[str, Address]:
     """By name in the server's file, else by address."""
-    return dict(_address(settings, text) for text in asked)
+    names = [_name(settings, text) for text in asked]
+    given = {
+        name: text.removeprefix(f"{name}=")
+        for name, text in zip(names, asked, strict=True)
+        if text not in settings.robots
+    }
+    known = add_robots(settings, given).robots
+    return {name: known[name].where for name in names}
 
 
-def _address(settings: ServerSettings, text: str) -> tuple[str, Address]:
-    if text in settings.robots:
-        return text, settings.robots[text].where
-    try:
-        return name_of(text), Address.parse(text)
-    except BadAddress as error:
-        names = ", ".join(settings.robots) or "none"
-        raise SettingsError(f"{text!r} is no robot of the server's file ({names}), and {error}") from error
+def _name(settings: ServerSettings, text: str) -> str:
+    """Of a robot that the server's file names, or that is given with its address."""
+    name, equals, _ = text.partition("=")
+    if equals or text in settings.robots:
+        return name
+    if ":" in text:
+        return name_of(text)
+    known = ", ".join(settings.robots) or "none"
+    raise SettingsError(
+        f"{text!r} is no robot of the server's file, which names {known}; say where it is: {text}=HOST:PORT"
+    )
 
 
 def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: argparse.Namespace) -> int:
+    linked = _Linked()
     until_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
     predicted = False
     with (
@@ -109,7 +120,25 @@ def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: ar
             news = live.look(LOOK_S)
             predicted |= any(isinstance(one, Predicted) for one in news)
             show(live, news)
+            if arguments.json or not sys.stdout.isatty():  # the picture says it itself
+                linked(live)
+    if not predicted:
+        warn("predict", "nothing was predicted")
     return 0 if predicted else 1
+
+
+class _Linked:
+    """Say on stderr how each robot is reached, whenever that changes."""
+
+    def __init__(self) -> None:
+        self._said: dict[str, str] = {}
+
+    def __call__(self, live: Live) -> None:
+        for name, watched in live.robots.items():
+            told_now = "connected" if watched.robot.link.state is ConnectionState.CONNECTED else link(watched)
+            if self._said.get(name) != told_now:
+                self._said[name] = told_now
+                warn("predict", f"{name}: {told_now}")
 
 
 @contextlib.contextmanager
@@ -212,7 +241,7 @@ def _parser() -> argparse.ArgumentParser:
         "--robot",
         action="append",
         default=[],
-        metavar="NAME|HOST:PORT",
+        metavar="NAME|[NAME=]HOST:PORT",
         help="live: a robot of the server's file, or where one is; repeat for more",
     )
     made.add_argument("--seconds", type=float, metavar="N", help="live: end after so long")

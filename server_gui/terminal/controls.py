@@ -1,6 +1,7 @@
-"""What keys do: choose a parameter, raise or lower it, stop, quit. Draws nothing."""
+"""What keys do: choose a parameter, raise or lower it, stop, end a held stop, quit. Draws nothing."""
 
 import math
+import time
 from collections.abc import Callable
 
 from gateway.wire.parameter import ParameterInfo
@@ -11,6 +12,7 @@ from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.keys import Key
 
 STEPS = 20  # from one end of a parameter's range to the other
+AGAIN_S = 3.0  # within which a reset is asked for twice
 
 
 class Controls:
@@ -20,6 +22,7 @@ class Controls:
         self.wants_to_quit = False
         self.stop_sent = False
         self.note = ""
+        self._reset_until_s = 0.0  # a second press until then is one
         self._station = station
         self._row = 0
         self._does: dict[Key, Callable[[], None]] = {
@@ -28,19 +31,25 @@ class Controls:
             Key.LEFT: lambda: self._change(-1),
             Key.RIGHT: lambda: self._change(+1),
             Key.STOP: self._stop,
+            Key.RESET: self._reset,
             Key.QUIT: self._quit,
         }
 
     @property
     def names(self) -> list[str]:
         """The parameters that can be chosen, in the robot's order."""
-        return list(self._station.robot.parameters)
+        return [name for name in self._station.robot.parameters if name in self._station.known]
 
     @property
     def selected(self) -> str | None:
         """The chosen parameter, None while none is known."""
         names = self.names
         return names[min(self._row, len(names) - 1)] if names else None
+
+    @property
+    def asks_again(self) -> bool:
+        """Whether a second press of the same key is waited for."""
+        return time.monotonic() < self._reset_until_s
 
     @property
     def writing(self) -> bool:
@@ -68,13 +77,23 @@ class Controls:
         if target is None:
             self.note = f"{name} has no limits to move between; use gwrms set {name}=VALUE"
         elif target != value:
-            self.note = f"writing {name} = {target:.10g} {info.unit}"
             unit = unit_of(name, info.unit, Units())
+            self.note = f"writing {name} = {unit.editable(target)} {unit.symbol}"
             problem = refusal(target, value, info, unit)
             self._station.write((Change(name, unit, value, target, elsewhere=False, problem=problem),))
 
     def _stop(self) -> None:
         self._station.stop("STOP key of the dashboard")
+
+    def _reset(self) -> None:
+        """End a held stop; a key that is hit by mistake does nothing."""
+        if not self.asks_again:
+            self._reset_until_s = time.monotonic() + AGAIN_S
+            self.note = "r again ends a held stop: every drive is switched off, none is enabled"
+            return
+        self._reset_until_s = 0.0
+        self.note = "ending the held stop …"
+        self._station.reset()
 
     def _quit(self) -> None:
         self.wants_to_quit = True

@@ -18,6 +18,8 @@ from server_gui.terminal.keys import Keyboard
 FRAME_S = 0.1
 PICTURE_SIZE = (118, 27)
 WIDE_COLUMNS, WIDE_LINES = 110, 27
+FEET_LINES = 6
+FRAME = 2  # lines of a panel that are its frame
 
 
 def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
@@ -26,16 +28,18 @@ def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]
     columns, lines = size
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
     page = Layout()
+    above, below = 3 if look.roomy else 1, 2
+    joints = 2 + 1 + max(6, len(robot.names("joint")))
     page.split_column(
-        Layout(panels.header(robot, where, look), size=3 if look.roomy else 1),
-        Layout(panels.joints(station, look), size=2 + 1 + max(6, len(robot.names("joint")))),
+        Layout(panels.header(robot, where, look), size=above),
+        Layout(panels.joints(station, look), size=joints),
         Layout(name="lower"),
-        Layout(panels.footer(station, controls, where), size=2),
+        Layout(panels.footer(station, controls, where), size=below),
     )
     page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(station, look), ratio=2))
     page["left"].split_column(
-        Layout(panels.feet_and_trunk(robot, gait, look), size=6),
-        Layout(panels.parameters(robot, controls, look)),
+        Layout(panels.feet_and_trunk(robot, gait, look), size=FEET_LINES),
+        Layout(panels.parameters(robot, controls, look, lines - above - joints - below - FEET_LINES - FRAME)),
     )
     return page
 

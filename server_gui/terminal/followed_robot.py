@@ -5,6 +5,8 @@ import concurrent.futures
 from collections.abc import Callable
 from typing import Self
 
+from msgspec.structs import replace
+
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from server_gui.core.desk.station import Station
@@ -24,13 +26,14 @@ FOLLOWING = FollowSettings(
     parameters=("gait.*",),
     resources=ResourceSnapshotParams(processes=False),
 )
+EVERY_PARAMETER = replace(FOLLOWING, client="gwrms top", parameters=("*",))
 PROCESSES = ResourceSnapshotParams(limit=8)
 
 
 class FollowedRobot:
     """Use it as a context manager; call `update` often, then read `station`."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, following: FollowSettings = FOLLOWING) -> None:
         self.summary: Summary | None = None
         self._mailbox = Mailbox()
         self._posted: collections.deque[Callable[[], None]] = collections.deque()
@@ -40,11 +43,11 @@ class FollowedRobot:
             address,
             self._mailbox.put,
             lambda: self._posted.append(self.station.lost_control),
-            CLIENT,
+            following.client,
             PROCESSES,
         )
         self.station = Station(str(address), str(address), self._link, self._posted.append, News())
-        self._feed = Feed(address, [self._mailbox.put], FOLLOWING)
+        self._feed = Feed(address, [self._mailbox.put], following)
         self._running: list[concurrent.futures.Future[None]] = []
         self._given_back = 0  # the revision of what was written when the lease was given back
 

@@ -17,6 +17,7 @@ class Key(Enum):
     LEFT = "left"
     RIGHT = "right"
     STOP = "s"
+    RESET = "r"
     QUIT = "q"
 
 
@@ -39,6 +40,8 @@ SEQUENCES = {
     b"s": Key.STOP,
     b"S": Key.STOP,
     b" ": Key.STOP,
+    b"r": Key.RESET,
+    b"R": Key.RESET,
     b"q": Key.QUIT,
     b"Q": Key.QUIT,
 }

@@ -55,11 +55,11 @@ def words(text: str, style: str = "") -> Text:
     return Text(plain(text), style=style)
 
 
-def state_text(word: str) -> Text:
-    """Return a state as shape, colour and word."""
+def state_text(word: str, more: str = "") -> Text:
+    """Return a state as shape, colour and word, and what else there is to say of it."""
     said = word.replace("_", " ").lower()
     mark = STATES.get(said, UNKNOWN)
-    return words(f"{mark.shape} {said}", mark.colour)
+    return words(f"{mark.shape} {said} {more}".rstrip(), mark.colour)
 
 
 def sparkline(values: Iterable[float | None], low: float, high: float, width: int) -> str:

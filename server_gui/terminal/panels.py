@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich import box
@@ -14,9 +15,12 @@ from gateway.client import ConnectionState
 from gateway.plain import plain
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
+from server_gui.core.processing.units import Unit, Units
+from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.controls import Controls
@@ -44,6 +48,7 @@ TILT_RAD = math.radians(15)
 SPARK_SPAN_RAD = math.radians(20)  # at least: a joint at rest is a flat line, not a magnified one
 PAST_ROWS = 240
 ROWS_A_BLOCK = 6
+SAID_S = 10.0  # for so long what became of a reset is shown
 STOP_STYLES = {StopState.SENT: WARN, StopState.CONFIRMED: GOOD, StopState.NOT_CONFIRMED: BAD}
 NOT_WRITTEN = (WriteState.FAILED, WriteState.NOT_STORED, WriteState.UNKNOWN)
 
@@ -60,7 +65,7 @@ class Look:
     roomy: bool  # frames, limits and process numbers
 
 
-WIDE = Look(angle=28, past=34, foot=20, parameter=20, share=12, roomy=True)
+WIDE = Look(angle=28, past=34, foot=20, parameter=10, share=12, roomy=True)
 NARROW = Look(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
 
 
@@ -136,7 +141,8 @@ def _drive(robot: Robot, name: str, stale: bool) -> Text:
     word = robot.word(f"{name}.state")
     if stale or word is None:
         return words(word or NONE, style=OLD)
-    return state_text(word)
+    code = robot.values.get(f"{name}.error_code")
+    return state_text(word, f"{int(code):04X}h" if code else "")
 
 
 def _part_state(robot: Robot, name: str) -> Text:
@@ -186,36 +192,49 @@ def _walk(gait: Gait, look: Look) -> str:
     return f"{cadence}, stance {shares} %"
 
 
-def parameters(robot: Robot, controls: Controls, look: Look) -> RenderableType:
-    """Return the gait parameters as the controller holds them; the chosen one can be moved."""
+def parameters(robot: Robot, controls: Controls, look: Look, rows: int) -> RenderableType:
+    """Return the parameters as the devices have them, as many as fit; the chosen one can be moved."""
     grid = Table.grid(expand=True, padding=(0, 1))
-    for justify in ("left", "left", "right", "left", "left"):
-        grid.add_column(justify=justify, no_wrap=True)
+    for width in (1, None, 7, 4, None):
+        grid.add_column(justify="right" if width == 7 else "left", no_wrap=True, min_width=width)
     known = robot.description.parameters if robot.description is not None else []
     infos = {info.name: info for info in known}
-    for name, held in robot.parameters.items():
+    names = list(robot.parameters)
+    for name in _around(names, controls.selected, rows):
+        held = robot.parameters[name]
         chosen = name == controls.selected
         style = "bold" if chosen else "default"
-        value = words(NONE if held.value is None else f"{held.value:.10g}", style=style)
+        unit = unit_of(name, held.unit, Units())
+        value = words(NONE if held.value is None else f"{float(unit.shown(held.value)):.6g}", style=style)
         grid.add_row(
             "▶" if chosen else " ",
             words(name, style=style),
             value,
-            words(held.unit),
-            _range(held, infos.get(name), look),
+            words(unit.symbol),
+            _range(held, infos.get(name), unit, look),
         )
     if not robot.parameters:
         grid.add_row("", words("not known yet", style=OLD), "", "", "")
-    return _panel(grid, "Gait parameters", robot, _age(robot.parameters_at_ns))
+    hidden = len(names) > rows and controls.selected is not None
+    place = f" {names.index(controls.selected or names[0]) + 1} of {len(names)}" if hidden else ""
+    return _panel(grid, f"Parameters{place}", robot, _age(robot.parameters_at_ns))
 
 
-def _range(held: ParameterValue, info: ParameterInfo | None, look: Look) -> Text:
+def _around(names: Sequence[str], chosen: str | None, rows: int) -> Sequence[str]:
+    """As many of them as there are rows, with the chosen one among them."""
+    place = names.index(chosen) if chosen in names else 0
+    first = max(0, min(place - rows // 2, len(names) - rows))
+    return names[first : first + max(1, rows)]
+
+
+def _range(held: ParameterValue, info: ParameterInfo | None, unit: Unit, look: Look) -> Text:
     if held.problem is not None or info is None or info.min is None or info.max is None:
         return words(held.problem or "no limits known", style=WARN)
     where = needle(held.value, info.min, info.max, look.parameter)
     if not look.roomy:
         return words(where, style=DIM)
-    return Text.assemble(f"{info.min:>6g} ", (where, DIM), f" {info.max:g}")
+    low, high = float(unit.shown(info.min)), float(unit.shown(info.max))
+    return Text.assemble(f"{low:>6.4g} ", (where, DIM), f" {high:.4g}")
 
 
 def resources(station: Station, look: Look) -> RenderableType:
@@ -253,6 +272,8 @@ def footer(station: Station, controls: Controls, where: str) -> RenderableType:
         " choose   ",
         ("←→", "bold"),
         " lower, raise   ",
+        ("r r", "bold"),
+        " reset   ",
         ("q", "bold"),
         " quit",
     )
@@ -268,6 +289,8 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
     robot, writing = station.robot, station.writing
     if controls.stop_sent:
         return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")
+    if controls.asks_again:
+        return words(controls.note, style=WARN)
     if writing.state in NOT_WRITTEN:
         return words(f"✕ {writing.state.value}: {writing.text}", style=BAD)
     if robot.last_failure is not None:
@@ -282,6 +305,9 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
         )
     if controls.writing:
         return words(controls.note, style=DIM)
+    newest = next(iter(station.news.items), None)
+    if newest is not None and newest.kind is NewsKind.STOP and time.time() - newest.utc_s < SAID_S:
+        return words(newest.text, style=WARN)
     if writing.state is WriteState.DONE:
         return words(f"✓ {writing.text}", style=GOOD)
     hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"

@@ -33,7 +33,7 @@ def told(name: str, watched: Watched) -> str:
     """Return a robot now: what its models say and how far to believe it; faults and rules beside."""
     known = watched.predictions
     shown = [known.by_task[task] for task in TASKS if task in known.by_task]
-    lines = [f"{name}: {_link(watched)}"]
+    lines = [f"{name}: {link(watched)}"]
     if shown:
         lines += [table(HEADER, map(_row, shown), RIGHT), table(MODELS, map(_model, shown)).rstrip()]
     lines += [f"{task}: {why}" for task, why in known.why.items()] or [known.problem] * (not shown)
@@ -47,7 +47,8 @@ def told(name: str, watched: Watched) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _link(watched: Watched) -> str:
+def link(watched: Watched) -> str:
+    """How a robot is reached, and how much comes from it."""
     link = watched.robot.link
     if link.state is ConnectionState.CONNECTED:
         age_s = watched.robot.age_s()

@@ -24,7 +24,7 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "models": ("ls", "show", "promote", "rollback", "history", "export"),
     "sim": ("run",),
 }
-_ALONE: Final = frozenset({"sensor", "sim"})  # which are commands without such a word too
+ALONE: Final = frozenset({"sensor", "sim"})  # which are commands without such a word too
 _HEAD: Final = """# Commands
 
 `gwrms COMMAND --help` says what stands here. Those that ask a robot take `--robot HOST:PORT`
@@ -64,7 +64,7 @@ def commands() -> Iterator[Command]:
     """Every command that has arguments of its own, in the order of `gwrms --help`."""
     for name in main.COMMANDS:
         words = WORDS.get(name, ())
-        if not words or name in _ALONE:
+        if not words or name in ALONE:
             yield Command((name,), parser_of((name,)))
         for word in words:
             yield Command((name, word), parser_of((name, word)))
@@ -91,7 +91,7 @@ def parser_of(words: tuple[str, ...]) -> argparse.ArgumentParser:
 
 def _anchor(words: tuple[str, ...]) -> str:
     first = words[0]
-    chosen = (first, WORDS[first][0]) if first in WORDS and first not in _ALONE else words
+    chosen = (first, WORDS[first][0]) if first in WORDS and first not in ALONE else words
     return "gwrms-" + "-".join(chosen)
 
 

@@ -71,7 +71,7 @@ class Station:
         self.flash = Flash(self.audit)
         self._commands = commands
         self._deliver = deliver
-        self._news = news
+        self.news = news
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
 
@@ -103,7 +103,7 @@ class Station:
 
     def tell(self, kind: NewsKind, text: str) -> None:
         """Note something about this robot."""
-        self._news.add(kind, self.title, text)
+        self.news.add(kind, self.title, text)
 
     # --- what has come
 

@@ -169,6 +169,45 @@ def test_refusal_is_a_sentence_and_changes_nothing(
     assert robot.parameters["gait.step_length"] == 0.40
 
 
+@pytest.mark.parametrize(
+    ("arguments", "shown"),
+    [
+        (("get", "gait"), "gait.step_length"),
+        (("watch", "left_knee", "--count", "1", "--rate", "50"), "left_knee.position [rad]"),
+        (("snapshot", "component", "left_knee"), "left_knee.position"),
+    ],
+)
+def test_a_component_alone_means_all_that_it_has(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], shown: str
+) -> None:
+    assert run(robot, *arguments) == 0
+    said = printed(capsys)
+    assert shown in said
+    assert "trunk" not in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kind", "words"),
+    [
+        (("get", "gait.step_lenght"), "UnknownName", "did you mean gait.step_length"),
+        (("set", "gait.step_length=9"), "out_of_limit", "above 0.6 m"),
+        (("describe", "--robot", "127.0.0.1:1"), "", "no gateway at 127.0.0.1:1"),
+    ],
+)
+def test_an_error_is_an_object_for_machines(
+    robot: FakeRobot,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    kind: str,
+    words: str,
+) -> None:
+    assert main([*arguments[:1], "--robot", robot.address, *arguments[1:], "--json"]) == 1
+    (line,) = printed(capsys).splitlines()
+    error = json.loads(line)["error"]
+    assert words in error["message"]
+    assert kind in error["kind"]
+
+
 def test_lease_of_another_is_said_in_the_robots_words(
     robot: FakeRobot, capsys: pytest.CaptureFixture[str]
 ) -> None:

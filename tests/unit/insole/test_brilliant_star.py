@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.cli.listen import table
+from drivers.cli.live import table
 from drivers.identify import recognise
 from drivers.insole.build import insoles
 from drivers.insole.formats.brilliant_star import FORMAT, HEADER, LAYOUT, BrilliantStarParser

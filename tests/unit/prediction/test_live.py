@@ -1,7 +1,8 @@
 """`gwrms predict --robot`: what is said of robots that nobody records, with faults beside."""
 
 import json
-from collections.abc import Callable, Iterator
+import signal
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from msgspec.structs import replace
 from gateway.client import Address
 from server_gui.cli import predict
 from server_gui.core.prediction.live import Live
+from server_gui.core.prediction.news import Predicted, PredictionNews
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.core.settings.server_file import SettingsError
 from server_gui.terminal.predictions import told
@@ -23,6 +25,11 @@ WALKING = RuleSettings("activity", "walk", 0.5, action=Action.STOP)
 def robot() -> Iterator[SteadyRobot]:
     with SteadyRobot() as robot:
         yield robot
+
+
+def _ended_by_a_prediction(_: Live, foreseen: Sequence[PredictionNews]) -> None:
+    if any(isinstance(one, Predicted) and one.robot == "new" for one in foreseen):
+        signal.raise_signal(signal.SIGINT)
 
 
 def until(live: Live, so: Callable[[], object]) -> None:
@@ -58,9 +65,37 @@ def test_a_robot_that_is_not_there_is_said_and_no_success(
     argv = ["--config", str(config), "--robot", "exo-01", "--seconds", "0.3"]
     assert predict.main(argv) == 1
     assert predict.main([*argv, "--json"]) == 1
-    assert not [line for line in capsys.readouterr().out.splitlines() if "label" in json.loads(line)]
-    with pytest.raises(SettingsError, match=r"'h:x' is no robot of the server's file \(exo-01\), and"):
-        predict.main(["--config", str(config), "--robot", "h:x"])
+    said = capsys.readouterr()
+    assert not [line for line in said.out.splitlines() if "label" in json.loads(line)]
+    assert said.err.count("exo-01: waiting: no gateway at") == 2
+    assert said.err.count("nothing was predicted") == 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        ("exo-2", "'exo-2' is no robot of the server's file, which names exo-01; .* exo-2=HOST:PORT"),
+        ("h:x", r"h-x: 'h:x' is not a robot's address; write HOST:PORT"),
+        ("left=h:x", r"left: 'h:x' is not a robot's address"),
+        ("new=127.0.0.1:1", r"127\.0\.0\.1:1 is exo-01 already"),
+    ],
+)
+def test_a_robot_that_cannot_be_meant_is_refused(tmp_path: Path, asked: str, why: str) -> None:
+    config = tmp_path / "server.toml"
+    config.write_text('[robots]\nexo-01 = "127.0.0.1:1"\n')
+    with pytest.raises(SettingsError, match=why):
+        predict.main(["--config", str(config), "--robot", asked])
+
+
+def test_a_robot_may_be_named_with_its_address(
+    robot: SteadyRobot, folder_url: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    publish(folder_url)
+    argv = ["--robot", f"new={robot.address}", "--url", folder_url, "--seconds", "60", "--json"]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(predict, "_show_json", _ended_by_a_prediction)
+        assert predict.main(argv) == 0
+    assert "gwrms predict: new: connected" in capsys.readouterr().err
 
 
 def test_prediction_that_is_off_for_recording_is_on_for_who_asks(folder_url: str) -> None:

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import random
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from drivers.cli import listen, sensor
+from drivers.cli import listen, live, sensor
 from drivers.errors import SettingsError, Unavailable
+from drivers.identify import Match
 from tests.support.waiting import until
 from tests.unit.port.terminals import Terminal
 from tests.unit.sensor_cli.streams import capture, streams
@@ -127,6 +129,7 @@ def test_unknown_sensor_is_identified_and_shown_live(
     out = capsys.readouterr().out
     assert name in out
     assert f'port = "{terminal.path}"' in out
+    assert ("axes = [" in out) == (name == "witmotion")
     assert shown in out
 
 
@@ -138,6 +141,12 @@ def test_identified_sensor_as_json(
         assert sensor.main([str(terminal.path), "--json"]) == 0
     (line,) = lines(capsys)
     assert line["found"]["match"]["format_name"] == "xsens"
+    assert 'format = "xsens"\naxes = ["x","y","z"]' in line["table"]
+
+
+def test_which_foot_an_insole_is_under_is_asked_where_its_frames_do_not_say() -> None:
+    lines_of_numbers = Match("insole-csv", None, 20, 1.0, 3)
+    assert live.table("/dev/x", 9600, lines_of_numbers).startswith("[insole.left_insole]  # or right_insole")
 
 
 def test_silent_port_is_called_silent(
@@ -160,6 +169,7 @@ def test_what_is_recorded_is_replayed_at_its_pace(
     with Talking(terminal, streams()["bno08x-rvc"]):
         assert sensor.main(["record", str(terminal.path), str(file), "--seconds", "1"]) == 0
     assert file.stat().st_size > 500
+    assert json.loads((tmp_path / "walk.bin.json").read_bytes())["format"] == "bno08x-rvc"
     monkeypatch.setattr(listen, "LISTEN_S", 0.5)
     replaying = threading.Thread(target=sensor.main, args=(["replay", str(file), "--link", str(link)],))
     replaying.start()
@@ -181,10 +191,31 @@ def test_recording_never_overwrites(terminal: Terminal, tmp_path: Path) -> None:
     assert file.read_bytes() == b"precious"
 
 
-def test_recording_of_silence_leaves_no_file(terminal: Terminal, tmp_path: Path) -> None:
-    with pytest.raises(Unavailable, match="sent nothing"):
-        sensor.main(["record", str(terminal.path), str(tmp_path / "walk.bin"), "--seconds", "0.1"])
+@pytest.mark.parametrize(("how", "why"), [("--raw", "sent nothing"), ("--baud=9600", "is silent")])
+def test_recording_of_silence_leaves_no_file(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, why: str
+) -> None:
+    monkeypatch.setattr(listen, "LISTEN_S", 0.05)
+    with pytest.raises(Unavailable, match=why):
+        sensor.main(["record", str(terminal.path), str(tmp_path / "walk.bin"), "--seconds", "0.1", how])
     assert not (tmp_path / "walk.bin").exists()
+
+
+def test_noise_as_at_a_wrong_baud_rate_is_recorded_only_where_that_is_said(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(listen, "LISTEN_S", 0.2)
+    file = tmp_path / "walk.bin"
+    argv = ["record", str(terminal.path), str(file), "--seconds", "0.5", "--baud", "115200"]
+    with Talking(terminal, random.Random(1).randbytes(4000)):
+        with pytest.raises(Unavailable, match=r"no known format explains at 115200 baud.*--raw"):
+            sensor.main(argv)
+        assert not file.exists()
+        assert sensor.main([*argv, "--raw"]) == 0
+    assert file.stat().st_size > 0
+    about = json.loads((tmp_path / "walk.bin.json").read_bytes())
+    assert (about["baudrate"], about["format"]) == (115200, None)
+    assert "at 115200 baud" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,14 @@ from concurrent.futures import Future
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from rich.console import Console
 
 from gateway.client import Batch, ConnectionState, LinkLost
-from gateway.wire.component import ComponentInfo, QualityInfo, Snapshot
+from gateway.wire.component import ChannelInfo, ComponentInfo, QualityInfo, Snapshot
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Written
 from gateway.wire.robot import Clock, Description, GuardInfo
-from gateway.wire.stop import StopInfo, Stopped
+from gateway.wire.stop import Reset, StopInfo, Stopped
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, LinkChanged, Looked, Telemetry
 from server_gui.core.follow.news import News
@@ -156,6 +157,23 @@ def test_stop_goes_out_also_during_a_write_and_each_time() -> None:
     assert len(asked.named("stop")) == 2
 
 
+def test_a_reset_needs_the_key_twice_within_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 100.0
+    monkeypatch.setattr("server_gui.terminal.controls.time.monotonic", lambda: now_s)
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
+    controls.press(Key.RESET)
+    assert "r again ends a held stop" in screen(station, controls)
+    now_s += 10.0
+    controls.press(Key.RESET)
+    assert asked.named("reset") == []
+    controls.press(Key.RESET)
+    assert len(asked.named("reset")) == 1
+    asked.answer(Reset({}, {"left_knee": "no answer"}, True))
+    assert "stop still held: left_knee: no answer" in screen(station, controls)
+
+
 @pytest.mark.parametrize(
     ("low", "high", "largest", "step"),
     [(0.2, 0.6, 0.1, 0.02), (0.2, 0.6, 0.005, 0.005), (0.0, 2000.0, None, 100.0), (-0.1, 0.3, None, 0.02)],
@@ -227,6 +245,35 @@ def test_live_values_are_shown_in_degrees_and_newtons(
     assert "old" not in text
 
 
+def test_a_fault_is_shown_with_its_error_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    station = a_station()
+    state = ChannelInfo("left_knee.state", "", "left_knee", "state", {"3": "FAULT"})
+    description = station.robot.description
+    assert description is not None
+    station.take([Described(replace(description, channels=[state]))])
+    _feed(station, {"left_knee.state": [3.0], "left_knee.error_code": [0x8611]})
+    monkeypatch.setattr("time.monotonic_ns", lambda: 1_000_000)
+    assert "■ fault 8611h" in screen(station)
+
+
+@pytest.mark.parametrize("chosen", [0, 7, 29])
+def test_of_many_parameters_the_chosen_one_is_in_sight(chosen: int) -> None:
+    station = a_station()
+    names = [f"gait.number_{number}" for number in range(30)]
+    description = station.robot.description
+    assert description is not None
+    known = [parameter(name, 0.0, 1.0) for name in names]
+    station.take([Described(replace(description, parameters=known))])
+    station.robot.parameters = {name: ParameterValue(0.25, "m", 0.0, 1.0, 0) for name in names}
+    controls = Controls(station)
+    for _ in range(chosen):
+        controls.press(Key.DOWN)
+    for size in ((118, 27), (80, 24)):
+        text = " ".join(screen(station, controls, size).split())
+        assert f"▶ gait.number_{chosen} 250 mm" in text
+        assert f"Parameters {chosen + 1} of 30" in text
+
+
 def test_old_values_say_how_old_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     station = a_station()
     _feed(station, {"left_knee.position": [0.5]})
@@ -259,7 +306,7 @@ def test_write_is_shown_as_read_back() -> None:
     station = a_station(asked)
     controls = Controls(station)
     controls.press(Key.RIGHT)
-    assert "writing gait.step_length = 0.42 m" in screen(station, controls)
+    assert "writing gait.step_length = 420 mm" in screen(station, controls)
     asked.answer(Written(1, {"gait.step_length": 0.4}, {"gait.step_length": 0.42}))
     assert "✓ 1 parameter written and read back" in screen(station, controls)
 

@@ -1,0 +1,62 @@
+"""`gwrms top`: one robot in the terminal, live; its parameters changed, stopped, reset."""
+
+import argparse
+import math
+import sys
+import time
+from typing import Final
+
+from gateway.cli.arguments import seconds
+from gateway.cli.connect import add_robot
+
+EPILOG: Final = """keys
+  s, space     STOP: quick stop on every drive (software, not safety-rated)
+  r r          end a held stop, pressed twice: every drive is switched off, none is enabled
+  ↑ ↓          choose a parameter
+  ← →          lower or raise it; the lease is held only while it is written
+  q            end
+
+Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says how old.
+Without a terminal: gwrms watch, gwrms describe.
+
+exit status
+  0 ended by q or after --seconds; 1 it cannot be shown; 130, 143 ended by Ctrl-C, SIGTERM"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms top`."""
+    arguments = _parser().parse_args(argv)
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        sys.stderr.write("gwrms top: this is no terminal; gwrms watch and gwrms describe need none\n")
+        return 1
+    from server_gui.processes.ending import Ended, Ending
+    from server_gui.terminal.controls import Controls
+    from server_gui.terminal.dashboard import Dashboard
+    from server_gui.terminal.followed_robot import EVERY_PARAMETER, FollowedRobot
+
+    ends_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
+    with Ending() as ending, FollowedRobot(arguments.robot, EVERY_PARAMETER) as followed:
+
+        def tick() -> bool:
+            ending.check()
+            followed.update()
+            return time.monotonic() < ends_s
+
+        try:
+            Dashboard(followed.station, Controls(followed.station), str(arguments.robot)).run(tick)
+        except Ended as ended:
+            return ended.status
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(
+        prog="gwrms top",
+        description="One robot in the terminal, live: its joints, feet, trunk, parameters and computer.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add_robot(made)
+    made.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds")
+    return made

@@ -1,0 +1,104 @@
+"""A part of GWRMS alone: every help is there, and what is missing is named with the extra that brings it."""
+
+import importlib.metadata
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from gateway import main, missing
+from tools.draw.commands import commands
+
+ROOT = Path(__file__).parents[3]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = {name: wanted for name, wanted in PROJECT["optional-dependencies"].items() if name != "dev"}
+# In a process of its own: what is imported once cannot be missing any more.
+ASKED = """
+import contextlib, io, sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {missing}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Missing())
+from gateway.main import COMMANDS, main
+for words in {words}:
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        try:
+            status = main([*words, "--help"])
+        except SystemExit as ended:
+            status = ended.code
+    if status or "usage: gwrms " + words[0] not in said.getvalue():
+        print(*words, status, said.getvalue())
+"""
+
+
+def _names(requirement: str) -> str:
+    return re.split(r"[\[<>=!;~ ]", requirement)[0].lower().replace("_", "-")
+
+
+def _imported(extra: str) -> set[str]:
+    """What is imported of the packages that this extra names itself."""
+    wanted = set(map(_names, EXTRAS[extra])) - {"gwrms"}
+    found = importlib.metadata.packages_distributions()
+    return {name for name, packages in found.items() if wanted & set(map(_names, packages))} - {"Shiboken"}
+
+
+def test_help_needs_no_extra() -> None:
+    absent = set().union(*map(_imported, EXTRAS))
+    assert {"rich", "numpy", "PySide6", "obstore"} <= absent
+    words = [[name] for name in main.COMMANDS] + [list(one.words) for one in commands()]
+    script = ASKED.format(missing=absent, words=words)
+    asked = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (asked.returncode, asked.stdout, asked.stderr) == (0, "", "")
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_what_is_missing_is_named_with_an_extra_that_brings_it(extra: str) -> None:
+    brought = {name: set(map(_names, wanted)) for name, wanted in EXTRAS.items()}
+    packages = importlib.metadata.packages_distributions()
+    for name in _imported(extra):
+        assert brought[missing.extra_of(name)] & set(map(_names, packages[name])), name
+        assert f"pip install 'gwrms[{missing.extra_of(name)}]'" in missing.explained(name)
+
+
+def test_help_that_was_written_down_is_what_the_parser_says() -> None:
+    for one in commands():
+        said = one.parser.format_help().replace("\n\nresource:", "")  # whose title alone is not written down
+        assert missing.help_of([*one.words, "--help"]) == said
+
+
+def test_nothing_but_help_is_answered_from_what_was_written_down() -> None:
+    assert missing.help_of(["sessions", "ls"]) is None
+    assert missing.help_of(["gatway", "--help"]) is None
+
+
+def test_a_command_that_is_misspelled_is_guessed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["gatway"]) == 2
+    assert "did you mean gateway" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("gwrms se", {"set", "sensor", "sessions"}),
+        ("gwrms cloud v", {"verify", "vacuum"}),
+        ("gwrms sim r", {"run"}),
+        ("gwrms set --tr", {"--trial"}),
+        ("gwrms completion ", {"bash", "zsh", "fish"}),
+    ],
+)
+def test_bash_completes(line: str, offered: set[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["completion", "bash"]) == 0
+    words = line.split(" ")
+    asked = f"""{capsys.readouterr().out}
+COMP_WORDS=({" ".join(f'"{word}"' for word in words)}); COMP_CWORD={len(words) - 1}
+"$(complete -p gwrms | sed 's/.*-F \\([^ ]*\\).*/\\1/')"; printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+    said = subprocess.run(["bash"], input=asked, capture_output=True, text=True, check=True).stdout
+    assert set(said.split()) == offered
