@@ -5,6 +5,7 @@ Where a line is JSON, its method counts, and never what stands in the parameters
 """
 
 import re
+from collections.abc import Iterator
 from typing import Any, Final
 
 import msgspec
@@ -139,13 +140,20 @@ class StopSplitter(LineSplitter):
         self._search: StopSearch | None = None
 
     def feed(self, data: bytes) -> list[Line]:
-        self._suspect = self.may_stop(data)
+        self._suspect = self._may_stop(data)
         return super().feed(data)
 
-    def may_stop(self, data: bytes) -> bool:
+    def _may_stop(self, data: bytes) -> bool:
         """Whether there may be a stop in what these bytes end or hold; costs little."""
         seam = bytes(self._rest[-_LONGEST_MARK:]) + data
         return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
+
+    def newest_first(self, data: bytes) -> Iterator[StopRequest | None]:
+        """Whether there is a stop in each line that may hold one, of the last that comes: from its end on."""
+        begin = data.find(b"\n") + 1
+        for line in _suspects(data, begin):
+            yield _last_stop(StopSplitter(), line)
+        yield _last_stop(self, data[:begin] or data)
 
     def _take(self, line: bytes, lines: list[Line]) -> None:
         lines.append((stop_in(line) if self._suspect else None) or line)
@@ -164,3 +172,23 @@ class StopSplitter(LineSplitter):
             lines.append(StopRequest())
         elif search is not None:
             super()._begin_dropping(lines)
+
+
+def _suspects(data: bytes, begin: int) -> Iterator[bytes]:
+    """The lines from `begin` on in which there is a mark, the last first; all others cost next to nothing."""
+    end = len(data)
+    marks = dict.fromkeys(_MARKS, end)
+    while begin:
+        marks = {mark: at if at < end else data.rfind(mark, begin, end) for mark, at in marks.items()}
+        if (found := max(marks.values())) < begin:
+            return
+        newline = data.find(b"\n", found, end)
+        start = data.rfind(b"\n", 0, found) + 1
+        yield data[start : end if newline < 0 else newline]
+        end = start
+
+
+def _last_stop(splitter: StopSplitter, line: bytes) -> StopRequest | None:
+    """The stop in a line that is the last which this one cuts."""
+    lines = splitter.feed(line) + splitter.end()
+    return next((one for one in reversed(lines) if isinstance(one, StopRequest)), None)
