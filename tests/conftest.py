@@ -20,6 +20,10 @@ from tests.stores import (  # noqa: F401  # fixtures, for every test
     store_url,
 )
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # It looks for 840 names in every module that is there: after Qt and the others, for seconds.
+    import skops.io  # noqa: F401
+
 README = Path(__file__).with_name("README.md")
 SMOKE = "tests/unit/store/test_store.py"  # of all that is tried on an S3 server too, this always is
 
