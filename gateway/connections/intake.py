@@ -166,7 +166,7 @@ class Inlet:
 
     def _read_last(self) -> None:
         """For the newest stop in it, as far as that takes this thread no long time."""
-        until_ns = time.thread_time_ns() + LAST_NS
+        found, until_ns = None, time.thread_time_ns() + LAST_NS
         for found in self._splitter.newest_first(self._unread()):
             if found is not None or time.thread_time_ns() >= until_ns:
                 break

@@ -20,6 +20,7 @@ _BLANK = bytes(range(33))  # white space, and what no text should hold
 _MARKS = (b"stop", b"\\", b"\0")  # one of these is in every line that asks for a stop: letters may be escaped
 _SHORTEST = len("method:robot.stop")
 _LONGEST_MARK = max(map(len, _MARKS))
+_PIECE_BYTES = 16 * 1024  # of a long line, looked at without a pause
 _KEPT_BYTES = 160  # of what was dropped: more than a method takes with every letter escaped
 _ESCAPED = re.compile(rb"\\u00([2-7][0-9A-Fa-f])")
 _METHOD = re.compile(rb"""(?<![\w.])method["']{0,2}:["']{0,2}robot\.stop(?=[^\w.])""")
@@ -149,11 +150,13 @@ class StopSplitter(LineSplitter):
         return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
 
     def newest_first(self, data: bytes) -> Iterator[StopRequest | None]:
-        """Whether there is a stop in each line that may hold one, of the last that comes: from its end on."""
+        """The stops in the last that comes, from its end on; in between `None`, so often that one can end."""
         begin = data.find(b"\n") + 1
         for line in _suspects(data, begin):
-            yield _last_stop(StopSplitter(), line)
-        yield _last_stop(self, data[:begin] or data)
+            yield from _last_stop(StopSplitter(), line)
+        first = data[:begin] or data
+        if self._may_stop(first):
+            yield from _last_stop(self, first)
 
     def _take(self, line: bytes, lines: list[Line]) -> None:
         lines.append((stop_in(line) if self._suspect else None) or line)
@@ -188,7 +191,13 @@ def _suspects(data: bytes, begin: int) -> Iterator[bytes]:
         end = start
 
 
-def _last_stop(splitter: StopSplitter, line: bytes) -> StopRequest | None:
-    """The stop in a line that is the last which this one cuts."""
-    lines = splitter.feed(line) + splitter.end()
+def _last_stop(splitter: StopSplitter, line: bytes) -> Iterator[StopRequest | None]:
+    """The stop in the last line that this one cuts."""
+    *pieces, rest = [line[at : at + _PIECE_BYTES] for at in range(0, len(line), _PIECE_BYTES)] or [b""]
+    for piece in pieces:
+        yield _newest(splitter.feed(piece))
+    yield _newest(splitter.feed(rest) + splitter.end())
+
+
+def _newest(lines: list[Line]) -> StopRequest | None:
     return next((one for one in reversed(lines) if isinstance(one, StopRequest)), None)

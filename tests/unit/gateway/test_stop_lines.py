@@ -257,4 +257,24 @@ def test_the_newest_stop_is_the_last_that_would_be_cut(lines: list[bytes], draw:
 
 def test_lines_in_which_nothing_hints_at_a_stop_are_not_looked_at_to_find_the_newest() -> None:
     data = b'{"jsonrpc":"2.0","id":1,"method":"clock.read"}\n' * 5000
-    assert list(StopSplitter().newest_first(data + PLAIN + b"\n" + data)) == [stop_in(PLAIN), None]
+    assert list(StopSplitter().newest_first(data + PLAIN + b"\n" + data)) == [stop_in(PLAIN)]
+
+
+@pytest.mark.parametrize(
+    "piece", [b"x", b"\\", b'"method":', b"\\u006d", b"\0 ", b"\\\n", b"[" * 9999 + b"\\\n"]
+)
+def test_one_can_end_the_look_for_the_newest_whatever_there_is(
+    piece: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is looked at without a pause is short."""
+    data = (piece * 4 * LINE_LIMIT)[: 4 * LINE_LIMIT]
+    fed: list[int] = []
+    feed = StopSplitter.feed
+
+    def count(self: StopSplitter, data: bytes) -> list[framing.Line]:
+        fed.append(len(data))
+        return feed(self, data)
+
+    monkeypatch.setattr(StopSplitter, "feed", count)
+    assert list(StopSplitter().newest_first(data)) == [None] * len(fed)
+    assert max(fed, default=0) <= 16 * 1024
