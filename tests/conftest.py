@@ -2,6 +2,7 @@
 
 import os
 import re
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -19,10 +20,21 @@ from tests.stores import (  # noqa: F401  # fixtures, for every test
     store_url,
 )
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # It looks for 840 names in every module that is there: after Qt and the others, for seconds.
+    import skops.io  # noqa: F401
+
 README = Path(__file__).with_name("README.md")
 SMOKE = "tests/unit/store/test_store.py"  # of all that is tried on an S3 server too, this always is
 
 
+def hear_ctrl_c() -> None:
+    """A shell has what it starts with `&` ignore it, and so would whatever a test starts and ends with it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+hear_ctrl_c()
 settings.register_profile("quick", max_examples=40)  # a share of what Hypothesis gives by itself
 settings.register_profile("nightly", settings.get_profile("default"))
 if settings.get_current_profile_name() == "default":

@@ -43,7 +43,8 @@ class Robot:
     ) -> None:
         self._client = Client(address, settings, on_state)
         self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name=THREAD_NAME)
+        # Whoever is interrupted before there is a robot to close ends all the same.
+        self._thread = threading.Thread(target=self._loop.run_forever, name=THREAD_NAME, daemon=True)
         self._thread.start()
         try:
             self._wait(self._client.__aenter__())

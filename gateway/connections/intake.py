@@ -165,16 +165,12 @@ class Inlet:
         self.receiver = bool
 
     def _read_last(self) -> None:
-        """For the stops in it, as far as that takes no long time."""
-        data = self._unread()
-        lines: list[framing.Line] = []
-        if self._splitter.may_stop(data):
-            until_ns = time.monotonic_ns() + LAST_NS
-            for start in range(0, len(data), RECEIVE_BYTES):
-                if time.monotonic_ns() < until_ns:
-                    lines += self._splitter.feed(data[start : start + RECEIVE_BYTES])
-            lines += self._splitter.end()
-        self._hand_over(self._sorted([one for one in lines if isinstance(one, framing.StopRequest)]))
+        """For the newest stop in it, as far as that takes this thread no long time."""
+        found, until_ns = None, time.thread_time_ns() + LAST_NS
+        for found in self._splitter.newest_first(self._unread()):
+            if found is not None or time.thread_time_ns() >= until_ns:
+                break
+        self._hand_over(self._sorted([] if found is None else [found]))
 
     def _unread(self) -> bytes:
         data = b""

@@ -5,6 +5,7 @@ Where a line is JSON, its method counts, and never what stands in the parameters
 """
 
 import re
+from collections.abc import Iterator
 from typing import Any, Final
 
 import msgspec
@@ -19,6 +20,7 @@ _BLANK = bytes(range(33))  # white space, and what no text should hold
 _MARKS = (b"stop", b"\\", b"\0")  # one of these is in every line that asks for a stop: letters may be escaped
 _SHORTEST = len("method:robot.stop")
 _LONGEST_MARK = max(map(len, _MARKS))
+_PIECE_BYTES = 16 * 1024  # of a long line, looked at without a pause
 _KEPT_BYTES = 160  # of what was dropped: more than a method takes with every letter escaped
 _ESCAPED = re.compile(rb"\\u00([2-7][0-9A-Fa-f])")
 _METHOD = re.compile(rb"""(?<![\w.])method["']{0,2}:["']{0,2}robot\.stop(?=[^\w.])""")
@@ -139,13 +141,22 @@ class StopSplitter(LineSplitter):
         self._search: StopSearch | None = None
 
     def feed(self, data: bytes) -> list[Line]:
-        self._suspect = self.may_stop(data)
+        self._suspect = self._may_stop(data)
         return super().feed(data)
 
-    def may_stop(self, data: bytes) -> bool:
+    def _may_stop(self, data: bytes) -> bool:
         """Whether there may be a stop in what these bytes end or hold; costs little."""
         seam = bytes(self._rest[-_LONGEST_MARK:]) + data
         return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
+
+    def newest_first(self, data: bytes) -> Iterator[StopRequest | None]:
+        """The stops in the last that comes, from its end on; in between `None`, so often that one can end."""
+        begin = data.find(b"\n") + 1
+        for line in _suspects(data, begin):
+            yield from _last_stop(StopSplitter(), line)
+        first = data[:begin] or data
+        if self._may_stop(first):
+            yield from _last_stop(self, first)
 
     def _take(self, line: bytes, lines: list[Line]) -> None:
         lines.append((stop_in(line) if self._suspect else None) or line)
@@ -164,3 +175,29 @@ class StopSplitter(LineSplitter):
             lines.append(StopRequest())
         elif search is not None:
             super()._begin_dropping(lines)
+
+
+def _suspects(data: bytes, begin: int) -> Iterator[bytes]:
+    """The lines from `begin` on in which there is a mark, the last first; all others cost next to nothing."""
+    end = len(data)
+    marks = dict.fromkeys(_MARKS, end)
+    while begin:
+        marks = {mark: at if at < end else data.rfind(mark, begin, end) for mark, at in marks.items()}
+        if (found := max(marks.values())) < begin:
+            return
+        newline = data.find(b"\n", found, end)
+        start = data.rfind(b"\n", 0, found) + 1
+        yield data[start : end if newline < 0 else newline]
+        end = start
+
+
+def _last_stop(splitter: StopSplitter, line: bytes) -> Iterator[StopRequest | None]:
+    """The stop in the last line that this one cuts."""
+    *pieces, rest = [line[at : at + _PIECE_BYTES] for at in range(0, len(line), _PIECE_BYTES)] or [b""]
+    for piece in pieces:
+        yield _newest(splitter.feed(piece))
+    yield _newest(splitter.feed(rest) + splitter.end())
+
+
+def _newest(lines: list[Line]) -> StopRequest | None:
+    return next((one for one in reversed(lines) if isinstance(one, StopRequest)), None)

@@ -1,11 +1,23 @@
 """A bridge to a python-can `virtual` channel: programs in the same process join the simulated bus."""
 
+from copy import copy
+from typing import Any
+
 import can
 
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.clock import MILLISECOND_NS
 
 _POLL_NS = MILLISECOND_NS  # a virtual channel cannot be waited for together with anything else
+
+
+class _Message(can.Message):
+    """python-can copies it for each receiver, and its data the long way, of which nobody changes any."""
+
+    __slots__ = ()
+
+    def __deepcopy__(self, memo: dict[int, Any] | None) -> can.Message:
+        return copy(self)
 
 
 class VirtualBridge:
@@ -31,7 +43,7 @@ class VirtualBridge:
 
     def _receive(self, frame: Frame, _sender: object) -> None:
         self._outside.send(
-            can.Message(
+            _Message(
                 arbitration_id=frame.cob_id,
                 data=frame.data,
                 is_extended_id=frame.extended,
@@ -42,7 +54,7 @@ class VirtualBridge:
 
     def _receive_error(self, error_class: int) -> None:
         self._outside.send(
-            can.Message(
+            _Message(
                 arbitration_id=error_class,
                 data=bytes(8),
                 is_error_frame=True,

@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtGui import QImage
 
@@ -61,7 +62,10 @@ def live(bench: Bench) -> None:
 
 
 def colours(image: QImage) -> set[int]:
-    return {image.pixel(x, y) for x in range(0, image.width(), 7) for y in range(0, image.height(), 7)}
+    """Of every seventh pixel both ways."""
+    as_words = image.convertToFormat(QImage.Format.Format_ARGB32)
+    pixels = np.frombuffer(as_words.constBits(), np.uint32).reshape(image.height(), image.width())
+    return set(np.unique(pixels[::7, ::7]).tolist())
 
 
 def title_of(title: str) -> str:
@@ -105,8 +109,9 @@ def test_every_tab_is_whole_on_every_screen(
             name = f"{title}-{look.value}-{100 * scale:.0f}-{screen}.png"
             save(image, name)
             assert (full.width(), full.height()) == (width, height), name
-            assert len(colours(image)) > 60, name
-            assert theme.colour("window").rgb() in colours(image), name
+            seen = colours(image)
+            assert len(seen) > 60, name
+            assert theme.colour("window").rgb() in seen, name
         assert stop_is_whole(full)
         full.docks[1].raise_()
         full.parameters.tree.select_name("gait.step_length")

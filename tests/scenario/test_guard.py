@@ -12,6 +12,7 @@ from typing import Any
 import can
 import pytest
 
+from drivers.joint.cia402 import DriveState
 from gateway.config import load
 from gateway.guard.inputs import AGAIN_NS
 from gateway.records.folder import RecordsFolder
@@ -113,10 +114,21 @@ def entries(robot: SimulatedRobot) -> set[int]:
     return {drive.dictionary[0x1016, at].number() for drive in drives for at in range(1, 5)}
 
 
-def stand_still(robot: SimulatedRobot) -> None:
-    """The gait controller switches its drives off by itself, as a caregiver does at the end of the day."""
+def stand_still(robot: SimulatedRobot, client: Client) -> None:
+    """The gait controller switches its drives off by itself, as a caregiver does at the end of the day.
+
+    The gateway has heard of it: before that it does not end, as it should not.
+    """
     ask(robot.folder.path, {"controller": "stop"})
     until(lambda: ENABLED not in power_states(robot), "no drive is enabled")
+    until(lambda: knows_that_none_is_enabled(client), "the gateway knows")
+
+
+def knows_that_none_is_enabled(client: Client) -> bool:
+    states = client.call("component.snapshot", channels=[f"{joint}.state" for joint in JOINTS])["values"]
+    return len(states) == len(JOINTS) and not {None, DriveState.OPERATION_ENABLED.value} & set(
+        states.values()
+    )
 
 
 @pytest.fixture
@@ -322,7 +334,7 @@ class TestArming:
             assert entries(robot) == {ENTRY, 0}
             arming = client.call("robot.describe")["guard"]["arming"]
             assert set(arming.values()) == {f"armed by 1016h:1, {round(CONSUMER_S * 1000)} ms"}
-            stand_still(robot)
+            stand_still(robot, client)
         assert entries(robot) == {0}
 
     def test_a_drive_that_keeps_moving_without_us_is_told_and_not_armed(self, robot: SimulatedRobot) -> None:
@@ -332,7 +344,7 @@ class TestArming:
             until(lambda: journal(robot.config, "alarm"), "told")
             assert "6007h is 0" in client.call("robot.describe")["guard"]["arming"]["left_knee"]
             assert robot.exoskeleton.drives["left_knee"].dictionary[0x1016, 1].number() == 0
-            stand_still(robot)
+            stand_still(robot, client)
 
     def test_a_rebooted_drive_is_armed_again(self, robot: SimulatedRobot) -> None:
         with serving(load(configure(robot, HEARTBEAT))) as address, Client(address) as client:
@@ -341,14 +353,14 @@ class TestArming:
             ask(robot.folder.path, {"fault": "reboot", "on": "left_knee"})
             assert knee.number() == 0, "it has lost it"
             until(lambda: knee.number() == ENTRY and armed(client) == set(JOINTS), "armed again")
-            stand_still(robot)
+            stand_still(robot, client)
 
     def test_drives_that_cannot_be_reached_at_the_end_are_said_to_be_left_armed(
         self, robot: SimulatedRobot
     ) -> None:
         with serving(load(configure(robot, HEARTBEAT))) as address, Client(address) as client:
             until(lambda: armed(client) == set(JOINTS), "armed")
-            stand_still(robot)
+            stand_still(robot, client)
             ask(robot.folder.path, {"fault": "bus_cut"})
             until(lambda: lost(client) >= set(JOINTS), "nothing is heard any more")
         assert len(journal(robot.config, "not disarmed")) == len(JOINTS)

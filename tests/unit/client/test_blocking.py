@@ -1,5 +1,8 @@
 """The face for scripts: five lines, one thread, nothing left behind."""
 
+import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 
@@ -7,6 +10,7 @@ import pytest
 
 from gateway.client import BadAddress, LinkSettings, RemoteError, Robot, Unreachable
 from tests.fake_robot import FakeRobot
+from tests.support.waiting import WAIT_S
 
 PATIENT = LinkSettings(silence_s=30.0)
 
@@ -77,3 +81,28 @@ def test_snapshots_come_typed(fake: FakeRobot) -> None:
         assert set(robot.components("left_insole.*").values) == {"left_insole.force"}
         assert robot.status().quality["trunk"]["state"] == "ok"
         assert robot.describe().robot == "exo-fake"
+
+
+INTERRUPTED = """
+import signal
+import subprocess
+import sys
+import threading
+from gateway.client import Robot
+
+start = threading.Thread.start
+
+def interrupted(self):
+    start(self)
+    raise KeyboardInterrupt
+
+threading.Thread.start = interrupted
+Robot("127.0.0.1:1")
+"""
+
+
+def test_ctrl_c_while_its_thread_starts_ends_the_program() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], stderr=subprocess.DEVNULL, timeout=WAIT_S, check=False
+    )
+    assert ended.returncode == -signal.SIGINT

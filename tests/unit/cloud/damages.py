@@ -30,6 +30,12 @@ from tests.unit.recording.robots import batch
 KNEE = "left_knee.position"
 
 
+def fill(folder: Path) -> None:
+    """Record what a place is about."""
+    for robot in ("exo-01", "exo-01", "exo-02"):
+        record((folder / "store").as_uri(), folder / "spool", robot)
+
+
 class Place:
     """A store in a folder, the spool that filled it in three batches, and the command that looks."""
 
@@ -40,8 +46,6 @@ class Place:
             f'[store]\nurl = "{self.store.as_uri()}"\n[recorder]\nspool = "{self.spool}"\n'
         )
         self._capsys = capsys
-        for robot in ("exo-01", "exo-01", "exo-02"):
-            record(self.url, self.spool, robot)
 
     @property
     def url(self) -> str:

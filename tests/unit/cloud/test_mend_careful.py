@@ -18,7 +18,7 @@ from ml.store.tables import TELEMETRY
 from ml.store.upkeep import compact, retain
 from server_gui.core.cloud import counting
 from server_gui.core.recording.receipts import RECEIPTS
-from tests.unit.cloud.damages import Place, altered, of_file, rewrite
+from tests.unit.cloud.damages import Place, altered, fill, of_file, rewrite
 from tests.unit.cloud.recordings import record
 from tests.unit.cloud.test_mend import file_cut_off, rows
 
@@ -37,6 +37,7 @@ def test_a_store_below_any_folder_is_read(
     store_libraries: None, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     (tmp_path / name).mkdir()
+    fill(tmp_path / name)
     place = Place(tmp_path / name, capsys)
     assert place.verify("--deep") == (0, "")
     assert "nothing to mend" in place.told("mend")

@@ -1,7 +1,12 @@
 """An inlet turned by hand: whose bytes are read when, how much waits, and that a stop in them acts."""
 
 import contextlib
+import fcntl
+import itertools
 import socket
+import sys
+import termios
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from typing import Any
@@ -19,6 +24,13 @@ from gateway.wire import framing
 from gateway.wire.limits import BAD_LINES, MOST_STOPS, QUEUED_LINES
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import CLOCK, STOP
+
+NO_STOP = b'{"jsonrpc":"2.0","id":1,"method":"stream.stop"}\n'  # which is only seen by reading it
+
+
+def unread(accepted: socket.socket) -> int:
+    """The bytes that the kernel keeps for it."""
+    return int.from_bytes(fcntl.ioctl(accepted, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
 class Turned:
@@ -53,6 +65,11 @@ class Turned:
         self.client.sendall(data)
         self.inlet._receive(intake.RECEIVE_BYTES)
 
+    def holds(self, data: bytes) -> None:
+        """That has arrived, and nobody has read it."""
+        self.client.sendall(data)
+        until(lambda: unread(self.accepted) == len(data), "it has arrived")
+
     def turn_loop(self) -> float | None:
         """As long as there is something to do; how long it would sleep then."""
         while (patience_s := self.loop._patience_s()) == 0.0:
@@ -74,7 +91,7 @@ def turned() -> Iterator[Turned]:
 
 
 def test_a_stop_that_has_arrived_acts_though_the_loop_has_closed_its_client(turned: Turned) -> None:
-    turned.client.sendall(CLOCK % 1 * 2000 + STOP % b"unread")
+    turned.holds(CLOCK % 1 * 1000 + STOP % b"unread")
     turned.inlet.finish()
     assert turned.asked == ["unread"]
     assert turned.accepted.fileno() == -1
@@ -87,7 +104,7 @@ def test_a_stop_cut_by_the_end_of_reading_acts(turned: Turned, cut: int) -> None
     """Its first part was read, the second is still in the socket when the connection is closed."""
     line = b'{"method": "robot.stop", "id": 1}'
     turned.says(line[:cut])
-    turned.client.sendall(line[cut:])
+    turned.holds(line[cut:])
     turned.inlet.finish()
     assert turned.asked == [""]
 
@@ -131,9 +148,28 @@ def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(intake, "LAST_NS", 0)
-    turned.client.sendall(STOP % b"late")
+    turned.holds(STOP % b"early" + NO_STOP)
     turned.inlet.finish()
     assert turned.asked == []
+
+
+def test_the_last_stop_of_a_closed_connection_acts_however_slow_the_computer_is(
+    turned: Turned, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(intake, "LAST_NS", 0)
+    turned.holds(STOP % b"early" + NO_STOP * 200 + CLOCK % 1 * 500 + STOP % b"last" + CLOCK % 1 * 500)
+    turned.inlet.finish()
+    assert turned.asked == ["last"]
+
+
+def test_what_others_take_of_the_processor_is_no_time_of_the_last_look(
+    turned: Turned, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = itertools.count(0, 10 * intake.LAST_NS)  # each time that it is read, others have had their turn
+    monkeypatch.setattr(time, "monotonic_ns", lambda: next(clock))
+    turned.holds(STOP % b"early" + NO_STOP * 5)
+    turned.inlet.finish()
+    assert turned.asked == ["early"]
 
 
 def test_stops_beyond_what_may_wait_act_and_are_not_answered(
@@ -208,7 +244,7 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(turned: Tu
 
 def test_a_stop_behind_lines_that_were_none_is_heard(turned: Turned) -> None:
     turned.says(b"[]\n" * 2 * BAD_LINES)
-    turned.client.sendall(STOP % b"behind")
+    turned.holds(STOP % b"behind")
     turned.inlet.finish()
     assert turned.asked == ["behind"]
 

@@ -215,3 +215,66 @@ def test_numbers_by_the_thousand_are_not_read_to_see_that_a_line_is_no_stop() ->
         return min(times)
 
     assert cost_s(slow) < 20 * cost_s(quick)
+
+
+# The newest of what a connection still holds
+
+
+def newest(data: bytes, cut: int) -> framing.StopRequest | None:
+    """The first that is found behind `cut`, from the end on."""
+    splitter = StopSplitter()
+    splitter.feed(data[:cut])
+    return next(filter(None, splitter.newest_first(data[cut:])), None)
+
+
+ANY_LINE = st.sampled_from(
+    [
+        b"",
+        PLAIN,
+        PLAIN[:-1] + b',"x":1}\r',
+        PLAIN.replace(b"fall", b"later"),
+        PLAIN[:60],
+        PLAIN.decode().encode("utf-16-le"),
+        b'{"jsonrpc":"2.0","id":1,"method":"clock.read"}',
+        b'{"jsonrpc":"2.0","id":1,"method":"stream.stop"}',
+        b"\\",
+        LONG_STOP,
+        LONG + b"x",
+    ]
+)
+
+
+@given(st.lists(ANY_LINE, max_size=6), st.data())
+def test_the_newest_stop_is_the_last_that_would_be_cut(lines: list[bytes], draw: st.DataObject) -> None:
+    data = b"\n".join(lines)
+    cut = draw.draw(st.integers(0, len(data)))
+    splitter = StopSplitter()
+    splitter.feed(data[:cut])
+    each = splitter.feed(data[cut:]) + splitter.end()
+    stops = [one for one in each if isinstance(one, framing.StopRequest)]
+    assert newest(data, cut) == (stops[-1] if stops else None)
+
+
+def test_lines_in_which_nothing_hints_at_a_stop_are_not_looked_at_to_find_the_newest() -> None:
+    data = b'{"jsonrpc":"2.0","id":1,"method":"clock.read"}\n' * 5000
+    assert list(StopSplitter().newest_first(data + PLAIN + b"\n" + data)) == [stop_in(PLAIN)]
+
+
+@pytest.mark.parametrize(
+    "piece", [b"x", b"\\", b'"method":', b"\\u006d", b"\0 ", b"\\\n", b"[" * 9999 + b"\\\n"]
+)
+def test_one_can_end_the_look_for_the_newest_whatever_there_is(
+    piece: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is looked at without a pause is short."""
+    data = (piece * 4 * LINE_LIMIT)[: 4 * LINE_LIMIT]
+    fed: list[int] = []
+    feed = StopSplitter.feed
+
+    def count(self: StopSplitter, data: bytes) -> list[framing.Line]:
+        fed.append(len(data))
+        return feed(self, data)
+
+    monkeypatch.setattr(StopSplitter, "feed", count)
+    assert list(StopSplitter().newest_first(data)) == [None] * len(fed)
+    assert max(fed, default=0) <= 16 * 1024
