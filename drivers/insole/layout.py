@@ -6,16 +6,14 @@ from functools import cached_property
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 
 from drivers.errors import SettingsError
 from drivers.insole.calibration import Calibration
 from drivers.insole.description import CsvDescription, FrameDescription
+from drivers.insole.foot import Foot
 
-Foot = Literal["left", "right"]
-FEET: tuple[Foot, ...] = ("left", "right")
 Cell = tuple[float, float, float]
 
 SHIPPED = resources.files("drivers.insole") / "layouts"
@@ -70,8 +68,13 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 def shipped() -> list[str]:
     """Names of the layouts that ship, sorted by their number of cells."""
-    names = [file.name.removesuffix(".toml") for file in SHIPPED.iterdir() if file.name.endswith(".toml")]
-    return sorted(names, key=lambda name: (len(load(name).cells), name))
+    return sorted(shipped_names(), key=lambda name: (len(load(name).cells), name))
+
+
+def shipped_names() -> list[str]:
+    """The same by their names."""
+    files = (file.name for file in SHIPPED.iterdir())
+    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
 
 
 def load(name: str, beside: Path | None = None) -> Layout:
@@ -93,8 +96,6 @@ def _locate(name: str, beside: Path | None) -> Path | Traversable:
         file = SHIPPED / f"{name}.toml"
         if file.is_file():
             return file
-        known = ", ".join(
-            entry.name.removesuffix(".toml") for entry in SHIPPED.iterdir() if entry.name.endswith(".toml")
-        )
+        known = ", ".join(shipped_names())
         raise SettingsError(f"there is no insole layout {name!r}: use a .toml file, or one of {known}")
     return (beside or Path()) / name

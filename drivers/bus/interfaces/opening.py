@@ -31,6 +31,30 @@ def _python_can(settings: CanSettings) -> Transport:
     return PythonCanTransport(settings)
 
 
+# Those of python-can 4; plug-ins may bring others.
+_PYTHON_CAN = (
+    "virtual",
+    "slcan",
+    "pcan",
+    "kvaser",
+    "ixxat",
+    "gs_usb",
+    "vector",
+    "canalystii",
+    "cantact",
+    "etas",
+    "iscan",
+    "neousys",
+    "neovi",
+    "nican",
+    "nixnet",
+    "robotell",
+    "seeedstudio",
+    "serial",
+    "systec",
+    "udp_multicast",
+    "usb2can",
+)
 _OWN: dict[str, Callable[[CanSettings], Transport]] = {
     "socketcand": _socketcand,
     "socketcan": _socketcan,
@@ -45,3 +69,17 @@ def needs_python_can(settings: CanSettings) -> bool:
 def open_transport(settings: CanSettings) -> Transport:
     """Open the interface that `settings` name; imports only what it needs. Raises `Unavailable`."""
     return _OWN.get(settings.interface, _python_can)(settings)
+
+
+def interfaces() -> tuple[str, ...]:
+    """Every name of an interface that comes with us."""
+    return (*sorted(_OWN), *_PYTHON_CAN)
+
+
+def is_interface(name: str) -> bool:
+    """Whether there is such an interface: one that comes with us, or of a plug-in of python-can."""
+    if name in interfaces():
+        return True
+    from importlib.metadata import entry_points  # for who has a plug-in, or has mistyped, only
+
+    return bool(entry_points(group="can.interface", name=name))

@@ -35,7 +35,7 @@ def test_a_wrong_file_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.
     file = tmp_path / "robot.toml"
     file.write_text("[robot]\n", encoding="utf-8")
     assert main(["gateway", str(file)]) == 1
-    assert capsys.readouterr().err == f"gwrms gateway: {file}: [robot] lacks the key 'name'\n"
+    assert capsys.readouterr().err == f"gwrms gateway: {file}: [robot] name: is missing\n"
 
 
 def test_a_port_in_use_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

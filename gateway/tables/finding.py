@@ -1,0 +1,55 @@
+"""What is wrong with a file, or likely is: which table and key, what is allowed, what was likely meant."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+
+class Severity(StrEnum):
+    """How bad it is."""
+
+    MISTAKE = "mistake"  # the file is refused
+    WARNING = "warning"  # it can be used, and is likely not what was meant, or something is not there yet
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing; `where` is the table as the file writes it, `[[rules]] number 2` for an entry of a list."""
+
+    where: str
+    key: str  # empty where it is the table itself
+    text: str
+    severity: Severity = Severity.MISTAKE
+
+    @property
+    def words(self) -> str:
+        return f"{self.where} {self.key}".rstrip() + f": {self.text}"
+
+
+def warning(where: str, key: str, text: str) -> Finding:
+    return Finding(where, key, text, Severity.WARNING)
+
+
+def mistakes(findings: Iterable[Finding]) -> list[Finding]:
+    """Those for which the file is refused."""
+    return [one for one in findings if one.severity is Severity.MISTAKE]
+
+
+def lines(file: Path, findings: Iterable[Finding]) -> str:
+    """A line each, which begins with the file."""
+    return "\n".join(f"{file}: {one.words}" for one in findings)
+
+
+def meant(word: object, allowed: Iterable[str], cutoff: float = 0.6) -> str:
+    """`did you mean 'x'? `, where one of those that are allowed is close."""
+    import difflib  # for who has mistyped only
+
+    close = difflib.get_close_matches(str(word), [str(one) for one in allowed], 1, cutoff)
+    return f"did you mean {close[0]!r}? " if close else ""
+
+
+def unknown(word: object, allowed: Iterable[object]) -> str:
+    """The words for something that is none of these."""
+    names = [str(one) for one in allowed]
+    return f"{word!r} is not known: {meant(word, names)}allowed are {', '.join(names)}"
