@@ -1,9 +1,10 @@
 """Tables to structs; of those that cannot be made, every mistake, key by key."""
 
+import functools
 import math
 import types
 import typing
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import Enum
 from typing import Annotated, Any, Final, Literal, TypeVar, Union
 
@@ -29,8 +30,9 @@ UNIT: Final = "unit"  # of a key, in the `extra` of its `Meta`
 class Decoding:
     """Makes structs; `findings` are the mistakes so far."""
 
-    def __init__(self) -> None:
+    def __init__(self, dec_hook: Callable[[type, Any], Any] | None = None) -> None:
         self.findings: list[Finding] = []
+        self._convert = functools.partial(msgspec.convert, dec_hook=dec_hook)  # types that msgspec lacks
 
     def complain(self, where: str, key: str, text: str) -> None:
         self.findings.append(Finding(where, key, text))
@@ -52,16 +54,15 @@ class Decoding:
             )
             return None
         try:
-            made = msgspec.convert(table, kind)
-        except ValidationError as error:
-            return self._parted(where, table, kind, error)
+            made: S = self._convert(table, kind)
+        except ValidationError:
+            return self._parted(where, table, kind)
         for key in kind.__struct_fields__:
             self._check_finite(where, key, getattr(made, key))
         return made
 
-    def _parted(self, where: str, table: Table, kind: type[S], whole: ValidationError) -> S | None:
+    def _parted(self, where: str, table: Table, kind: type[S]) -> S | None:
         """Key by key; what can be left out is, where it is wrong."""
-        before = len(self.findings)
         known = {field.encode_name: field for field in msgspec.structs.fields(kind)}
         good = {}
         for key, value in table.items():
@@ -72,18 +73,19 @@ class Decoding:
         for key, field in known.items():
             if field.required and key not in table:
                 self.complain(where, key, "is missing" + _choices_words(field.type))
-        if len(self.findings) == before:  # its parts are well: it is the struct's own check
-            self._own(where, whole, known)
         try:
-            return msgspec.convert(good, kind)
-        except ValidationError:
+            made: S = self._convert(good, kind)
+        except ValidationError as error:
+            if all(key in good for key, field in known.items() if field.required):
+                self._own(where, error, known)
             return None
+        return made
 
     def _own(self, where: str, error: ValidationError, known: Iterable[str]) -> None:
-        """A check of the struct itself: its words begin with the key, where it is about one."""
-        text = said(error)
-        key, _, rest = text.partition(" ")
-        self.complain(where, *((key, rest) if key in known else ("", text)))
+        """Checks of the struct itself: a line each, that begins with the key where it is about one."""
+        for text in said(error).split("\n"):
+            key, _, rest = text.partition(" ")
+            self.complain(where, *((key, rest) if key in known else ("", text)))
 
     def _value(self, where: str, key: str, value: Any, kind: Any) -> bool:
         """Whether it can be the value of a key of this type."""
@@ -97,7 +99,7 @@ class Decoding:
         if len(self.findings) > before:
             return False
         try:
-            msgspec.convert(value, kind)
+            self._convert(value, kind)
         except ValidationError as error:
             parts = list(_parts(value, kind))
             for at, part, part_kind in parts:

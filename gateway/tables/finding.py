@@ -18,13 +18,14 @@ class Finding:
     """One thing; `where` is the table as the file writes it, `[[rules]] number 2` for an entry of a list."""
 
     where: str
-    key: str  # empty where it is the table itself
+    key: str  # empty where it is the table itself, as both are for the whole file
     text: str
     severity: Severity = Severity.MISTAKE
 
     @property
     def words(self) -> str:
-        return f"{self.where} {self.key}".rstrip() + f": {self.text}"
+        place = " ".join(filter(None, [self.where, self.key]))
+        return f"{place}: {self.text}" if place else self.text
 
 
 def warning(where: str, key: str, text: str) -> Finding:

@@ -9,10 +9,12 @@ import pytest
 
 from gateway.config.reading import examine as examine_robot
 from gateway.tables.finding import Finding, Severity
+from server_gui.core.settings.server_file import examine as examine_server
 
 DATA: Final = Path(__file__).parents[2] / "data" / "mistakes"
 EXAMINE: Final[dict[str, Callable[[Path], list[Finding]]]] = {
     "robot": lambda file: examine_robot(file).findings,
+    "server": lambda file: examine_server(file).findings,
 }
 
 

@@ -62,7 +62,7 @@ def test_each_table_builds_its_component(
         ('bus = "main"\nformat = "witmotion-can"', "[imu.trunk] can_id: is missing"),
         ('format = "witmotion"', "[imu.trunk] port: is missing"),
         ('format = []\nport = "x"', "[imu.trunk] format: must"),
-        ('format = "morse"\nport = "x"', "[imu.trunk] format: 'morse' is not known: allowed are bno08x-rvc, "),
+        ('format = "morse"\nport = "x"', "[imu.trunk] format: 'morse' is not known: allowed are bno08x"),
         ('format = "../xsens"\nport = "x"', "format: '../xsens' is not known"),
         ('format = "cia410"\nport = "x"', "[imu.trunk] port: is not known"),
         ('bus = "main"\nformat = "xsens"\ncan_id = 80', "[imu.trunk] bus: is not known"),
