@@ -71,6 +71,11 @@ def verb_of(request: Request) -> str:
     return verbs[0]
 
 
+def further(verb: str) -> tuple[str, ...]:
+    """What else a request of this kind may hold."""
+    return _CHECKS[verb][0]
+
+
 def check(request: object) -> Request:
     """The request, where it can be obeyed as far as anybody can tell; raises `SimulatorError`."""
     if not isinstance(request, Mapping):

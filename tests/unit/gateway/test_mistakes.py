@@ -9,12 +9,25 @@ import pytest
 
 from gateway.config.reading import examine as examine_robot
 from gateway.tables.finding import Finding, Severity
+from gateway.tables.reading import Unreadable, read
+from hil_sim.scenario.script import examined
 from server_gui.core.settings.server_file import examine as examine_server
 
 DATA: Final = Path(__file__).parents[2] / "data" / "mistakes"
+
+
+def examine_scenario(file: Path) -> list[Finding]:
+    try:
+        found = examined(file, read(file))[1]
+    except Unreadable as error:
+        return [error.finding]
+    return [Finding(one.where, one.key, one.text, Severity(one.severity)) for one in found]
+
+
 EXAMINE: Final[dict[str, Callable[[Path], list[Finding]]]] = {
     "robot": lambda file: examine_robot(file).findings,
     "server": lambda file: examine_server(file).findings,
+    "scenario": examine_scenario,
 }
 
 
