@@ -5,14 +5,16 @@ With `--check` nothing is written; exit status 1 names the pages that are not wh
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Final
 
-from tools.draw import commands, robot_file, server_file, wire
+from tools.draw import commands, robot_file, schemas, server_file, wire
 
 REFERENCE: Final = Path(__file__).parents[1] / "docs" / "reference"
 PAGES: Final[Mapping[str, Callable[[], str]]] = {
-    page.PAGE: page.draw for page in (robot_file, server_file, wire, commands)
+    **{page.PAGE: page.draw for page in (robot_file, server_file, wire, commands)},
+    **{f"{kind}.schema.json": partial(schemas.draw, kind) for kind in schemas.SCHEMAS},
 }
 
 

@@ -87,7 +87,13 @@ def load(name: str, beside: Path | None = None) -> Layout:
     file = _locate(name, beside)
     try:
         return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), Layout)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except OSError as error:
+        known = ", ".join(shipped_names())
+        raise SettingsError(
+            f"insole layout {file} cannot be read ({error.strerror}): it lies beside the robot's file, "
+            f"or is one of {known}"
+        ) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise SettingsError(f"insole layout {file}: {error}") from error
 
 

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 from gateway.cli.arguments import number
-from gateway.cli.reach import channel_names, check_names, parser, reach
+from gateway.cli.reach import absent_components, channel_names, check_names, parser, reach
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
 from gateway.wire.component import ChannelInfo
@@ -37,7 +37,7 @@ def main(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     with reach(arguments, "watch") as robot:
         description = robot.describe()
-        check_names("channel", arguments.channels, channel_names(description))
+        check_names("channel", arguments.channels, channel_names(description), absent_components(description))
         modules = _modules(arguments.channels, description)
         rows = itertools.islice(_rows(robot, arguments.channels, modules, arguments.rate), arguments.count)
         try:

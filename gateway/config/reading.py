@@ -67,10 +67,15 @@ def load(path: Path) -> RobotConfig:
         ConfigError: it is not there, is no TOML, or says something that cannot work.
 
     """
-    examined = examine(path)
-    if examined.config is None:
-        raise ConfigError(lines(path, mistakes(examined.findings)))
-    return examined.config
+    return load_with_warnings(path)[0]
+
+
+def load_with_warnings(path: Path) -> tuple[RobotConfig, list[Finding]]:
+    """The same, with what is likely wrong; raises `ConfigError`."""
+    found = examine(path)
+    if found.config is None:
+        raise ConfigError(lines(path, mistakes(found.findings)))
+    return found.config, found.findings
 
 
 def examine(path: Path) -> Examined:

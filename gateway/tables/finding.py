@@ -1,6 +1,6 @@
 """What is wrong with a file, or likely is: which table and key, what is allowed, what was likely meant."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -30,6 +30,13 @@ class Finding:
 
 def warning(where: str, key: str, text: str) -> Finding:
     return Finding(where, key, text, Severity.WARNING)
+
+
+Told = tuple[str, str, str, str]  # severity, where, key and text: how houses tell each other
+
+
+def told(findings: Iterable[Finding]) -> Iterator[Told]:
+    return ((one.severity.value, one.where, one.key, one.text) for one in findings)
 
 
 def mistakes(findings: Iterable[Finding]) -> list[Finding]:

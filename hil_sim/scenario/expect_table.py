@@ -9,9 +9,9 @@ from hil_sim.scenario.expectation import Condition, Expectation, Seen, Timing, T
 from hil_sim.scenario.table import Table, unknown
 from hil_sim.scenario.truth import names
 
-_TIMINGS = {when.value: when for when in When}
+TIMINGS = {when.value: when for when in When}
 # subject → the conditions that may be asked of it
-_SUBJECTS = {
+SUBJECTS = {
     "component": ("state", "problem"),
     "channel": ("min", "max", "is", "missing"),
     "truth": ("min", "max", "is"),
@@ -25,16 +25,16 @@ COMPONENTS = (*JOINTS, CONTROLLER, *SENSORS)  # of the robot's own file
 
 def read(table: Table) -> list[Expectation]:
     """The expectations of one table; raises `Unusable`."""
-    subject = table.one_of(_SUBJECTS)
-    table.only({subject, *_SUBJECTS[subject], *_TIMINGS})
+    subject = table.one_of(SUBJECTS)
+    table.only({subject, *SUBJECTS[subject], *TIMINGS})
     glob, timing = table.text(subject), _timing(table)
     _check_name(table, subject, glob)
     found = [
         Expectation(Track.PROBLEM if key == "problem" else Track(subject), glob, condition, timing)
-        for key, condition in _conditions(table, _SUBJECTS[subject])
+        for key, condition in _conditions(table, SUBJECTS[subject])
     ]
     if not found:
-        raise table.unusable(f"say what is expected of {glob} with {', '.join(_SUBJECTS[subject])}")
+        raise table.unusable(f"say what is expected of {glob} with {', '.join(SUBJECTS[subject])}")
     return found
 
 
@@ -48,8 +48,8 @@ def _check_name(table: Table, subject: str, glob: str) -> None:
 
 
 def _timing(table: Table) -> Timing:
-    key = table.one_of(_TIMINGS)
-    when = _TIMINGS[key]
+    key = table.one_of(TIMINGS)
+    when = TIMINGS[key]
     begin_s, end_s = (table.seconds(key), math.inf) if when is When.AT else table.window(key)
     return Timing(when, begin_s, end_s)
 

@@ -79,6 +79,16 @@ def examined(file: Path, values: Mapping[str, Any]) -> tuple[Script, list[Mistak
     return _Reading(file, mistakes).script(values), mistakes
 
 
+def findings(
+    file: Path,
+    tables: Mapping[str, Any],
+    *,
+    machine: bool,  # noqa: ARG001 - of robots
+) -> Iterator[tuple[str, str, str, str]]:
+    """What `gwrms check` says of it: severity, where, key and text."""
+    return ((one.severity, one.where, one.key, one.text) for one in examined(file, tables)[1])
+
+
 class _Reading:
     """One file's tables."""
 

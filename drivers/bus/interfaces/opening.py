@@ -10,11 +10,14 @@ from drivers.errors import Unavailable
 def _socketcand(settings: CanSettings) -> Transport:
     from drivers.bus.interfaces.socketcand import SocketcandTransport
 
+    return SocketcandTransport(*_address(settings), str(settings.channel))
+
+
+def _address(settings: CanSettings) -> tuple[str, int]:
     try:
-        host, port = str(settings.more["host"]), int(settings.more["port"])
+        return str(settings.more["host"]), int(settings.more["port"])
     except (KeyError, ValueError) as error:
         raise Unavailable("interface socketcand needs the keys host and port in its [can.…] table") from error
-    return SocketcandTransport(host, port, str(settings.channel))
 
 
 def _socketcan(settings: CanSettings) -> Transport:
@@ -55,6 +58,7 @@ _PYTHON_CAN = (
     "udp_multicast",
     "usb2can",
 )
+_LOOK_S = 1.0  # how long a daemon may take to answer
 _OWN: dict[str, Callable[[CanSettings], Transport]] = {
     "socketcand": _socketcand,
     "socketcan": _socketcan,
@@ -69,6 +73,36 @@ def needs_python_can(settings: CanSettings) -> bool:
 def open_transport(settings: CanSettings) -> Transport:
     """Open the interface that `settings` name; imports only what it needs. Raises `Unavailable`."""
     return _OWN.get(settings.interface, _python_can)(settings)
+
+
+def obstacle(settings: CanSettings) -> str | None:
+    """Why the interface could not be opened, or not as `settings` say; it is only looked at."""
+    if settings.interface == "socketcan":
+        from drivers.bus.interfaces.socketcan import obstacle as socketcan_obstacle
+
+        return socketcan_obstacle(settings)
+    if settings.interface == "socketcand":
+        return _daemon_obstacle(settings)
+    channel = str(settings.channel)
+    if channel.startswith("/dev/"):  # an adapter on a serial port
+        from drivers.port import obstacle as port_obstacle
+
+        return port_obstacle(channel)
+    return None
+
+
+def _daemon_obstacle(settings: CanSettings) -> str | None:
+    import socket
+
+    try:
+        host, port = _address(settings)
+        socket.create_connection((host, port), _LOOK_S).close()
+    except Unavailable as error:
+        return str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        return f"nothing answers at {host}:{port} ({reason}): start it, or correct host and port"
+    return None
 
 
 def interfaces() -> tuple[str, ...]:

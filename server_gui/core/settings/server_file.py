@@ -30,7 +30,7 @@ from msgspec import Meta, Struct, field
 
 from gateway.client import Address, BadAddress
 from gateway.tables.decoding import Decoding
-from gateway.tables.finding import Finding, lines, mistakes, warning
+from gateway.tables.finding import Finding, Told, lines, mistakes, told, warning
 from gateway.tables.reading import Unreadable, read
 from ml.store import StoreError, default_url
 from ml.store.store import checked_url
@@ -157,6 +157,11 @@ def examined(file: Path, document: dict[str, Any]) -> Examined:
     settings = reading.settings(document, file.parent)
     wrong = mistakes(reading.findings)
     return Examined(None if wrong else settings, [*reading.findings, *([] if wrong else _unlikely(settings))])
+
+
+def findings(file: Path, tables: dict[str, Any], *, machine: bool) -> Iterator[Told]:  # noqa: ARG001 - of robots
+    """What `gwrms check` says of it."""
+    return told(examined(file, tables).findings)
 
 
 def add_robots(settings: ServerSettings, robots: dict[str, str]) -> ServerSettings:
