@@ -25,7 +25,7 @@ from gateway.config.robot import (
 )
 from gateway.config.stop import StopSettings
 from gateway.tables.decoding import Decoding
-from gateway.tables.finding import Finding, lines, mistakes, unknown
+from gateway.tables.finding import Finding, in_order, lines, mistakes, unknown
 from gateway.tables.reading import Unreadable, read
 
 Table = Mapping[str, Any]
@@ -94,7 +94,7 @@ def examined(path: Path, document: Table) -> Examined:
     findings = decoding.findings
     if config is not None:
         findings.extend(complaints(config))
-    return Examined(None if mistakes(findings) else config, findings)
+    return Examined(None if mistakes(findings) else config, in_order(findings, document))
 
 
 class _Reading:

@@ -1,9 +1,10 @@
 """What is wrong with a file, or likely is: which table and key, what is allowed, what was likely meant."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 
 class Severity(StrEnum):
@@ -42,6 +43,23 @@ def told(findings: Iterable[Finding]) -> Iterator[Told]:
 def mistakes(findings: Iterable[Finding]) -> list[Finding]:
     """Those for which the file is refused."""
     return [one for one in findings if one.severity is Severity.MISTAKE]
+
+
+def in_order(findings: Iterable[Finding], document: Mapping[str, Any]) -> list[Finding]:
+    """As the tables stand in the file; what is of no table comes first."""
+    tables = list(document)
+
+    def place(one: Finding) -> tuple[int, int]:
+        table, _, name = one.where.partition("]")[0].lstrip("[").partition(".")
+        entries = document.get(table)
+        names = list(entries) if isinstance(entries, Mapping) else []
+        return _index(tables, table), _index(names, name.strip('"'))
+
+    return sorted(findings, key=place)
+
+
+def _index(names: list[str], name: str) -> int:
+    return names.index(name) if name in names else -1
 
 
 def lines(file: Path, findings: Iterable[Finding]) -> str:

@@ -30,7 +30,7 @@ from msgspec import Meta, Struct, field
 
 from gateway.client import Address, BadAddress
 from gateway.tables.decoding import Decoding
-from gateway.tables.finding import Finding, Told, lines, mistakes, told, warning
+from gateway.tables.finding import Finding, Told, in_order, lines, mistakes, told, warning
 from gateway.tables.reading import Unreadable, read
 from ml.store import StoreError, default_url
 from ml.store.store import checked_url
@@ -155,8 +155,8 @@ def examined(file: Path, document: dict[str, Any]) -> Examined:
     """The same for what stands in it."""
     reading = _Reading(Decoding(_path))
     settings = reading.settings(document, file.parent)
-    wrong = mistakes(reading.findings)
-    return Examined(None if wrong else settings, [*reading.findings, *([] if wrong else _unlikely(settings))])
+    findings = in_order([*reading.findings, *_unlikely(settings)], document)
+    return Examined(None if mistakes(findings) else settings, findings)
 
 
 def findings(file: Path, tables: dict[str, Any], *, machine: bool) -> Iterator[Told]:  # noqa: ARG001 - of robots
