@@ -95,9 +95,8 @@ def _about_serial_ports(config: RobotConfig) -> Iterator[Finding]:
         if fnmatch.fnmatchcase(one.port, "/dev/tty[AU][CS][MB][0-9]*"):
             text = f"{one.port} may be another device next time: take its path in /dev/serial/by-id"
             yield warning(where, "port", text)
-        if not one.port.startswith("/") and "://" not in one.port:
-            name = one.port.rpartition("/")[2]
-            text = f"{one.port!r} is looked for where the gateway was started: write it whole, as /dev/{name}"
+        if "/" not in one.port:
+            text = f"{one.port!r} is looked for where the gateway is started: write /dev/{one.port}"
             yield warning(where, "port", text)
 
 

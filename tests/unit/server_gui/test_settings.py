@@ -115,7 +115,7 @@ def test_an_empty_file_is_as_none(tmp_path: Path) -> None:
         ("[rules]\ntask = 'falling'", r"\[\[rules\]\]: is a list of tables: write it with double brackets"),
         (RULE.replace("at_least = 0.9", ""), r"\[\[rules\]\] number 1 at_least: is missing"),
         (RULE + RULE.replace("0.9", "2"), r"\[\[rules\]\] number 2 at_least: must be a number, at most 1"),
-        (RULE.replace("'falling'", "'fall'"), r"number 1 task: 'fall' is not known: did you mean 'falling'\?"),
+        (RULE.replace("'falling'", "'fall'"), r"number 1 task: 'fall' is not known: did you mean"),
         (
             RULE.replace("near_fall", "nearfall"),
             r"number 1 label: 'nearfall' is not known: did you mean 'near_",
