@@ -3,8 +3,6 @@
 import math
 import tomllib
 from functools import cached_property
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 
 import msgspec
@@ -13,10 +11,9 @@ from drivers.errors import SettingsError
 from drivers.insole.calibration import Calibration
 from drivers.insole.description import CsvDescription, FrameDescription
 from drivers.insole.foot import Foot
+from drivers.insole.shipped import SHIPPED, shipped_names
 
 Cell = tuple[float, float, float]
-
-SHIPPED = resources.files("drivers.insole") / "layouts"
 
 
 class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, dict=True):
@@ -71,12 +68,6 @@ def shipped() -> list[str]:
     return sorted(shipped_names(), key=lambda name: (len(load(name).cells), name))
 
 
-def shipped_names() -> list[str]:
-    """The same by their names."""
-    files = (file.name for file in SHIPPED.iterdir())
-    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
-
-
 def load(name: str, beside: Path | None = None) -> Layout:
     """The layout `name`: a shipped name, or a TOML file, looked for in the folder `beside` first.
 
@@ -97,7 +88,7 @@ def load(name: str, beside: Path | None = None) -> Layout:
         raise SettingsError(f"insole layout {file}: {error}") from error
 
 
-def _locate(name: str, beside: Path | None) -> Path | Traversable:
+def _locate(name: str, beside: Path | None) -> Path:
     if not name.endswith(".toml"):
         file = SHIPPED / f"{name}.toml"
         if file.is_file():

@@ -9,6 +9,7 @@ from drivers.bus.interfaces.opening import interfaces, is_interface
 from drivers.imu.rotation import from_axes
 from drivers.imu.settings import CanImuSettings, ImuSettings
 from drivers.insole.settings import InsoleSettings
+from drivers.insole.shipped import shipped_names
 from drivers.joint.settings import JointSettings
 from gateway.config.likelihood import warnings
 from gateway.config.parameter_checks import complaints as about_parameters
@@ -116,8 +117,6 @@ def _about_layouts(config: RobotConfig) -> Iterator[Finding]:
     for name, insole in config.insole.items():
         if insole.layout is None or insole.layout.endswith(".toml"):
             continue
-        from drivers.insole.layout import shipped_names  # for who names one only
-
         if insole.layout not in (known := shipped_names()):
             text = f"{unknown(insole.layout, known)}, or a .toml file"
             yield Finding(header("insole", name), "layout", text)
