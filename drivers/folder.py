@@ -2,7 +2,7 @@
 
 import importlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.machinery import PathFinder
 from typing import TypeVar
 
@@ -46,3 +46,13 @@ class Folder(Mapping[str, F]):
 
     def _module(self, name: str) -> str:
         return f"{self._package}.{name.replace('-', '_')}"
+
+
+def not_a_format(name: str, known: Iterable[str]) -> str:
+    """What is said of the key `format` where it names none of these."""
+    import difflib  # for who has mistyped only
+
+    names = list(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"format {name!r} is not known: {hint}allowed are {', '.join(names)}"

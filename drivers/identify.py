@@ -7,9 +7,9 @@ from typing import Any
 
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.insole import layout as layouts
+from drivers.insole.foot import FEET, Foot
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import FEET, Foot
 from drivers.parsing import Parser
 
 FEWEST_FRAMES = 3

@@ -8,6 +8,7 @@ a pseudo-terminal whose other end closed) is opened again by the same path, so s
 import errno
 import os
 import select
+import stat
 import threading
 import time
 from collections.abc import Callable
@@ -140,6 +141,19 @@ def open_port(path: str, baudrate: int) -> serial.Serial:
         return serial.Serial(path, baudrate, timeout=0, exclusive=True)
     except (OSError, ValueError) as error:  # SerialException is an OSError
         raise Unavailable(_explain(path, baudrate, error)) from error
+
+
+def obstacle(path: str) -> str | None:
+    """Why the port could not be opened now, in words with what to do; it is only looked at."""
+    try:
+        kind = Path(path).stat().st_mode
+    except OSError as error:
+        return _explain(path, 0, error)
+    if not stat.S_ISCHR(kind):
+        return f"{path} is no serial port: correct the port's path{_ports_here()}"
+    if not os.access(path, os.R_OK | os.W_OK):
+        return _explain(path, 0, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+    return None
 
 
 def _explain(path: str, baudrate: int, error: Exception) -> str:

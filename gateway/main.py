@@ -16,6 +16,7 @@ from gateway import __version__
 COMMANDS: dict[str, tuple[str, str]] = {
     "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
     "install-service": ("gateway.cli.install_service:main", "systemd units for a robot's file"),
+    "check": ("gateway.cli.check:main", "what is wrong with a robot's or server's file, or a scenario"),
     "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
     "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),
     "cost": ("gateway.cli.cost:main", "what monitoring costs the robot, client by client"),

@@ -18,6 +18,8 @@ _PATTERNS = (  # msgspec's messages, and ours
     (r"Expected `(?:str|array|object)` of length >= 1", "must not be empty"),
     (r"Expected `str` matching regex (?P<n>.+)", "must have the form {n}"),
     (r"Expected `array` of length <= (?P<n>\d+)", "has more than {n} entries"),
+    (r"Expected `array` of length (?P<n>\d+), got (?P<m>\d+)", "must have {n} entries, not {m}"),
+    (r"Expected `int` that's a multiple of (?P<n>\d+)", "must be a multiple of {n}"),
     (r"Expected `(?P<want>[^`]+)` >= (?P<n>\S+?)(\.0)?", "must be {want}, at least {n}"),
     (r"Expected `(?P<want>[^`]+)` <= (?P<n>\S+?)(\.0)?", "must be {want}, at most {n}"),
     (r"Expected `(?P<want>[^`]+)` > (?P<n>\S+?)(\.0)?", "must be {want} above {n}"),
@@ -32,15 +34,25 @@ _TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PA
 def plainly(error: Exception) -> str:
     """As `ttl_s must be a number, not text`; what is not in the table stays as it is."""
     what, key = _parts(error)
-    said = next((_said(words, found) for one, words in _TABLE if (found := one.fullmatch(what))), None)
-    if said is None:
+    found = _known(what)
+    if found is None:
         return f"{key}: {what[:1].lower()}{what[1:]}" if key else what
-    return f"{key} {said}" if key else said
+    return f"{key} {found}" if key else found
+
+
+def said(error: Exception) -> str:
+    """The same without its key."""
+    what, _key = _parts(error)
+    return _known(what) or what[:1].lower() + what[1:]
 
 
 def key_of(error: Exception) -> str:
     """Where it is, as `rules[0].above`; empty where it is the whole."""
     return _parts(error)[1]
+
+
+def _known(what: str) -> str | None:
+    return next((_said(words, found) for one, words in _TABLE if (found := one.fullmatch(what))), None)
 
 
 def _parts(error: Exception) -> tuple[str, str]:

@@ -15,7 +15,7 @@ Request = Mapping[str, Any]
 Answer = dict[str, Any]
 
 EVERYTHING = "all"
-_CONTROLLER_COMMANDS = {"start": b"\x01", "stop": b"\x00"}  # object 2000h
+CONTROLLER_COMMANDS = {"start": b"\x01", "stop": b"\x00"}  # object 2000h
 
 
 class RequestRefused(SimulatorError):
@@ -55,7 +55,7 @@ class Operator:
 
     def _controller(self, request: Request) -> Answer:
         self._robot.controller.dictionary.write(
-            *controller.COMMAND, _CONTROLLER_COMMANDS[request["controller"]]
+            *controller.COMMAND, CONTROLLER_COMMANDS[request["controller"]]
         )
         return {"controller": self._robot.controller.controller_state.name.lower()}
 
@@ -69,6 +69,11 @@ def verb_of(request: Request) -> str:
     if len(verbs) != 1:
         raise RequestRefused(f"say one of {', '.join(_CHECKS)}, not {', '.join(request) or 'nothing'}")
     return verbs[0]
+
+
+def further(verb: str) -> tuple[str, ...]:
+    """What else a request of this kind may hold."""
+    return _CHECKS[verb][0]
 
 
 def check(request: object) -> Request:
@@ -104,9 +109,9 @@ def _check_activity(request: Request) -> None:
 
 
 def _check_controller(request: Request) -> None:
-    if request["controller"] not in list(_CONTROLLER_COMMANDS):
+    if request["controller"] not in list(CONTROLLER_COMMANDS):
         raise RequestRefused(
-            f"controller = {request['controller']!r} is no command: {', '.join(_CONTROLLER_COMMANDS)}"
+            f"controller = {request['controller']!r} is no command: {', '.join(CONTROLLER_COMMANDS)}"
         )
 
 

@@ -5,15 +5,18 @@ With `--check` nothing is written; exit status 1 names the files that are not wh
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Final
 
-from tools.draw import commands, packaged, robot_file, server_file, wire
+from tools.draw import commands, packaged, robot_file, schemas, server_file, wire
 
 ROOT: Final = Path(__file__).parents[1]
 FILES: Final[Mapping[str, Callable[[], str]]] = {
-    f"docs/reference/{page.PAGE}": page.draw for page in (robot_file, server_file, wire, commands)
-} | {f"gateway/drawn/{name}": draw for name, draw in packaged.PAGES.items()}
+    **{f"docs/reference/{page.PAGE}": page.draw for page in (robot_file, server_file, wire, commands)},
+    **{f"docs/reference/{kind}.schema.json": partial(schemas.draw, kind) for kind in schemas.SCHEMAS},
+    **{f"gateway/drawn/{name}": draw for name, draw in packaged.PAGES.items()},
+}
 
 
 def stale() -> list[str]:

@@ -11,6 +11,9 @@ from drivers.bus.frames import wire_id
 SDO_REQUEST, SDO_RESPONSE = 0x600, 0x580  # of the predefined connection set (CiA 301 §7.3.3)
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
+Seconds = Annotated[float, msgspec.Meta(gt=0, le=60)]
+LongSeconds = Annotated[float, msgspec.Meta(gt=0, le=600)]
+Angle = Annotated[float, msgspec.Meta(ge=-6.2832, le=6.2832, extra={"unit": "rad"})]  # a turn
 NodeId = Annotated[int, msgspec.Meta(ge=1, le=127)]
 CobId = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
 
@@ -27,10 +30,10 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     interface: str  # python-can's name: "socketcan", "socketcand", "virtual", "slcan", …
     channel: str | int
-    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000)] | None = None
-    sync_period_s: Positive | None = None  # master only
+    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000, extra={"unit": "bit/s"})] | None = None
+    sync_period_s: Seconds | None = None  # master only
     node_id: NodeId | None = None  # our own, for our heartbeat
-    heartbeat_s: Positive | None = None  # how often we send it; master only
+    heartbeat_s: Seconds | None = None  # how often we send it; master only
     more: dict[str, Any] = {}
 
     @classmethod
@@ -39,19 +42,23 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
         Raises `msgspec.ValidationError`, which names the key and what is allowed.
         """
+        return msgspec.convert(cls.parted(table), cls)
+
+    @classmethod
+    def parted(cls, table: Mapping[str, Any]) -> dict[str, Any]:
+        """The table with python-can's keys in `more`."""
         ours = {key: value for key, value in table.items() if key in cls.__struct_fields__ and key != "more"}
-        more = {key: value for key, value in table.items() if key not in ours}
-        return msgspec.convert({**ours, "more": more}, cls)
+        return {**ours, "more": {key: value for key, value in table.items() if key not in ours}}
 
 
 class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How long one node is waited for, and by which SDO channel it is asked."""
 
-    sdo_timeout_s: Positive = 0.5
-    store_timeout_s: Positive = 10.0  # for the answer to 1010h and 1011h: flash takes its time
+    sdo_timeout_s: Seconds = 0.5
+    store_timeout_s: LongSeconds = 10.0  # for the answer to 1010h and 1011h: flash takes its time
     sdo_cob_ids: tuple[CobId, CobId] | None = None  # request, response; None: 600h and 580h + node id
-    heartbeat_timeout_s: Positive | None = None  # None: 2.5 times what the device says in 1017h
-    guard_time_s: Positive | None = None  # node guarding by us, for a device without heartbeat; master only
+    heartbeat_timeout_s: Seconds | None = None  # None: 2.5 times what the device says in 1017h
+    guard_time_s: Seconds | None = None  # node guarding by us, for a device without heartbeat; master only
 
     def sdo_ids(self, node_id: int) -> tuple[int, int]:
         """The identifiers of its SDO channel, of requests and of responses, with their flags."""
@@ -65,5 +72,5 @@ class DeviceSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only
     bus: str
     node_id: NodeId
     eds: str
-    stale_after_s: Positive = 0.5
-    lost_after_s: Positive = 2.0
+    stale_after_s: LongSeconds = 0.5
+    lost_after_s: LongSeconds = 2.0

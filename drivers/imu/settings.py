@@ -5,15 +5,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import msgspec
 
-from drivers.bus.settings import CobId, NodeId, NodeTimes
+from drivers.bus.settings import Angle, CobId, LongSeconds, NodeId, NodeTimes, Seconds
+from drivers.folder import not_a_format
 from drivers.imu import can, canopen, formats
 
 if TYPE_CHECKING:
     from drivers.folder import Folder
     from drivers.imu.format import CanFormat, Format, NodeFormat
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Axes = Annotated[tuple[Axis, Axis, Axis], msgspec.Meta(examples=[["x", "y", "z"]])]
 Attitude = Literal["auto", "device", "filter"]
 
 # The key that only tables of that wiring have → the format of those that name none.
@@ -27,17 +28,16 @@ class MountedSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     what is left after that: roll, pitch, yaw (rad) of the sensor in the trunk.
     """
 
-    axes: tuple[Axis, Axis, Axis] | None = None  # None: as the format's device defines its own
-    mounting: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axes: Axes | None = None  # None: as the format's device defines its own
+    mounting: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
     zero: str | None = None  # file of a zero taken by `gwrms calibrate imu`, beside the robot's file
-    stale_after_s: Positive = 0.5
-    lost_after_s: Positive = 2.0
+    stale_after_s: LongSeconds = 0.5
+    lost_after_s: LongSeconds = 2.0
     format: str  # how it talks
 
     def __post_init__(self) -> None:
         if not any(self.format in wiring.formats for wiring in WIRINGS):
-            known = ", ".join(name for wiring in WIRINGS for name in wiring.formats)
-            raise ValueError(f"format {self.format!r} is not known; here are {known}")
+            raise ValueError(not_a_format(self.format, [name for one in WIRINGS for name in one.formats]))
 
 
 class ImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -65,8 +65,8 @@ class NodeImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, 
     node_id: NodeId
     format: str = USUAL["node_id"]
     eds: str = "inclinometer.eds"  # the vendor's is better
-    sdo_timeout_s: Positive = 0.5
-    heartbeat_timeout_s: Positive | None = None  # None: 2.5 times what the device says in 1017h
+    sdo_timeout_s: Seconds = 0.5
+    heartbeat_timeout_s: Seconds | None = None  # None: 2.5 times what the device says in 1017h
 
     @property
     def times(self) -> NodeTimes:

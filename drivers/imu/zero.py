@@ -69,7 +69,12 @@ def load(path: Path) -> Quaternion:
     """
     try:
         return msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Zero).rotation
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except OSError as error:
+        raise SettingsError(
+            f"IMU zero {path} cannot be read ({error.strerror}): gwrms calibrate imu writes it; "
+            "leave the key `zero` out until then"
+        ) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise SettingsError(f"IMU zero {path}: {error}") from error
 
 

@@ -101,7 +101,12 @@ def load(path: Path) -> Calibration:
     """
     try:
         return msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Calibration)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except OSError as error:
+        raise SettingsError(
+            f"insole calibration {path} cannot be read ({error.strerror}): gwrms calibrate insole writes it; "
+            "leave the key `calibration` out until then"
+        ) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise SettingsError(f"insole calibration {path}: {error}") from error
 
 

@@ -9,9 +9,10 @@ from drivers.freshness import Freshness, silence_text
 from drivers.insole import calibration as calibrations
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import Cells
+from drivers.insole.foot import FEET, Foot
 from drivers.insole.formats import FORMATS
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import FEET, Foot, Layout
+from drivers.insole.layout import Layout
 from drivers.insole.load import Stance, load_of
 from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
@@ -49,7 +50,7 @@ class Insole:
     ) -> None:
         self.name = name
         self.settings = settings
-        self.foot: Foot | None = settings.foot or _foot_in(name)
+        self.foot: Foot | None = settings.side(name)
         layout = layout_of(settings.format, settings.layout, beside)
         self.layout = layout if self.foot is None else layout.for_foot(self.foot)
         if not layout.cells:
@@ -231,10 +232,6 @@ def _calibration(settings: InsoleSettings, layout: Layout, beside: Path | None) 
     if settings.calibration is not None:
         calibration = calibrations.load((beside or Path()) / settings.calibration)
     return None if calibration is None else Cells(calibration, len(layout.cells))
-
-
-def _foot_in(name: str) -> Foot | None:
-    return next((foot for foot in FEET if name.startswith(foot)), None)
 
 
 def _channels(name: str, cells: int) -> tuple[Channel, ...]:

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from drivers.insole.layout import Foot
+from drivers.insole.foot import Foot
 
 
 class InsoleFrame(msgspec.Struct, frozen=True):

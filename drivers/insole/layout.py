@@ -3,22 +3,17 @@
 import math
 import tomllib
 from functools import cached_property
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 
 from drivers.errors import SettingsError
 from drivers.insole.calibration import Calibration
 from drivers.insole.description import CsvDescription, FrameDescription
+from drivers.insole.foot import Foot
+from drivers.insole.shipped import SHIPPED, shipped_names
 
-Foot = Literal["left", "right"]
-FEET: tuple[Foot, ...] = ("left", "right")
 Cell = tuple[float, float, float]
-
-SHIPPED = resources.files("drivers.insole") / "layouts"
 
 
 class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, dict=True):
@@ -70,8 +65,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 def shipped() -> list[str]:
     """Names of the layouts that ship, sorted by their number of cells."""
-    names = [file.name.removesuffix(".toml") for file in SHIPPED.iterdir() if file.name.endswith(".toml")]
-    return sorted(names, key=lambda name: (len(load(name).cells), name))
+    return sorted(shipped_names(), key=lambda name: (len(load(name).cells), name))
 
 
 def load(name: str, beside: Path | None = None) -> Layout:
@@ -84,17 +78,21 @@ def load(name: str, beside: Path | None = None) -> Layout:
     file = _locate(name, beside)
     try:
         return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), Layout)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except OSError as error:
+        known = ", ".join(shipped_names())
+        raise SettingsError(
+            f"insole layout {file} cannot be read ({error.strerror}): it lies beside the robot's file, "
+            f"or is one of {known}"
+        ) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise SettingsError(f"insole layout {file}: {error}") from error
 
 
-def _locate(name: str, beside: Path | None) -> Path | Traversable:
+def _locate(name: str, beside: Path | None) -> Path:
     if not name.endswith(".toml"):
         file = SHIPPED / f"{name}.toml"
         if file.is_file():
             return file
-        known = ", ".join(
-            entry.name.removesuffix(".toml") for entry in SHIPPED.iterdir() if entry.name.endswith(".toml")
-        )
+        known = ", ".join(shipped_names())
         raise SettingsError(f"there is no insole layout {name!r}: use a .toml file, or one of {known}")
     return (beside or Path()) / name

@@ -1,6 +1,6 @@
 """Late frames of formats whose description says what counts: a sequence, else the device's time."""
 
-from drivers.insole.layout import Foot
+from drivers.insole.foot import Foot
 from drivers.parsing import Counters, Sequence
 
 TIME_MODULUS = 1 << 64  # µs: never

@@ -1,12 +1,13 @@
 """What an integrator says about an insole: the table `[insole.NAME]` of the robot's file."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
+from drivers.bus.settings import LongSeconds, Positive
+from drivers.folder import not_a_format
+from drivers.insole.foot import Foot, foot_in
 from drivers.insole.formats import FORMATS
-
-Positive = Annotated[float, msgspec.Meta(gt=0)]
 
 
 class InsoleSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -17,11 +18,15 @@ class InsoleSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     format: str = "insole-cobs"
     layout: str | None = None  # a shipped one, or a .toml file beside the robot's file; None: the usual one
     calibration: str | None = None  # a file of `gwrms calibrate insole`, beside the robot's file
-    foot: Literal["left", "right"] | None = None  # None: by the component's name, left_… or right_…
+    foot: Foot | None = None  # None: by the component's name, left_… or right_…
     force_threshold: Positive = 20.0  # N; below it the foot is in the air and has no centre of pressure
-    stale_after_s: Positive = 0.5
-    lost_after_s: Positive = 2.0
+    stale_after_s: LongSeconds = 0.5
+    lost_after_s: LongSeconds = 2.0
 
     def __post_init__(self) -> None:
         if self.format not in FORMATS:
-            raise ValueError(f"format {self.format!r} is not known; here are {', '.join(FORMATS)}")
+            raise ValueError(not_a_format(self.format, FORMATS))
+
+    def side(self, name: str) -> Foot | None:
+        """Which foot a component of that name is; `None` where nothing says it."""
+        return self.foot or foot_in(name)

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from drivers.bus.settings import NodeId, NodeTimes, Positive
+from drivers.bus.settings import Angle, LongSeconds, NodeId, NodeTimes, Positive, Seconds
 
 VelocityUnit = Literal["counts/s", "rpm", "0.1rpm", "0.01rpm", "0.001rpm"]
 
@@ -22,7 +22,7 @@ class JointSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=
     counts_per_revolution: Positive  # of the encoder that 6064h counts
     gear_ratio: Positive  # its revolutions per revolution of the joint
     direction: Literal[1, -1] = 1
-    zero_offset: float = 0.0  # rad: the joint's angle where the drive counts 0
+    zero_offset: Angle = 0.0  # rad: the joint's angle where the drive counts 0
     velocity_unit: VelocityUnit = "counts/s"  # of 606Ch, at the encoder
     rated_torque: Positive | None = None  # N·m at the joint; None: 6076h times gear_ratio
     rated_current: Positive | None = None  # A; None: 6075h
@@ -31,6 +31,6 @@ class JointSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=
     )
     slow_poll_hz: Annotated[float, msgspec.Meta(ge=0, le=50)] = 4.0  # all else no TPDO brings; 0: never
     configure_pdos: bool = False  # may the gateway change the drive's PDO mapping?
-    stop_timeout_s: Positive = 1.0  # how long a quick stop may take to be confirmed
-    stale_after_s: Positive = 0.5
-    lost_after_s: Positive = 2.0
+    stop_timeout_s: Seconds = 1.0  # how long a quick stop may take to be confirmed
+    stale_after_s: LongSeconds = 0.5
+    lost_after_s: LongSeconds = 2.0

@@ -22,7 +22,7 @@ exit code
   0 when every file can be used, 1 when one cannot, 2 for wrong usage
 
 examples
-  gwrms eds drive.eds
+  gwrms eds joint_drive.eds
   gwrms eds --brief *.eds *.dcf
   gwrms eds --json --node-id 5 drive.eds
 """
@@ -41,7 +41,13 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("files", nargs="+", metavar="FILE", type=Path, help="an .eds or .dcf file")
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        type=Path,
+        help="an .eds or .dcf file, or the name of one that ships",
+    )
     parser.add_argument(
         "--node-id", type=_node_id, default=1, metavar="N", help="node id for COB-IDs that depend on it (1)"
     )
@@ -56,7 +62,7 @@ def main(argv: list[str]) -> int:
     failed = False
     for path in arguments.files:
         try:
-            description = eds.load(path, arguments.node_id)
+            description = eds.load(eds.locate(str(path), Path.cwd() / "here"), arguments.node_id)
         except EdsError as error:
             failed = True
             sys.stderr.write(f"gwrms eds: {error}\n")

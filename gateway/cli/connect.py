@@ -4,6 +4,7 @@ import argparse
 import fnmatch
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 from gateway.cli.text import did_you_mean, say, warn
 from gateway.client import Address, BadAddress, ClientError, ConnectionState, LinkSettings, Robot
@@ -71,15 +72,20 @@ def widened(asked: Iterable[str], description: Description) -> list[str]:
     return [f"{name}.*" if name in components else name for name in asked]
 
 
-def check_names(what: str, asked: Iterable[str], known: Sequence[str]) -> None:
-    """Refuse a name or glob that nothing on the robot has.
+def check_names(
+    what: str, asked: Iterable[str], known: Sequence[str], absent: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Refuse a name or glob that nothing on the robot has; `absent` are components that cannot be built.
 
     Raises:
-        UnknownName: names it, and those that come close.
+        UnknownName: names it, and those that come close, or why the component that it is of is not there.
 
     """
     for glob in asked:
         if not any(fnmatch.fnmatchcase(name, glob) for name in known):
+            component = glob.partition(".")[0]
+            for name in fnmatch.filter(absent, component):
+                raise UnknownName(f"{name} has no {what}: {absent[name]}")
             raise UnknownName(
                 f"the robot has no {what} {glob!r}{did_you_mean(glob, known)} (gwrms describe lists them)"
             )
@@ -108,6 +114,12 @@ def ask(question: str, *, yes: bool) -> bool:
         raise NobodyToAsk("there is no terminal to ask on, and nothing was sent; say --yes to go on")
     say(f"{question} [y/N] ")
     return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def absent_components(description: Description) -> dict[str, str]:
+    """Those that have no channel because something is wrong with them, and what."""
+    there = {channel.component for channel in description.channels}
+    return {one.name: one.problem for one in description.components if one.problem and one.name not in there}
 
 
 def channel_names(description: Description) -> list[str]:

@@ -13,7 +13,6 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from gateway import config
-from gateway.config.robot import GatewaySettings
 from gateway.connections.listeners import Listeners, inherited, listen, rest
 from gateway.daemon import Daemon
 from gateway.process import notify
@@ -79,13 +78,13 @@ def main(arguments: Sequence[str]) -> int:
     logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     handed = inherited(os.environ)
     try:
-        robot = _robot(options)
+        robot = _robot(options, tell=handed is None or not handed.woken)
     except config.ConfigError as error:
         if handed is None:
             raise
         return _refuse(handed, error)
     share_heap()
-    sockets = _listeners(robot.gateway, handed)
+    sockets = _listeners(robot, handed)
     by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
     daemon = Daemon(robot, sockets.port, classic=sockets.classic, ends_idle=watched is None)
     if watched is not None:
@@ -99,20 +98,25 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _robot(options: argparse.Namespace) -> config.RobotConfig:
-    robot = config.load(options.config)
+def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
+    """The robot of the file; what is likely wrong with it is logged where `tell` says so."""
+    robot, warnings = config.load_with_warnings(options.config)
+    for one in warnings if tell else ():
+        log.warning("%s: %s", options.config, one.words)
     given = {"host": options.host, "port": options.port}
     changed = {key: value for key, value in given.items() if value is not None}
     return replace(robot, gateway=replace(robot.gateway, **changed))
 
 
-def _listeners(gateway: GatewaySettings, handed: Listeners | None) -> Listeners:
+def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners:
     """Those that were handed over; what is missing is opened."""
-    port = listen(gateway.host, gateway.port) if handed is None else handed.port
+    gateway, where = robot.gateway, f"[gateway] of {robot.path}:"
+    ours = f"{where} host and port, or --host and --port"
+    port = listen(gateway.host, gateway.port, ours) if handed is None else handed.port
     classic = None if handed is None else handed.classic
     if classic is None and gateway.classic_port is not None:
         try:
-            classic = listen(gateway.host, gateway.classic_port, "classic_port")
+            classic = listen(gateway.host, gateway.classic_port, f"{where} classic_port")
         except OSError:
             port.close()
             raise

@@ -6,7 +6,14 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 from gateway.cli.arguments import number
-from gateway.cli.connect import channel_names, check_names, connect, parser, widened
+from gateway.cli.connect import (
+    absent_components,
+    channel_names,
+    check_names,
+    connect,
+    parser,
+    widened,
+)
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
 from gateway.wire.component import ChannelInfo
@@ -40,7 +47,7 @@ def main(argv: list[str]) -> int:
     with connect(arguments, "watch") as robot:
         description = robot.describe()
         channels = widened(arguments.channels, description)
-        check_names("channel", channels, channel_names(description))
+        check_names("channel", channels, channel_names(description), absent_components(description))
         modules = _modules(channels, description)
         rows = itertools.islice(_rows(robot, channels, modules, arguments.rate), arguments.count)
         try:

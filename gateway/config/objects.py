@@ -5,7 +5,14 @@ from typing import Annotated
 from msgspec import Meta
 
 # As "0x6072:0", index and subindex.
-ObjectName = Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$")]
+ObjectName = Annotated[
+    str,
+    Meta(
+        pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$",
+        title="index and sub-index",
+        examples=["0x6072:0"],
+    ),
+]
 
 CONTROLWORD = 0x6040
 AXIS_OFFSET = 0x800  # between the objects of a multi-axis drive's axes (CiA 402-2)

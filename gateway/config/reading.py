@@ -1,7 +1,7 @@
 """TOML to the robot's structs, validated once; every error names file, table, key and remedy."""
 
-import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +24,18 @@ from gateway.config.robot import (
     header,
 )
 from gateway.config.stop import StopSettings
-from gateway.wording import key_of, plainly
+from gateway.tables.decoding import Decoding
+from gateway.tables.finding import Finding, in_order, lines, mistakes, unknown
+from gateway.tables.reading import Unreadable, read
 
 Table = Mapping[str, Any]
 
 
 class ConfigError(ValueError):
-    """The robot's file cannot be used; the message names file, table, key and what is allowed."""
+    """The robot's file cannot be used; the message names file, table, key what is allowed, a line each."""
 
 
-_SINGLE: Mapping[str, type[Struct]] = {
+SINGLE: Mapping[str, type[Struct]] = {
     "robot": RobotSettings,
     "gateway": GatewaySettings,
     "stop": StopSettings,
@@ -47,6 +49,15 @@ NAMED: Mapping[str, type[Struct]] = {
     "imu": MountedSettings,  # one of several, by what the table says
     "parameter": ParameterSettings,
 }
+TABLES = (*SINGLE, *NAMED, "guard")
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A robot's file with everything that is wrong with it, or likely is; `config` where it can be served."""
+
+    config: RobotConfig | None
+    findings: list[Finding] = field(default_factory=list)
 
 
 def load(path: Path) -> RobotConfig:
@@ -56,88 +67,112 @@ def load(path: Path) -> RobotConfig:
         ConfigError: it is not there, is no TOML, or says something that cannot work.
 
     """
+    return load_with_warnings(path)[0]
+
+
+def load_with_warnings(path: Path) -> tuple[RobotConfig, list[Finding]]:
+    """The same, with what is likely wrong; raises `ConfigError`."""
+    found = examine(path)
+    if found.config is None:
+        raise ConfigError(lines(path, mistakes(found.findings)))
+    return found.config, found.findings
+
+
+def examine(path: Path) -> Examined:
+    """Read the robot's file; whatever is wrong with it is told, not only the first thing."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}; name the robot's file") from error
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: is no TOML: {error}") from error
-    try:
-        config = _convert(path, document)
-        for complaint in complaints(config):
-            raise ConfigError(complaint)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
-    return config
+        document = read(path)
+    except Unreadable as error:
+        return Examined(None, [error.finding])
+    return examined(path, document)
 
 
-def _convert(path: Path, document: Table) -> RobotConfig:
-    _check_keys("the file", document, allowed=[*_SINGLE, *NAMED, "guard"], required=["robot"])
-    parts: dict[str, Any] = {"path": path}
-    for table, kind in _SINGLE.items():
-        if table in document:
-            parts[table] = _struct(f"[{table}]", document[table], kind)
-    for table, kind in NAMED.items():
-        entries = document.get(table, {})
-        if not isinstance(entries, dict):
-            raise ConfigError(f"[{table}] holds tables: write [{table}.NAME]")
-        parts[table] = {name: _struct(header(table, name), entry, kind) for name, entry in entries.items()}
-    if "guard" in document:
-        parts["guard"] = _guard(document["guard"])
-    return RobotConfig(**parts)
+def examined(path: Path, document: Table) -> Examined:
+    """The same for what stands in it."""
+    decoding = Decoding()
+    config = _Reading(decoding).config(path, document)
+    findings = decoding.findings
+    if config is not None:
+        findings.extend(complaints(config))
+    return Examined(None if mistakes(findings) else config, in_order(findings, document))
 
 
-def _guard(table: Any) -> Struct:
-    """`[guard]` with its rules, each by what it watches."""
-    from gateway.config.guard import GuardSettings  # here and below: for a file that has a guard only
+class _Reading:
+    """One file's tables; those that cannot be read are named in `lost`, because others speak of them."""
 
-    if not isinstance(table, dict) or not isinstance(table.get("rule", {}), dict):
-        raise ConfigError("[guard] is a table, and so is each of its rules: write [guard.rule.NAME]")
-    rules = {name: _rule(f"[guard.rule.{name}]", name, rule) for name, rule in table.get("rule", {}).items()}
-    return msgspec.structs.replace(_struct("[guard]", {**table, "rule": {}}, GuardSettings), rule=rules)
+    def __init__(self, decoding: Decoding) -> None:
+        self._decoding = decoding
+        self._lost: dict[str, frozenset[str]] = {}
+
+    def config(self, path: Path, document: Table) -> RobotConfig | None:
+        """What can be made of it; `None` where that is no robot at all."""
+        self._decoding.tables(document, TABLES)
+        if "robot" not in document:
+            self._decoding.complain("[robot]", "", 'is missing: write [robot] and below it name = "…"')
+        parts: dict[str, Any] = {"robot": RobotSettings(name="?")}  # so that the rest is told all the same
+        for table, kind in SINGLE.items():
+            made = self._struct(f"[{table}]", document[table], kind) if table in document else None
+            parts |= {} if made is None else {table: made}
+        parts |= {table: self._named(table, kind, document.get(table, {})) for table, kind in NAMED.items()}
+        if "guard" in document:
+            parts["guard"] = self._guard(document["guard"])
+        return RobotConfig(path=path, lost=self._lost, **parts)
+
+    def _named(self, table: str, kind: type[Struct], entries: Any) -> dict[str, Struct]:
+        there = (
+            {name: one for name, one in entries.items() if _is_table(one)}
+            if isinstance(entries, dict)
+            else {}
+        )
+        if not isinstance(entries, dict) or len(there) < len(entries):
+            self._decoding.complain(
+                f"[{table}]", "", f"holds tables, each with its name: write [{table}.NAME]"
+            )
+        made = {name: self._struct(header(table, name), entry, kind) for name, entry in there.items()}
+        self._lost[table] = frozenset(name for name, one in made.items() if one is None)
+        return {name: one for name, one in made.items() if one is not None}
+
+    def _struct(self, where: str, table: Any, kind: type[Struct]) -> Struct | None:
+        if not isinstance(table, dict):
+            return self._decoding.struct(where, table, kind)
+        if kind is ParameterSettings and table and all(map(_is_table, table.values())):
+            component, name = where.removesuffix("]").rpartition(".")[2], next(iter(table))
+            text = f'a parameter\'s name is one key: write [parameter."{component}.{name}"]'
+            self._decoding.complain(where, "", text)
+            return None
+        if kind is CanSettings:
+            table = CanSettings.parted(table)
+        return self._decoding.struct(where, table, kind_of(table) if kind is MountedSettings else kind)
+
+    def _guard(self, table: Any) -> Struct | None:
+        """`[guard]` with its rules, each by what it watches."""
+        from gateway.config.guard import GuardSettings  # here and below: for a file that has a guard only
+
+        rules = table.get("rule", {}) if isinstance(table, dict) else None
+        if not isinstance(rules, dict):
+            text = "is a table, and so is each of its rules: write [guard.rule.NAME]"
+            self._decoding.complain("[guard]", "", text)
+            return None
+        guard = self._decoding.struct("[guard]", {**table, "rule": {}}, GuardSettings)
+        made = {name: self._rule(f"[guard.rule.{name}]", name, rule) for name, rule in rules.items()}
+        good = {name: rule for name, rule in made.items() if rule is not None}
+        self._lost["guard"] = frozenset(made.keys() - good.keys())
+        return None if guard is None else msgspec.structs.replace(guard, rule=good)
+
+    def _rule(self, where: str, name: str, table: Any) -> Struct | None:
+        from gateway.config.guard import WATCHES
+
+        if not isinstance(table, dict):
+            return self._decoding.struct(where, table, Struct)
+        if not NAME.fullmatch(name):
+            self._decoding.complain(where, "", "a name is a letter, then letters, digits, _ and -")
+        watch = table.get("watch")
+        if not isinstance(watch, str) or watch not in WATCHES:
+            missing = f"is missing; allowed are {', '.join(WATCHES)}"
+            self._decoding.complain(where, "watch", unknown(watch, WATCHES) if watch else missing)
+            return None
+        return self._decoding.struct(where, table, WATCHES[watch].rule)
 
 
-def _rule(where: str, name: str, table: Any) -> Struct:
-    from gateway.config.guard import WATCHES
-
-    watch = table.get("watch") if isinstance(table, dict) else None
-    if not isinstance(watch, str) or watch not in WATCHES:
-        raise ConfigError(f"{where} watch: say what it watches, one of {', '.join(WATCHES)}")
-    if not NAME.fullmatch(name):
-        raise ConfigError(f"{where}: a name is a letter, then letters, digits, _ and -")
-    return _struct(where, table, WATCHES[watch].rule)
-
-
-def _struct(where: str, table: Any, kind: type[Struct]) -> Struct:
-    if not isinstance(table, dict):
-        raise ConfigError(f"{where} is a table, not {table!r}")
-    if kind is ParameterSettings and table and all(isinstance(entry, dict) for entry in table.values()):
-        component, name = where.removesuffix("]").rpartition(".")[2], next(iter(table))
-        raise ConfigError(f'{where}: a parameter\'s name is one key: write [parameter."{component}.{name}"]')
-    if kind is MountedSettings:
-        kind = kind_of(table)
-    fields = msgspec.structs.fields(kind)
-    required = [field.encode_name for field in fields if field.required]
-    # Whatever else stands in [can.NAME] is for python-can.
-    allowed = None if kind is CanSettings else [field.encode_name for field in fields]
-    _check_keys(where, table, allowed, required)
-    try:
-        if issubclass(kind, CanSettings):
-            return kind.from_table(table)
-        return msgspec.convert(table, kind)
-    except msgspec.ValidationError as error:
-        place = where if key_of(error) else f"{where}:"
-        raise ConfigError(f"{place} {plainly(error)}") from error
-
-
-def _check_keys(where: str, table: Table, allowed: list[str] | None, required: list[str]) -> None:
-    for key in table:
-        if allowed is not None and key not in allowed:
-            import difflib  # for who has mistyped only
-
-            close = difflib.get_close_matches(key, allowed, n=1)
-            hint = f"did you mean {close[0]!r}? " if close else ""
-            raise ConfigError(f"{where} has an unknown key {key!r}: {hint}allowed are {', '.join(allowed)}")
-    missing = [key for key in required if key not in table]
-    if missing:
-        raise ConfigError(f"{where} lacks the key {', '.join(map(repr, missing))}")
+def _is_table(entry: Any) -> bool:
+    return isinstance(entry, dict | list)  # a list is complained about where it is read

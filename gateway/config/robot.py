@@ -1,7 +1,7 @@
 """The robot's file as frozen structs, a table each."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,7 +9,7 @@ from msgspec import Meta, Struct
 
 from drivers.bus.settings import CanSettings, DeviceSettings, Role
 from drivers.component import Kind
-from drivers.imu.settings import CanImuSettings, MountedSettings, NodeImuSettings
+from drivers.imu.settings import CanImuSettings, ImuSettings, MountedSettings, NodeImuSettings
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.settings import JointSettings
 from gateway.config.objects import ObjectName, address_of
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gateway.config.guard import GuardSettings
 
 Node = tuple[str, int]  # a bus by its name, and a node id there
+OnPort = InsoleSettings | ImuSettings
 OnBus = JointSettings | DeviceSettings | CanImuSettings | NodeImuSettings
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -123,6 +124,12 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     stop: StopSettings = StopSettings()
     guard: "GuardSettings | None" = None
     control_loop: ControlLoopSettings | None = None
+    # By table, the names of those that could not be read: others may speak of them while the file is checked.
+    lost: Mapping[str, frozenset[str]] = {}
+
+    def names(self, *tables: str) -> list[str]:
+        """Of the tables of these kinds, also those that could not be read."""
+        return [name for table in tables for name in (*getattr(self, table), *self.lost.get(table, ()))]
 
     def node_of(self, component: str) -> Node:
         """Where a joint or device is: bus and node id."""
@@ -144,6 +151,13 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
             for name, settings in getattr(self, table).items():
                 if isinstance(settings, OnBus):
                     yield f"[{table}.{name}]", settings
+
+    def on_ports(self) -> Iterator[tuple[str, OnPort]]:
+        """Every table of a sensor on a serial port, with its header."""
+        for table in (Kind.INSOLE, Kind.IMU):
+            for name, settings in getattr(self, table).items():
+                if isinstance(settings, OnPort):
+                    yield header(table, name), settings
 
     @property
     def records(self) -> Path:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from drivers.bus.settings import NodeTimes
 from drivers.imu.settings import CanImuSettings
 from gateway.config.robot import OnBus, RobotConfig
+from gateway.tables.finding import Finding
 
 REQUEST, RESPONSE = 0x600, 0x580  # of a node's default channel, plus its node id
 # Identifiers that no configurable object may have (CiA 301 §7.3.5), and those whose meaning is fixed.
@@ -32,7 +33,7 @@ _PDOS = {
 _REMEDY = "take one that nobody uses on that bus, such as one from 0x680 to 0x6DF, and set it in the device"
 
 
-def complaints(config: RobotConfig) -> Iterator[str]:
+def complaints(config: RobotConfig) -> Iterator[Finding]:
     """Everything that is wrong with a channel, by table and key."""
     for bus in config.can:
         yield from _Bus(config, bus).complaints()
@@ -53,7 +54,7 @@ class _Bus:
         if loop is not None and loop.bus == name:
             self._users[loop.can_id] = "[control_loop]"
 
-    def complaints(self) -> Iterator[str]:
+    def complaints(self) -> Iterator[Finding]:
         channels: dict[int, tuple[str, tuple[int, int] | None]] = {}  # by node: the first table counts
         for where, settings in self._tables.items():
             if isinstance(settings, CanImuSettings):
@@ -62,18 +63,19 @@ class _Bus:
             node_id = settings.node_id
             other, known = channels.setdefault(node_id, (where, given))
             if known != given:
-                yield f"{where} sdo_cob_ids: node {node_id} has one for all its tables: say what {other} says"
+                text = f"node {node_id} has one for all its tables: say what {other} says"
+                yield Finding(where, "sdo_cob_ids", text)
             elif given is not None and other == where:
-                yield from self._about_channel(f"{where} sdo_cob_ids:", where, node_id, given)
+                yield from self._about_channel(where, node_id, given)
 
-    def _about_channel(self, key: str, where: str, node_id: int, channel: tuple[int, int]) -> Iterator[str]:
+    def _about_channel(self, where: str, node_id: int, channel: tuple[int, int]) -> Iterator[Finding]:
         request, response = channel
         if request == response:
-            yield f"{key} request and response are both 0x{request:X}; {_REMEDY}"
+            yield Finding(where, "sdo_cob_ids", f"request and response are both 0x{request:X}; {_REMEDY}")
         for word, cob_id, default in (("request", request, REQUEST), ("response", response, RESPONSE)):
             why = None if cob_id == default + node_id else self._why_not(cob_id)
             if why is not None:
-                yield f"{key} the {word} 0x{cob_id:X} {why}; {_REMEDY}"
+                yield Finding(where, "sdo_cob_ids", f"the {word} 0x{cob_id:X} {why}; {_REMEDY}")
             self._users[cob_id] = where
 
     def _why_not(self, cob_id: int) -> str | None:

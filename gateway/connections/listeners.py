@@ -49,10 +49,8 @@ def listen(host: str, port: int, setting: str = "--host or --port") -> socket.so
         )[0]
         return socket.create_server(address[:2], family=family, backlog=BACKLOG)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise OSError(
-            error.errno, f"cannot listen on {host}:{port}: {reason}; choose another with {setting}"
-        ) from error
+        reason = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)
+        raise OSError(f"cannot listen on {host}:{port}: {reason}; choose another with {setting}") from error
 
 
 def inherited(environ: MutableMapping[str, str]) -> Listeners | None:

@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service describe snapshot cost bench blame watch top get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
+set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -69,6 +69,14 @@ complete -c gwrms -n '_shtab_gwrms_using install-service' -l user -d 'for your o
 complete -c gwrms -n '_shtab_gwrms_using install-service' -l run-as -x -d 'the account (default: one that systemd makes up)'
 complete -c gwrms -n '_shtab_gwrms_using install-service' -l name -x -d 'of the units (default: gwrms)'
 complete -c gwrms -n '_shtab_gwrms_using install-service; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a check -d 'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
+complete -c gwrms -n '_shtab_gwrms_using check' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using check' -l kind -xka "robot server scenario" -d 'what the files are, whatever their tables show'
+complete -c gwrms -n '_shtab_gwrms_using check' -l no-machine -d 'only the files and what lies beside them: no address, ports and CAN links of this computer'
+complete -c gwrms -n '_shtab_gwrms_using check' -l strict -d 'exit status 1 for warnings too'
+complete -c gwrms -n '_shtab_gwrms_using check' -l json -d 'one JSON object a file and line'
+complete -c gwrms -n '_shtab_gwrms_using check' -l schema -xka "robot server scenario" -d 'print the JSON Schema of such files, for editors, instead'
+complete -c gwrms -n '_shtab_gwrms_using check; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file to check'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a describe -d 'What a robot is made of: its components and what is wrong with them, its channels and their units,'
 complete -c gwrms -n '_shtab_gwrms_using describe' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using describe' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
@@ -183,7 +191,7 @@ complete -c gwrms -n '_shtab_gwrms_using eds' -s h -l help -d 'show this help me
 complete -c gwrms -n '_shtab_gwrms_using eds' -l node-id -x -d 'node id for COB-IDs that depend on it (1)'
 complete -c gwrms -n '_shtab_gwrms_using eds' -l brief -d 'leave out the objects'
 complete -c gwrms -n '_shtab_gwrms_using eds' -l json -d 'one JSON object a file and line'
-complete -c gwrms -n '_shtab_gwrms_using eds; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'an .eds or .dcf file'
+complete -c gwrms -n '_shtab_gwrms_using eds; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'an .eds or .dcf file, or the name of one that ships'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sensor -d 'Says what is on a serial port, how well it fits, and shows it live.'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -l baud -x -d 'try this baud rate only'

@@ -13,6 +13,7 @@ _shtab_gwrms_commands() {
     bench:'Measure a robot'"'"'s gateway: latency, CPU and memory of what it does.'
     blame:'Watch the robot'"'"'s control loop, and name what made it late.'
     calibrate:'an insole'"'"'s pressure, an IMU'"'"'s zero'
+    check:'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
     cloud:'the store: browse, upload, download, verify, tidy'
     collect:'Record every robot, whole, into the store; and ask how that goes.'
     completion:'Print what completes commands, options and files in a shell.'
@@ -192,6 +193,19 @@ _shtab_gwrms_calibrate_insole_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_calibrate_insole_defaults_added=0
+
+_shtab_gwrms_check_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--kind[what the files are, whatever their tables show]:kind:(robot server scenario)"
+  "--no-machine[only the files and what lies beside them\: no address, ports and CAN links of this computer]"
+  "--strict[exit status 1 for warnings too]"
+  "--json[one JSON object a file and line]"
+  "--schema[print the JSON Schema of such files, for editors, instead]:schema:(robot server scenario)"
+  "(*)::a file to check:_files"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_check_defaults_added=0
 
 _shtab_gwrms_cloud_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -373,7 +387,7 @@ _shtab_gwrms_eds_options=(
   "--node-id[node id for COB-IDs that depend on it (1)]:N:"
   "--brief[leave out the objects]"
   "--json[one JSON object a file and line]"
-  "(*):an .eds or .dcf file:_files"
+  "(*):an .eds or .dcf file, or the name of one that ships:_files"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -969,6 +983,7 @@ _shtab_gwrms() {
         bench) _arguments -C -s $_shtab_gwrms_bench_options ;;
         blame) _arguments -C -s $_shtab_gwrms_blame_options ;;
         calibrate) _shtab_gwrms_calibrate ;;
+        check) _arguments -C -s $_shtab_gwrms_check_options ;;
         cloud) _shtab_gwrms_cloud ;;
         collect) _arguments -C -s $_shtab_gwrms_collect_options ;;
         completion) _arguments -C -s $_shtab_gwrms_completion_options ;;

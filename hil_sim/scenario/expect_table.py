@@ -1,14 +1,17 @@
 """An `[[expect]]` of a scenario file becomes expectations."""
 
+import fnmatch
 import math
 from collections.abc import Callable, Iterator, Mapping
 
+from hil_sim.exoskeleton import CONTROLLER, JOINTS, SENSORS
 from hil_sim.scenario.expectation import Condition, Expectation, Seen, Timing, Track, When
-from hil_sim.scenario.table import Table
+from hil_sim.scenario.table import Table, unknown
+from hil_sim.scenario.truth import names
 
-_TIMINGS = {when.value: when for when in When}
+TIMINGS = {when.value: when for when in When}
 # subject → the conditions that may be asked of it
-_SUBJECTS = {
+SUBJECTS = {
     "component": ("state", "problem"),
     "channel": ("min", "max", "is", "missing"),
     "truth": ("min", "max", "is"),
@@ -16,23 +19,37 @@ _SUBJECTS = {
 }
 
 
+STATES = ("ok", "stale", "lost", "fault")  # of a component, as gateways say them
+COMPONENTS = (*JOINTS, CONTROLLER, *SENSORS)  # of the robot's own file
+
+
 def read(table: Table) -> list[Expectation]:
-    """Return the expectations of one table; raises `ScenarioError`."""
-    subject = table.one_of(_SUBJECTS)
-    table.only({subject, *_SUBJECTS[subject], *_TIMINGS})
+    """Return the expectations of one table; raises `Unusable`."""
+    subject = table.one_of(SUBJECTS)
+    table.only({subject, *SUBJECTS[subject], *TIMINGS})
     glob, timing = table.text(subject), _timing(table)
+    _check_name(table, subject, glob)
     found = [
         Expectation(Track.PROBLEM if key == "problem" else Track(subject), glob, condition, timing)
-        for key, condition in _conditions(table, _SUBJECTS[subject])
+        for key, condition in _conditions(table, SUBJECTS[subject])
     ]
     if not found:
-        raise table.fail(f"say what is expected of {glob} with {', '.join(_SUBJECTS[subject])}")
+        raise table.unusable(f"say what is expected of {glob} with {', '.join(SUBJECTS[subject])}")
     return found
 
 
+def _check_name(table: Table, subject: str, glob: str) -> None:
+    """Warn of a name that the robot does not have; a robot.toml of one's own may have others."""
+    known: tuple[str, ...] = names() if subject == "truth" else COMPONENTS
+    asked = glob.partition(".")[0] if subject == "channel" else glob
+    if subject == "answer" or asked == "resource" or fnmatch.filter(known, asked):
+        return
+    table.warn(subject, unknown(asked, known))
+
+
 def _timing(table: Table) -> Timing:
-    key = table.one_of(_TIMINGS)
-    when = _TIMINGS[key]
+    key = table.one_of(TIMINGS)
+    when = TIMINGS[key]
     begin_s, end_s = (table.seconds(key), math.inf) if when is When.AT else table.window(key)
     return Timing(when, begin_s, end_s)
 
@@ -49,6 +66,11 @@ def _is(table: Table, key: str) -> Condition:
     return Condition(f"is {wanted!r}", lambda seen: seen == wanted)
 
 
+def _state(table: Table, key: str) -> Condition:
+    table.choice(key, STATES, STATES[0])
+    return _is(table, key)
+
+
 def _contains(table: Table, key: str) -> Condition:
     wanted = table.text(key)
     if not wanted:
@@ -59,6 +81,8 @@ def _contains(table: Table, key: str) -> Condition:
 def _in_range(table: Table, _key: str) -> Condition:
     low = table.number("min") if "min" in table else -math.inf
     high = table.number("max") if "max" in table else math.inf
+    if low > high:
+        table.complain("min", f"{low:g} is above max {high:g}")
     words = [f"at least {low:g}"] * ("min" in table) + [f"at most {high:g}"] * ("max" in table)
 
     def holds(seen: Seen) -> bool:
@@ -74,7 +98,7 @@ def _missing(table: Table, key: str) -> Condition:
 
 
 _CONDITIONS: Mapping[str, Callable[[Table, str], Condition]] = {
-    "state": _is,
+    "state": _state,
     "problem": _contains,
     "is": _is,
     "says": _contains,

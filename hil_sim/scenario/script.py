@@ -4,20 +4,25 @@
 that happens; each `[[expect]]` what is looked at, what it must be, and when.
 """
 
+import contextlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from hil_sim import operator, personality
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import JOINTS, Scenario
 from hil_sim.scenario import expect_table
 from hil_sim.scenario.expectation import Expectation, When
-from hil_sim.scenario.table import ScenarioError, Table
+from hil_sim.scenario.table import Mistake, ScenarioError, Table, Unusable, meant
 from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
+T = TypeVar("T")
+
+TABLES = ("at", "expect", "robot", "title")
+ROBOT_KEYS = ("scenario", "seconds", "seed", "subject", "imu", "insole", "drive")
 _AFTER_S = 1.0  # how long a scenario goes on after the last time that it names
 # What a gateway is asked for: the line's key → method of the wire and the name of the parameter.
 GATEWAY_LINES = {"stop": ("robot.stop", "reason"), "set": ("parameter.write", "changes")}
@@ -54,74 +59,129 @@ class Script:
 
 
 def load(file: Path) -> Script:
-    """Read a scenario file; raises `ScenarioError`."""
+    """Read a scenario file; raises `ScenarioError`, with all that is wrong."""
     try:
         values = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ScenarioError(f"{file}: cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{file}: this is no TOML: {error}") from error
-    top = Table(str(file), values)
-    top.only(("title", "robot", "at", "expect"))
-    robot = Table(f"{file} [robot]", values.get("robot", {}))
-    robot.only(("scenario", "seconds", "seed", "subject", "imu", "insole", "drive"))
-    lines = tuple(_line(table) for table in _tables(top, "at"))
-    expectations = tuple(one for table in _tables(top, "expect") for one in expect_table.read(table))
-    least_s = _AFTER_S + max([0.0, *(line.time_s for line in lines), *map(_known_by, expectations)])
-    return Script(
-        title=top.text("title", file.stem),
-        scenario=Scenario(robot.choice("scenario", list(Scenario), Scenario.WALK)),
-        seconds=_duration(robot, least_s),
-        seed=robot.whole("seed", 0),
-        subject=robot.whole("subject", 0),
-        sensors=SensorChoice(
-            robot.choice("imu", IMUS, SensorChoice().imu),
-            robot.choice("insole", INSOLES, SensorChoice().insole),
-        ),
-        drives=_drives(robot, file),
-        lines=lines,
-        expectations=expectations,
-    )
+    script, mistakes = examined(file, values)
+    wrong = [one for one in mistakes if one.severity == "mistake"]
+    if wrong:
+        raise ScenarioError("\n".join(f"{file}: {one.words}" for one in wrong))
+    return script
 
 
-def _drives(robot: Table, file: Path) -> dict[str, Path]:
-    """`drive = "FILE"`, or a list of `"FILE"` and `"JOINT=FILE"`, beside the scenario's file."""
-    given = robot.values.get("drive", [])
-    words = [given] if isinstance(given, str) else given
-    if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
-        raise robot.fail(f'drive = {given!r} is no file: write "FILE", or a list of "FILE" and "JOINT=FILE"')
-    try:
-        return personality.choose(words, JOINTS, file)
-    except SimulatorError as error:
-        raise robot.fail(str(error)) from error
+def examined(file: Path, values: Mapping[str, Any]) -> tuple[Script, list[Mistake]]:
+    """What stands in a file, and everything that is wrong with it, or likely is."""
+    mistakes: list[Mistake] = []
+    return _Reading(file, mistakes).script(values), mistakes
 
 
-def _tables(top: Table, key: str) -> list[Table]:
-    found = top.values.get(key, [])
-    if not isinstance(found, list):
-        raise top.fail(f"{key} is a list of tables: write [[{key}]]")
-    return [Table(f"{top.where} [[{key}]] {number}", values) for number, values in enumerate(found, 1)]
+def findings(
+    file: Path,
+    tables: Mapping[str, Any],
+    *,
+    machine: bool,  # noqa: ARG001 - of robots
+) -> Iterator[tuple[str, str, str, str]]:
+    """What `gwrms check` says of it: severity, where, key and text."""
+    return ((one.severity, one.where, one.key, one.text) for one in examined(file, tables)[1])
 
 
-def _line(table: Table) -> Line:
-    request = {key: value for key, value in table.values.items() if key != "time_s"}
-    line = Line(table.where, table.seconds("time_s"), request)
-    if line.for_gateway is not None:
-        table.only(("time_s", line.for_gateway))
-        _check_gateway_line(table, line.for_gateway)
+class _Reading:
+    """One file's tables."""
+
+    def __init__(self, file: Path, mistakes: list[Mistake]) -> None:
+        self._file = file
+        self._mistakes = mistakes
+
+    def script(self, values: Mapping[str, Any]) -> Script:
+        """What can be made of it."""
+        top = Table("", values, self._mistakes)
+        self._check_tables(values)
+        robot = self._robot(values.get("robot", {}))
+        robot.only(ROBOT_KEYS)
+        lines = tuple(self._each(values, "at", self._line))
+        expected = tuple(self._each(values, "expect", expect_table.read))
+        expectations = tuple(one for some in expected for one in some)
+        least_s = _AFTER_S + max([0.0, *(line.time_s for line in lines), *map(_known_by, expectations)])
+        return Script(
+            title=top.text("title", self._file.stem),
+            scenario=Scenario(robot.choice("scenario", list(Scenario), Scenario.WALK)),
+            seconds=_duration(robot, least_s),
+            seed=robot.whole("seed", 0),
+            subject=robot.whole("subject", 0),
+            sensors=SensorChoice(
+                robot.choice("imu", IMUS, SensorChoice().imu),
+                robot.choice("insole", tuple(INSOLES), SensorChoice().insole),
+            ),
+            drives=self._drives(robot),
+            lines=lines,
+            expectations=expectations,
+        )
+
+    def _robot(self, values: object) -> Table:
+        try:
+            return Table("[robot]", values, self._mistakes)
+        except Unusable:
+            return Table("[robot]", {}, self._mistakes)
+
+    def _check_tables(self, values: Mapping[str, Any]) -> None:
+        for key in values:
+            if key not in TABLES:
+                said = f"is not known: {meant(key, TABLES)}allowed are {', '.join(TABLES)}"
+                self._mistakes.append(Mistake(f"[{key}]", "", said))
+
+    def _each(self, values: Mapping[str, Any], key: str, read: Callable[[Table], T]) -> Iterator[T]:
+        """What is made of each entry of a list; one that cannot be used does not hide the next."""
+        found = values.get(key, [])
+        if not isinstance(found, list):
+            self._mistakes.append(Mistake(f"[{key}]", "", f"is a list of tables: write [[{key}]]"))
+            return
+        for number, entry in enumerate(found, 1):
+            with contextlib.suppress(Unusable):
+                yield read(Table(f"[[{key}]] number {number}", entry, self._mistakes))
+
+    def _drives(self, robot: Table) -> dict[str, Path]:
+        """`drive = "FILE"`, or a list of `"FILE"` and `"JOINT=FILE"`, beside the scenario's file."""
+        given = robot.values.get("drive", [])
+        words = [given] if isinstance(given, str) else given
+        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+            text = f'{given!r} is no file: write "FILE", or a list of "FILE" and "JOINT=FILE"'
+            robot.complain("drive", text)
+            return {}
+        try:
+            return personality.choose(words, JOINTS, self._file)
+        except SimulatorError as error:
+            robot.complain("drive", str(error).removeprefix("drive "))
+            return {}
+
+    def _line(self, table: Table) -> Line:
+        request = {key: value for key, value in table.values.items() if key != "time_s"}
+        line = Line(f"{self._file} {table.where}", table.seconds("time_s"), request)
+        if line.for_gateway is not None:
+            table.only(("time_s", line.for_gateway))
+            _check_gateway_line(table, line.for_gateway)
+            return line
+        try:
+            verb = operator.verb_of(request)
+        except SimulatorError as error:
+            raise table.unusable(str(error)) from error
+        allowed = (verb, *operator.further(verb))
+        table.only(("time_s", *allowed))
+        try:
+            operator.check({key: value for key, value in request.items() if key in allowed})
+        except SimulatorError as error:
+            table.complain(verb, str(error))
         return line
-    try:
-        operator.check(request)
-    except SimulatorError as error:
-        raise table.fail(str(error)) from error
-    return line
 
 
 def _check_gateway_line(table: Table, key: str) -> None:
     if key == "stop":
         table.text(key)
     elif not isinstance(table.values[key], dict) or not table.values[key]:
-        raise table.fail('set = {"gait.step_length" = 0.45} is what it looks like')
+        table.complain(key, '{"gait.step_length" = 0.45} is what it looks like')
 
 
 def _known_by(expectation: Expectation) -> float:
@@ -134,7 +194,6 @@ def _duration(robot: Table, least_s: float) -> float:
         return least_s
     given_s = robot.seconds("seconds")
     if given_s < least_s - _AFTER_S:
-        raise robot.fail(
-            f"seconds = {given_s:g} ends before something that is to happen at {least_s - _AFTER_S:g}"
-        )
+        end_s = least_s - _AFTER_S
+        robot.complain("seconds", f"{given_s:g} ends before something that is to happen at {end_s:g}")
     return given_s

@@ -390,7 +390,10 @@ def checked_url(url: str) -> str:
         StoreError: it is of another kind, or has credentials in it.
 
     """
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+    except ValueError as error:
+        raise StoreError(f"{url!r} is no URL: {error}") from error
     if parts.username or parts.password or parts.query:
         raise StoreError("a store's URL has no keys in it: give them by the AWS environment or profile")
     folder = parts.scheme == "file" and not parts.netloc and parts.path.startswith("/")

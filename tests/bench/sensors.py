@@ -25,9 +25,9 @@ from drivers.imu.settings import ImuSettings
 from drivers.insole import layout as layouts
 from drivers.insole.build import pair
 from drivers.insole.device import Insole
+from drivers.insole.foot import FEET
 from drivers.insole.formats import FORMATS
 from drivers.insole.formats.insole_cobs import InsoleCobsParser
-from drivers.insole.layout import FEET
 from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
 from drivers.parsing import Counters

@@ -31,7 +31,8 @@ _HEAD: Final = """# robot.toml
 
 The file that describes a robot to its gateway: `gwrms gateway robot.toml`. `[robot]` is needed,
 everything else is not. Keys in bold are needed in their table; an unknown key is refused, and the key is
-named that was meant. Values are in SI units; files that are named lie beside this one. How to find out
+named that was meant ([check files](../how-to/check-files.md), also while you type). Values are in SI
+units; files that are named lie beside this one. How to find out
 what to write: [wire a joint](../how-to/wire-a-joint.md), [wire a sensor](../how-to/wire-a-sensor.md), [a
 first real robot](../how-to/first-robot.md)."""
 _TABLES: Final[tuple[tuple[str, type[Struct], tuple[str, ...]], ...]] = (

@@ -12,7 +12,7 @@ _HEAD: Final = """# server.toml
 
 The desk's and the collector's file: `--config FILE`, or `~/.config/gwrms/server.toml`. All of it may be
 left out. Robots that `--robot` names come on top. How it is used: [record robots](../how-to/record.md),
-[predict](../how-to/predict.md#rules)."""
+[predict](../how-to/predict.md#rules). What is wrong with one: [check files](../how-to/check-files.md)."""
 _TABLES: Final = (
     ("`[robots]`", RobotSettings, 'Usually just NAME = "HOST:PORT". The name is the robot\'s in the store.'),
     (

@@ -1,18 +1,15 @@
 """A msgspec struct as rows of a table: each key's name, type, default, and what its comment says."""
 
-import ast
 import enum
 import inspect
 import re
-import textwrap
-import tokenize
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from io import StringIO
 
 from msgspec import NODEFAULT, UNSET, Struct
 from msgspec.structs import FieldInfo, fields
 
+from gateway.tables.comments import comments
 from tools.draw.kinds import kind, parts, without_none
 
 _ABOVE = re.compile(r"^(?:Result of )?`[^`]+`(?: and `[^`]+`)?[.:;] ?")
@@ -68,28 +65,6 @@ def table(keys: Iterable[Key], first: str = "key") -> str:
         name = f"**`{key.name}`**" if key.default is None else f"`{key.name}`"
         lines.append(f"| {name} | {key.kind} | {key.default or ''} | {key.meaning} |")
     return "\n".join(lines)
-
-
-def comments(struct: type[Struct]) -> dict[str, str]:
-    """By field: the comment behind it, also where a base class declares it."""
-    found: dict[str, str] = {}
-    for base in reversed(struct.__mro__):
-        if issubclass(base, Struct) and base is not Struct:
-            found |= _own_comments(textwrap.dedent(inspect.getsource(base)))
-    return found
-
-
-def _own_comments(source: str) -> dict[str, str]:
-    tokens = tokenize.generate_tokens(StringIO(source).readline)
-    by_line = {one.start[0]: one.string.lstrip("# ") for one in tokens if one.type == tokenize.COMMENT}
-    [declared] = ast.parse(source).body
-    return {
-        node.target.id: " ".join(
-            by_line[line] for line in range(node.lineno, (node.end_lineno or 0) + 1) if line in by_line
-        )
-        for node in getattr(declared, "body", ())
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
-    }
 
 
 def _default(field: FieldInfo) -> str | None:

@@ -10,11 +10,14 @@ from drivers.errors import Unavailable
 def _socketcand(settings: CanSettings) -> Transport:
     from drivers.bus.interfaces.socketcand import SocketcandTransport
 
+    return SocketcandTransport(*_address(settings), str(settings.channel))
+
+
+def _address(settings: CanSettings) -> tuple[str, int]:
     try:
-        host, port = str(settings.more["host"]), int(settings.more["port"])
+        return str(settings.more["host"]), int(settings.more["port"])
     except (KeyError, ValueError) as error:
         raise Unavailable("interface socketcand needs the keys host and port in its [can.…] table") from error
-    return SocketcandTransport(host, port, str(settings.channel))
 
 
 def _socketcan(settings: CanSettings) -> Transport:
@@ -31,6 +34,31 @@ def _python_can(settings: CanSettings) -> Transport:
     return PythonCanTransport(settings)
 
 
+# Those of python-can 4; plug-ins may bring others.
+_PYTHON_CAN = (
+    "virtual",
+    "slcan",
+    "pcan",
+    "kvaser",
+    "ixxat",
+    "gs_usb",
+    "vector",
+    "canalystii",
+    "cantact",
+    "etas",
+    "iscan",
+    "neousys",
+    "neovi",
+    "nican",
+    "nixnet",
+    "robotell",
+    "seeedstudio",
+    "serial",
+    "systec",
+    "udp_multicast",
+    "usb2can",
+)
+_LOOK_S = 1.0  # how long a daemon may take to answer
 _OWN: dict[str, Callable[[CanSettings], Transport]] = {
     "socketcand": _socketcand,
     "socketcan": _socketcan,
@@ -45,3 +73,47 @@ def needs_python_can(settings: CanSettings) -> bool:
 def open_transport(settings: CanSettings) -> Transport:
     """Open the interface that `settings` name; imports only what it needs. Raises `Unavailable`."""
     return _OWN.get(settings.interface, _python_can)(settings)
+
+
+def obstacle(settings: CanSettings) -> str | None:
+    """Why the interface could not be opened, or not as `settings` say; it is only looked at."""
+    if settings.interface == "socketcan":
+        from drivers.bus.interfaces.socketcan import obstacle as socketcan_obstacle
+
+        return socketcan_obstacle(settings)
+    if settings.interface == "socketcand":
+        return _daemon_obstacle(settings)
+    channel = str(settings.channel)
+    if channel.startswith("/dev/"):  # an adapter on a serial port
+        from drivers.port import obstacle as port_obstacle
+
+        return port_obstacle(channel)
+    return None
+
+
+def _daemon_obstacle(settings: CanSettings) -> str | None:
+    import socket
+
+    try:
+        host, port = _address(settings)
+        socket.create_connection((host, port), _LOOK_S).close()
+    except Unavailable as error:
+        return str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        return f"nothing answers at {host}:{port} ({reason}): start it, or correct host and port"
+    return None
+
+
+def interfaces() -> tuple[str, ...]:
+    """Every name of an interface that comes with us."""
+    return (*sorted(_OWN), *_PYTHON_CAN)
+
+
+def is_interface(name: str) -> bool:
+    """Whether there is such an interface: one that comes with us, or of a plug-in of python-can."""
+    if name in interfaces():
+        return True
+    from importlib.metadata import entry_points  # for who has a plug-in, or has mistyped, only
+
+    return bool(entry_points(group="can.interface", name=name))

@@ -31,7 +31,7 @@ class PythonCanTransport:
         try:
             # The robot's file says everything: what python-can finds in its own files must not change it.
             self._bus = can.Bus(settings.channel, settings.interface, ignore_config=True, **keys)
-        except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
+        except (can.CanError, OSError, ValueError, TypeError, ImportError, NotImplementedError) as error:
             raise Unavailable(f"{self._where} cannot be opened: {error}") from error
         for port in self._serial_ports():
             port.write_timeout = WRITE_S

@@ -128,6 +128,18 @@ def open_socketcan(settings: CanSettings) -> SocketCanTransport:
         ) from error
 
 
+def obstacle(settings: CanSettings) -> str | None:
+    """Why no frame would pass, or what is otherwise than in `settings`; the interface is only looked at."""
+    name = str(settings.channel)
+    try:
+        link = read_link(name)
+    except OSError as error:
+        return f"interface {name} cannot be looked at ({error.strerror})"
+    if link is None:
+        return missing_link(name)
+    return blocking_problem(name, link, settings.bitrate) or warning(name, link, settings.bitrate)
+
+
 def _bound_socket(name: str) -> socket.socket:
     sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     try:

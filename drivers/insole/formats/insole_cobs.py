@@ -11,9 +11,9 @@ import binascii
 import struct
 
 from drivers.clock import ClockSpec
+from drivers.insole.foot import FEET
 from drivers.insole.format import Format
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import FEET
 from drivers.parsing import DelimitedParser, Sequence
 
 VERSION = 0x31

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 from drivers.insole import layout as layouts
 from drivers.insole.description import SECONDS, Column, CsvDescription, Flag
+from drivers.insole.foot import Foot
 from drivers.insole.format import MICROSECONDS, Format, MakeParser
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import Foot, Layout
+from drivers.insole.layout import Layout
 from drivers.insole.order import LARGEST, Order
 from drivers.parsing import DelimitedParser
 

@@ -10,9 +10,10 @@ from operator import xor
 from drivers.errors import SettingsError
 from drivers.insole import layout as layouts
 from drivers.insole.description import Flag, FrameDescription
+from drivers.insole.foot import Foot
 from drivers.insole.format import MICROSECONDS, Format, MakeParser
 from drivers.insole.frame import InsoleFrame
-from drivers.insole.layout import Foot, Layout
+from drivers.insole.layout import Layout
 from drivers.insole.order import LONGEST_TIME_S, Order
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 

@@ -85,4 +85,4 @@ def _check(written: Path) -> None:
     try:
         load(written)
     except SettingsError as error:
-        raise SettingsError(str(error).removeprefix(f"{written}: ")) from None
+        raise SettingsError(str(error).replace(f"{written}: ", "")) from None

@@ -1,6 +1,5 @@
 """`[prediction]` and `[[rules]]` of the server's file; what cannot work is said in words."""
 
-import difflib
 from collections.abc import Iterable, Mapping
 from enum import Enum
 from fnmatch import fnmatchcase
@@ -9,6 +8,7 @@ from typing import Annotated, Final
 
 from msgspec import Meta, Struct
 
+from gateway.tables.finding import unknown
 from ml.robot.task import ABNORMAL, TASKS
 
 EVERY_MS: Final[Mapping[str, int]] = MappingProxyType({"activity": 100, "gait_phase": 40, "falling": 40})
@@ -24,8 +24,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
     poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # between looks which models serve
 
     def __post_init__(self) -> None:
-        if self.every_ms:
-            _among(self.every_ms, TASKS, "task in every_ms")
+        _refuse(_strange("every_ms", self.every_ms, TASKS))
 
     def every_ns(self, task: str) -> int:
         """Between two decisions of a task."""
@@ -48,17 +47,18 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
     task: str
     label: str
-    at_least: Annotated[float, Meta(gt=0, le=1)]
+    at_least: Annotated[float, Meta(gt=0, le=1, extra={"unit": ""})]
     for_ms: Annotated[int, Meta(ge=0, le=60_000)] = 0
     release: Annotated[float, Meta(ge=0, le=1)] | None = None
     robot: str = "*"  # a name or glob
     action: Action = Action.ALARM
 
     def __post_init__(self) -> None:
-        _among([self.task], TASKS, "task")
-        _among([self.label], [*TASKS[self.task].support, ABNORMAL], f"label of {self.task}")
+        labels = [*TASKS[self.task].support, ABNORMAL] if self.task in TASKS else [self.label]
+        wrong = [*_strange("task", [self.task], TASKS), *_strange("label", [self.label], labels)]
         if self.release is not None and self.release > self.at_least:
-            raise ValueError(f"release = {self.release:g} is above at_least = {self.at_least:g}")
+            wrong.append(f"release {self.release:g} is above at_least {self.at_least:g}")
+        _refuse(wrong)
 
     @property
     def name(self) -> str:
@@ -75,10 +75,11 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
         return fnmatchcase(robot, self.robot)
 
 
-def _among(found: Iterable[str], allowed: Iterable[str], what: str) -> None:
+def _strange(key: str, found: Iterable[str], allowed: Iterable[str]) -> list[str]:
     names = list(allowed)
-    for name in found:
-        if name not in names:
-            close = difflib.get_close_matches(name, names, n=1)
-            hint = f"did you mean {close[0]!r}? " if close else ""
-            raise ValueError(f"there is no {what} {name!r}: {hint}allowed are {', '.join(names)}")
+    return [f"{key} {unknown(name, names)}" for name in found if name not in names]
+
+
+def _refuse(wrong: list[str]) -> None:
+    if wrong:
+        raise ValueError("\n".join(wrong))

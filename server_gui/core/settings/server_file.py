@@ -17,10 +17,10 @@ at_least = 0.9
 for_ms = 60
 """
 
-import difflib
 import os
 import re
-import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
@@ -29,12 +29,15 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from gateway.client import Address, BadAddress
-from gateway.wording import key_of, plainly
+from gateway.tables.decoding import Decoding
+from gateway.tables.finding import Finding, Told, in_order, lines, mistakes, told, warning
+from gateway.tables.reading import Unreadable, read
 from ml.store import StoreError, default_url
 from ml.store.store import checked_url
-from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
+from server_gui.core.settings.prediction import Action, PredictionSettings, RuleSettings
 
 Table = TypeVar("Table", bound=Struct)
+_LIKELY: Final = 0.5  # that something is so rather than not
 _ROBOT: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
@@ -112,6 +115,14 @@ class ServerSettings(Struct, frozen=True):
     rules: tuple[RuleSettings, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A server's file with what is wrong with it, or likely is; `settings` where it can be used."""
+
+    settings: ServerSettings | None
+    findings: list[Finding]
+
+
 def load(path: Path | None = None) -> ServerSettings:
     """Read and check the server's file; without `path` the user's own, or the defaults where there is none.
 
@@ -120,26 +131,47 @@ def load(path: Path | None = None) -> ServerSettings:
 
     """
     file = default_file() if path is None else path
+    if path is None and not file.exists():
+        return ServerSettings()
+    found = examine(file)
+    if found.settings is None:
+        raise SettingsError(lines(file, mistakes(found.findings)))
+    return found.settings
+
+
+def examine(file: Path) -> Examined:
+    """Read the server's file; whatever is wrong with it is told, not only the first thing."""
+    if not file.exists():
+        missing = Finding("", "", "is not there; name the server's file with --config")
+        return Examined(None, [missing])
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        if path is None:
-            return ServerSettings()
-        raise SettingsError(f"{file}: is not there; name the server's file with --config") from error
-    except OSError as error:
-        raise SettingsError(f"{file}: cannot be read: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        raise SettingsError(f"{file}: is no TOML: {error}") from error
-    try:
-        return _settings(document, file.parent)
-    except SettingsError as error:
-        raise SettingsError(f"{file}: {error}") from error
+        document = read(file)
+    except Unreadable as error:
+        return Examined(None, [error.finding])
+    return examined(file, document)
+
+
+def examined(file: Path, document: dict[str, Any]) -> Examined:
+    """The same for what stands in it."""
+    reading = _Reading(Decoding(_path))
+    settings = reading.settings(document, file.parent)
+    findings = in_order([*reading.findings, *_unlikely(settings)], document)
+    return Examined(None if mistakes(findings) else settings, findings)
+
+
+def findings(file: Path, tables: dict[str, Any], *, machine: bool) -> Iterator[Told]:  # noqa: ARG001 - of robots
+    """What `gwrms check` says of it."""
+    return told(examined(file, tables).findings)
 
 
 def add_robots(settings: ServerSettings, robots: dict[str, str]) -> ServerSettings:
     """Return the same settings with further robots, or other addresses for some; raises `SettingsError`."""
     known = {name: robot.address for name, robot in settings.robots.items()}
-    return msgspec.structs.replace(settings, robots=_robots(known | robots))
+    reading = _Reading(Decoding())
+    added = msgspec.structs.replace(settings, robots=reading.robots(known | robots))
+    if reading.findings:
+        raise SettingsError("\n".join(one.words for one in reading.findings))
+    return added
 
 
 def name_of(address: str) -> str:
@@ -147,100 +179,98 @@ def name_of(address: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", address).strip("-.")
 
 
-def _settings(document: dict[str, Any], folder: Path) -> ServerSettings:
-    _check_keys("the file", document, ServerSettings)
-    store = _convert("[store]", document.get("store", {}), StoreSettings)
-    try:
-        store = msgspec.structs.replace(store, url=checked_url(store.url))
-    except StoreError as error:
-        raise SettingsError(f"[store] url: {error}") from error
-    recorder = _convert("[recorder]", document.get("recorder", {}), RecordingSettings)
-    spool = folder / recorder.spool.expanduser()
-    return ServerSettings(
-        _robots(document.get("robots", {})),
-        store,
-        msgspec.structs.replace(recorder, spool=spool),
-        _convert("[prediction]", document.get("prediction", {}), PredictionSettings),
-        _rules(document.get("rules", [])),
-    )
+class _Reading:
+    """One file's tables, or those of the command line; what is wrong is in `findings`."""
 
+    def __init__(self, decoding: Decoding) -> None:
+        self.findings = decoding.findings
+        self._decoding = decoding
 
-def _rules(entries: Any) -> tuple[RuleSettings, ...]:
-    if not isinstance(entries, list):
-        raise SettingsError(
-            "[[rules]] is a list of tables: write it with double brackets, once for each rule"
+    def settings(self, document: dict[str, Any], folder: Path) -> ServerSettings:
+        """What can be made of it."""
+        self._decoding.tables(document, ServerSettings.__struct_fields__)
+        recorder = self._table("recorder", document, RecordingSettings)
+        return ServerSettings(
+            self.robots(document.get("robots", {})),
+            self._store(document),
+            msgspec.structs.replace(recorder, spool=folder / recorder.spool.expanduser()),
+            self._table("prediction", document, PredictionSettings),
+            self._rules(document.get("rules", [])),
         )
-    numbered = enumerate(entries, 1)
-    return tuple(_convert(f"[[rules]] number {number}", entry, RuleSettings) for number, entry in numbered)
+
+    def _table(self, name: str, document: dict[str, Any], kind: type[Table]) -> Table:
+        made = self._decoding.struct(f"[{name}]", document.get(name, {}), kind)
+        return kind() if made is None else made
+
+    def _store(self, document: dict[str, Any]) -> StoreSettings:
+        store = self._table("store", document, StoreSettings)
+        try:
+            return msgspec.structs.replace(store, url=checked_url(store.url))
+        except StoreError as error:
+            self._decoding.complain("[store]", "url", str(error))
+            return store
+
+    def _rules(self, entries: Any) -> tuple[RuleSettings, ...]:
+        if not isinstance(entries, list):
+            text = "is a list of tables: write it with double brackets, once for each rule"
+            self._decoding.complain("[[rules]]", "", text)
+            return ()
+        numbered = enumerate(entries, 1)
+        made = (self._decoding.struct(f"[[rules]] number {at}", one, RuleSettings) for at, one in numbered)
+        return tuple(rule for rule in made if rule is not None)
+
+    def robots(self, table: Any) -> dict[str, RobotSettings]:
+        """`[robots]`, each with an address of its own."""
+        if not isinstance(table, dict):
+            self._decoding.complain("[robots]", "", 'is a table of names: write exo-01 = "HOST:PORT" in it')
+            return {}
+        seen: dict[Address, str] = {}
+        robots: dict[str, RobotSettings] = {}
+        for name, entry in table.items():
+            robot = self._robot(name, entry)
+            if robot is None:
+                continue
+            robots[name] = robot
+            other = seen.setdefault(robot.where, name)
+            if other != name:
+                self._decoding.complain(
+                    "[robots]", name, f"{robot.where} is {other} already; remove one of them"
+                )
+        return robots
+
+    def _robot(self, name: str, entry: Any) -> RobotSettings | None:
+        if not _ROBOT.fullmatch(name):
+            self._decoding.complain("[robots]", name, "a robot's name is letters, digits, _, . and -")
+        if isinstance(entry, str):
+            entry = {"address": entry}
+        if not isinstance(entry, dict):
+            text = 'write "HOST:PORT", or a table with address = "HOST:PORT"'
+            self._decoding.complain("[robots]", name, text)
+            return None
+        robot = self._decoding.struct(f"[robots.{name}]", entry, RobotSettings)
+        try:
+            return None if robot is None else msgspec.structs.replace(robot, address=str(robot.where))
+        except BadAddress as error:
+            self._decoding.complain("[robots]", name, str(error))
+            return None
 
 
-def _robots(table: Any) -> dict[str, RobotSettings]:
-    if not isinstance(table, dict):
-        raise SettingsError('[robots] is a table of names: write exo-01 = "HOST:PORT" in it')
-    seen: dict[Address, str] = {}
-    robots: dict[str, RobotSettings] = {}
-    for name, entry in table.items():
-        robots[name] = _robot(name, entry)
-        other = seen.setdefault(robots[name].where, name)
-        if other != name:
-            raise SettingsError(
-                f"[robots] {name}: {robots[name].where} is {other} already; remove one of them"
-            )
-    return robots
-
-
-def _robot(name: str, entry: Any) -> RobotSettings:
-    if not _ROBOT.fullmatch(name):
-        raise SettingsError(f"[robots] {name!r}: a robot's name is letters, digits, _, . and -")
-    where = f"[robots] {name}"
-    if isinstance(entry, str):
-        entry = {"address": entry}
-    if not isinstance(entry, dict):
-        raise SettingsError(f'{where}: write "HOST:PORT", or a table with address = "HOST:PORT"')
-    robot = _convert(where, entry, RobotSettings)
-    try:
-        return msgspec.structs.replace(robot, address=str(robot.where))
-    except BadAddress as error:
-        raise SettingsError(f"{where}: {error}") from error
-
-
-def _convert(where: str, table: Any, kind: type[Table]) -> Table:
-    if not isinstance(table, dict):
-        raise SettingsError(f"{where} is a table, not {table!r}")
-    _check_keys(where, table, kind)
-    try:
-        return msgspec.convert(table, kind, dec_hook=_path)
-    except msgspec.ValidationError as error:
-        key = key_of(error)
-        place = where if key else f"{where}:"
-        raise SettingsError(f"{place} {plainly(error)}{_choices(kind, key)}") from error
+def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
+    """What can work and is likely not what was meant."""
+    for number, rule in enumerate(settings.rules, 1):
+        where = f"[[rules]] number {number}"
+        if settings.robots and not any(map(rule.concerns, settings.robots)):
+            known = ", ".join(settings.robots)
+            yield warning(where, "robot", f"{rule.robot!r} is none of [robots], which are {known}")
+        if rule.action is Action.STOP and rule.at_least < _LIKELY:
+            text = f"{rule.at_least:g} stops a robot on what is more likely not so"
+            yield warning(where, "at_least", text)
 
 
 def _path(_kind: type, value: Any) -> Path:
     if not isinstance(value, str) or not value:
-        raise ValueError(f"expected a folder, got {value!r}")
+        raise ValueError(f"must be a folder's path in quotes, not {value!r}")
     return Path(value)
-
-
-def _choices(kind: type[Struct], key: str) -> str:
-    """What an enumeration allows."""
-    found = next((known.type for known in msgspec.structs.fields(kind) if known.name == key), None)
-    if not (isinstance(found, type) and issubclass(found, Enum)):
-        return ""
-    return f"; allowed are {', '.join(one.value for one in found)}"
-
-
-def _check_keys(where: str, table: dict[str, Any], kind: type[Struct]) -> None:
-    fields = msgspec.structs.fields(kind)
-    allowed = [known.name for known in fields]
-    for key in table:
-        if key not in allowed:
-            close = difflib.get_close_matches(key, allowed, n=1)
-            hint = f"did you mean {close[0]!r}? " if close else ""
-            raise SettingsError(f"{where} has an unknown key {key!r}: {hint}allowed are {', '.join(allowed)}")
-    for known in fields:
-        if known.required and known.name not in table:
-            raise SettingsError(f"{where} lacks the key {known.name!r}")
 
 
 def _user_folder(variable: str, usual: str) -> Path:

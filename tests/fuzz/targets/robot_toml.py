@@ -34,9 +34,14 @@ TOKENS = (
 )
 MODULES = (
     "gateway.config.checks",
+    "gateway.config.likelihood",
     "gateway.config.objects",
+    "gateway.config.parameter_checks",
     "gateway.config.reading",
     "gateway.config.robot",
+    "gateway.tables.decoding",
+    "gateway.tables.finding",
+    "gateway.tables.reading",
 )
 
 

@@ -93,7 +93,7 @@ def test_a_file_that_is_wrong_is_told_to_who_comes_and_fails_the_service(
     with Client(("127.0.0.1", ports(launched)[0])) as client:
         message = client.line()
         assert message is not None
-        assert "lacks the key 'name'" in message["error"]["message"]
+        assert "name: is missing" in message["error"]["message"]
     assert ended(launched)[1] == 1
 
 

@@ -259,8 +259,8 @@ def test_a_release_that_means_nothing_is_seen_where_parameters_are(tmp_path: Pat
     [
         ('["max_torque"]', "", 'nothing to release without parameters = "eds"'),
         ('["knee.max_torque"]', 'parameters = "eds"', "write 'max_torque', without the table's own name"),
-        ('"max_torque"', 'parameters = "eds"', "[joint.knee] release must be a list, not text"),
-        ("[]", 'parameters = "all"', "[joint.knee] parameters 'all' is not known"),
+        ('"max_torque"', 'parameters = "eds"', "[joint.knee] release: must be a list, not text"),
+        ("[]", 'parameters = "all"', "[joint.knee] parameters: 'all' is not known"),
     ],
 )
 def test_a_release_that_cannot_work_is_refused(

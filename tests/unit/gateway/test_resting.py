@@ -100,7 +100,7 @@ def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running,
     with Client(address) as client:
         message = client.line()
         assert message is not None
-        assert message["error"]["message"] == f"{file}: [robot] lacks the key 'name'"
+        assert message["error"]["message"] == f"{file}: [robot] name: is missing"
     file.write_text(processes.RESTS_SOON, encoding="utf-8")
     until(lambda: processes.rests(running.pid), "it rests again")
     with Client(address) as client:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.cli.serve import _parser, _robot
 from gateway.connections.listeners import listen
 from gateway.main import main
 from tests.unit.gateway.harness import ROBOT
@@ -35,7 +36,7 @@ def test_a_wrong_file_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.
     file = tmp_path / "robot.toml"
     file.write_text("[robot]\n", encoding="utf-8")
     assert main(["gateway", str(file)]) == 1
-    assert capsys.readouterr().err == f"gwrms gateway: {file}: [robot] lacks the key 'name'\n"
+    assert capsys.readouterr().err == f"gwrms gateway: {file}: [robot] name: is missing\n"
 
 
 def test_a_port_in_use_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,4 +46,30 @@ def test_a_port_in_use_ends_with_1_and_a_sentence(tmp_path: Path, capsys: pytest
         assert main(["gateway", str(file), "--port", str(taken.getsockname()[1])]) == 1
     error = capsys.readouterr().err
     assert "cannot listen on 127.0.0.1:" in error
+    assert f"Address already in use; choose another with [gateway] of {file}: host and port" in error
     assert "Traceback" not in error
+    assert "Errno" not in error
+
+
+def test_an_address_of_another_computer_is_named_with_file_and_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(ROBOT.replace("[gateway]", '[gateway]\nhost = "192.0.2.1"'), encoding="utf-8")
+    assert main(["gateway", str(file)]) == 1
+    error = capsys.readouterr().err
+    assert "cannot listen on 192.0.2.1:" in error
+    assert f"Cannot assign requested address; choose another with [gateway] of {file}: host" in error
+    assert "Errno" not in error
+
+
+@pytest.mark.parametrize("tell", [True, False])
+def test_what_is_likely_wrong_with_its_file_is_logged_at_its_start_and_not_each_time_that_it_wakes(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, tell: bool
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "x"\n[gateway]\nhost = "0.0.0.0"\n', encoding="utf-8")
+    _robot(_parser().parse_args([str(file)]), tell=tell)
+    assert [record.getMessage().partition(" lets ")[0] for record in caplog.records] == (
+        [f"{file}: [gateway] host: '0.0.0.0'"] if tell else []
+    )

@@ -309,7 +309,7 @@ class TestController:
         ("timeout_s = 0", "timeout_s"),
         ("timeout_s = 60", "timeout_s"),
         ("time_out_s = 1", "did you mean 'timeout_s'"),
-        (CONTROLLER.replace("gait", "left_knee"), "there is no [device.left_knee]; here are gait"),
+        (CONTROLLER.replace("gait", "left_knee"), "there is no [device.left_knee]: here are gait"),
         (CONTROLLER.replace("0x2000:0", "2000"), "object"),
         (CONTROLLER.replace("0x2000:0", "0x2000:999"), "subindex"),
         (CONTROLLER.replace("value = 0", ""), "value"),

@@ -160,11 +160,11 @@ def test_without_names_there_is_nothing_to_tell(client: Client) -> None:
     ("table", "says"),
     [
         ("processes = []", "processes"),
-        ('processes = ["a"]\nbus = "other"\nperiod_ms = 10', "there is no bus 'other'; .*main"),
+        ('processes = ["a"]\nbus = "other"\nperiod_ms = 10', "there is no bus 'other': .*main"),
         ('processes = ["a"]\nbus = "main"', "bus and period_ms belong together"),
         ('processes = ["a"]\nperiod_ms = 10', "bus and period_ms belong together"),
         ('processes = ["a"]\nbus = "main"\nperiod_ms = 0', "period_ms"),
-        ("period_ms = 10", "lacks the key 'processes'"),
+        ("period_ms = 10", "processes: is missing"),
     ],
 )
 def test_a_table_that_cannot_work_is_refused(tmp_path: Path, table: str, says: str) -> None:

@@ -221,5 +221,5 @@ def test_a_scenario_names_files_beside_it(tmp_path: Path) -> None:
 def test_a_scenario_that_names_no_file_is_refused(tmp_path: Path, value: str) -> None:
     scenario = tmp_path / "scenario.toml"
     scenario.write_text(f"[robot]\ndrive = {value}\n", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"scenario\.toml \[robot\]"):
+    with pytest.raises(ScenarioError, match=r"scenario\.toml: \[robot\] drive: "):
         load(scenario)

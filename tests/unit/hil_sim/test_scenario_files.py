@@ -69,38 +69,38 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
     ("text", "words"),
     [
         ("x", "one.toml: this is no TOML"),
-        ("colour = 1", "one.toml: there is no key 'colour'; allowed are at, expect, robot, title"),
-        ("robot = 1", r"one.toml \[robot\]: this must be a table"),
-        ("[robot]\nspeed = 1", r"\[robot\]: there is no key 'speed'"),
-        ('[robot]\nscenario = "swim"', "scenario = 'swim' is not possible; allowed are walk, stand"),
-        ('[robot]\nseed = "x"', "seed = 'x' must be a whole number"),
-        ('[robot]\nimu = "x"', "imu = 'x' is not possible; allowed are bno08x-rvc, microstrain"),
-        ('[robot]\nseconds = 1\n[[at]]\ntime_s = 2\nactivity = "sit"', "seconds = 1 ends before something"),
-        ("[at]\ntime_s = 2", r"at is a list of tables: write \[\[at\]\]"),
-        ('[[at]]\nactivity = "sit"', r"\[\[at\]\] 1: time_s = None is no time"),
-        ('[[at]]\ntime_s = -1\nactivity = "sit"', "time_s = -1 is no time"),
-        ("[[at]]\ntime_s = 1", r"\[\[at\]\] 1: say one of fault, clear, activity, controller, list"),
+        ("colour = 1", r"one.toml: \[colour\]: is not known: allowed are at, expect, robot, title"),
+        ("robot = 1", r"one.toml: \[robot\]: this must be a table"),
+        ("[robot]\nspeed = 1", r"\[robot\] speed: is not known: did you mean 'seed'"),
+        ('[robot]\nscenario = "swim"', "scenario: 'swim' is not known: allowed are walk, stand"),
+        ('[robot]\nseed = "x"', "seed: 'x' must be a whole number"),
+        ('[robot]\nimu = "x"', "imu: 'x' is not known: allowed are bno08x-rvc, microstrain"),
+        ('[robot]\nseconds = 1\n[[at]]\ntime_s = 2\nactivity = "sit"', "seconds: 1 ends before something"),
+        ("[at]\ntime_s = 2", r"\[at\]: is a list of tables: write \[\[at\]\]"),
+        ('[[at]]\nactivity = "sit"', r"\[\[at\]\] number 1 time_s: is missing"),
+        ('[[at]]\ntime_s = -1\nactivity = "sit"', "time_s: -1 is no time"),
+        ("[[at]]\ntime_s = 1", r"\[\[at\]\] number 1: say one of fault, clear, activity, controller, list"),
         ('[[at]]\ntime_s = 1\nfault = "nod_lost"', "did you mean 'node_lost'"),
-        ('[[at]]\ntime_s = 1\nfault = "bus_load"\npercent = 3', "'percent' does not belong to 'fault'"),
+        ('[[at]]\ntime_s = 1\nfault = "bus_load"\npercent = 3', "percent: is not known: allowed are fault"),
         (
             '[[at]]\ntime_s = 1\nfault = "bus_load"\nparams = { percent = 300 }',
             "percent = 300 is not possible",
         ),
-        ('[[at]]\ntime_s = 1\nstop = "x"\nactivity = "sit"', "there is no key 'activity'"),
-        ("[[at]]\ntime_s = 1\nstop = 1", "stop = 1 must be a text"),
+        ('[[at]]\ntime_s = 1\nstop = "x"\nactivity = "sit"', "activity: is not known"),
+        ("[[at]]\ntime_s = 1\nstop = 1", "stop: 1 must be a text"),
         ("[[at]]\ntime_s = 1\nset = {}", "is what it looks like"),
         ('[[expect]]\nstate = "ok"\nat_s = 1', "exactly one of component, channel, truth, answer, not none"),
         ('[[expect]]\ncomponent = "x"\nchannel = "y"\nat_s = 1', "not component and channel"),
         ('[[expect]]\ncomponent = "x"\nat_s = 1', "say what is expected of x with state, problem"),
-        ('[[expect]]\ncomponent = "x"\nmin = 1\nat_s = 1', "there is no key 'min'"),
-        ('[[expect]]\ntruth = "x"\nmissing = true\nat_s = 1', "there is no key 'missing'"),
+        ('[[expect]]\ncomponent = "x"\nmin = 1\nat_s = 1', "min: is not known"),
+        ('[[expect]]\ntruth = "x"\nmissing = true\nat_s = 1', "missing: is not known"),
         ('[[expect]]\ncomponent = "x"\nstate = "ok"', "exactly one of at_s, within_s, between_s, not none"),
-        ('[[expect]]\ncomponent = "x"\nstate = "ok"\nwithin_s = 3', "within_s = 3 is no window"),
+        ('[[expect]]\ncomponent = "x"\nstate = "ok"\nwithin_s = 3', "within_s: 3 is no window"),
         ('[[expect]]\ncomponent = "x"\nstate = "ok"\nwithin_s = [4, 3]', "ends before it begins"),
-        ('[[expect]]\ncomponent = "x"\nstate = "ok"\nwithin_s = [1, "x"]', "within_s = 'x' is no time"),
-        ('[[expect]]\nchannel = "x"\nmin = "1"\nat_s = 1', "min = '1' must be a number"),
-        ('[[expect]]\nchannel = "x"\nmissing = 1\nat_s = 1', "missing = 1 must be true or false"),
-        ('[[expect]]\nchannel = "x"\nis = 1\nat_s = 1', "is = 1 must be a text"),
+        ('[[expect]]\ncomponent = "x"\nstate = "ok"\nwithin_s = [1, "x"]', "within_s: 'x' is no time"),
+        ('[[expect]]\nchannel = "x"\nmin = "1"\nat_s = 1', "min: '1' must be a number"),
+        ('[[expect]]\nchannel = "x"\nmissing = 1\nat_s = 1', "missing: 1 must be true or false"),
+        ('[[expect]]\nchannel = "x"\nis = 1\nat_s = 1', "is: 1 must be a text"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, words: str) -> None:
@@ -275,7 +275,9 @@ def test_what_cannot_be_done_when_its_time_comes_ends_the_run_in_words(tmp_path:
     robot = SimulatedRobot(tmp_path / "robot", virtual_channel=str(tmp_path), speed=None)
     robot.open()
     schedule(script(tmp_path, line * 2).lines, robot)
-    with pytest.raises(ScenarioError, match=r"one.toml \[\[at\]\] 2, at 0.1 s: node_lost is already on gait"):
+    with pytest.raises(
+        ScenarioError, match=r"one.toml \[\[at\]\] number 2, at 0.1 s: node_lost is already on gait"
+    ):
         robot.run(0.5)
     robot.close()
 

@@ -58,22 +58,22 @@ def test_each_table_builds_its_component(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ('bus = "main"\nformat = "cia410"', "[imu.trunk] lacks the key 'node_id'"),
-        ('bus = "main"\nformat = "witmotion-can"', "[imu.trunk] lacks the key 'can_id'"),
-        ('format = "witmotion"', "[imu.trunk] lacks the key 'port'"),
-        ('format = []\nport = "x"', "[imu.trunk] format must"),
-        ('format = "morse"\nport = "x"', "[imu.trunk]: format 'morse' is not known; here are bno08x-rvc, "),
-        ('format = "../xsens"\nport = "x"', "format '../xsens' is not known"),
-        ('format = "cia410"\nport = "x"', "[imu.trunk] has an unknown key 'port'"),
-        ('bus = "main"\nformat = "xsens"\ncan_id = 80', "[imu.trunk] has an unknown key 'bus'"),
+        ('bus = "main"\nformat = "cia410"', "[imu.trunk] node_id: is missing"),
+        ('bus = "main"\nformat = "witmotion-can"', "[imu.trunk] can_id: is missing"),
+        ('format = "witmotion"', "[imu.trunk] port: is missing"),
+        ('format = []\nport = "x"', "[imu.trunk] format: must"),
+        ('format = "morse"\nport = "x"', "[imu.trunk] format: 'morse' is not known: allowed are bno08x"),
+        ('format = "../xsens"\nport = "x"', "format: '../xsens' is not known"),
+        ('format = "cia410"\nport = "x"', "[imu.trunk] port: is not known"),
+        ('bus = "main"\nformat = "xsens"\ncan_id = 80', "[imu.trunk] bus: is not known"),
         ('bus = "mian"\nnode_id = 20', "[imu.trunk] bus: there is no bus 'mian'"),
         ('bus = "mian"\ncan_id = 80', "[imu.trunk] bus: there is no bus 'mian'"),
-        ('bus = "main"\nnode_id = 20\nport = "x"', "unknown key 'port'"),
+        ('bus = "main"\nnode_id = 20\nport = "x"', "port: is not known"),
         (
             'bus = "main"\nnode_id = 20' + JOINT,
             "[imu.trunk] node_id: 20 on bus 'main' belongs to [joint.left_",
         ),
-        ('bus = "main"\nnode_id = 20\ndirections = [1, 2]', "[imu.trunk] directions[1] 2"),
+        ('bus = "main"\nnode_id = 20\ndirections = [1, 2]', "[imu.trunk] directions[1]: 2"),
     ],
 )
 def test_a_table_that_cannot_work_is_named(tmp_path: Path, text: str, says: str) -> None:

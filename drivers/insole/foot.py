@@ -1,0 +1,11 @@
+"""Which foot it is."""
+
+from typing import Literal
+
+Foot = Literal["left", "right"]
+FEET: tuple[Foot, ...] = ("left", "right")
+
+
+def foot_in(name: str) -> Foot | None:
+    """The foot that a component's name begins with."""
+    return next((foot for foot in FEET if name.startswith(foot)), None)

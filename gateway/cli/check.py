@@ -1,0 +1,192 @@
+"""`gwrms check`: what is wrong with files, and with what a robot's file needs, without starting anything."""
+
+import argparse
+import importlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.cli.text import counted, say, say_json
+from gateway.tables.finding import Finding, Severity
+from gateway.tables.reading import Unreadable, read
+
+_DESCRIPTION = """\
+Checks a robot's file, a server's file or a scenario as a gateway, a collector or `gwrms sim run` would read
+it, and tells everything that is wrong at once: table, key, what is allowed and what was likely meant. Which
+of them a file is shows in its tables. Nothing is started, and nothing is written.
+
+Of a robot's file also what it needs is looked at: whether its EDS files, layouts and calibrations can be used
+and allow what its parameters say, whether the ports exist and this user may open them, whether the CAN links
+are up and run at its bit rate, and whether its address is this computer's.
+"""
+_EPILOG = """\
+A mistake is what a file is refused for. A warning is what can work and is likely not what was meant, or what
+this computer lacks: it may come yet. A gateway says the same of its file when it starts, and of ports, buses
+and devices' files in gwrms describe. Of what is no TOML only the first mistake is told.
+
+exit codes: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
+
+examples
+  gwrms check robot.toml
+  gwrms check --no-machine --json robot.toml server.toml scenarios/*.toml
+  gwrms check --schema robot > robot.schema.json
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind of file: where it is checked and described, and the tables or keys that only it has."""
+
+    what: str
+    check: str  # of file, its tables, and whether to look at this computer
+    schema: str
+    marks: frozenset[str]
+
+
+_SINGLE = ("gateway", "stop", "guard", "control_loop", "robot.name")
+# What is not installed is needed by its own kind only.
+KINDS: Final[Mapping[str, Kind]] = {
+    "robot": Kind(
+        "a robot's file",
+        "gateway.cli.check_robot:findings",
+        "gateway.config.schema:schema",
+        frozenset(
+            [
+                "gateway",
+                "can",
+                "joint",
+                "device",
+                "insole",
+                "imu",
+                "parameter",
+                "stop",
+                "guard",
+                "control_loop",
+                "robot.name",
+            ]
+        ),
+    ),
+    "server": Kind(
+        "a server's file",
+        "server_gui.core.settings.server_file:findings",
+        "server_gui.core.settings.schema:schema",
+        frozenset(["robots", "store", "recorder", "prediction", "rules"]),
+    ),
+    "scenario": Kind(
+        "a scenario",
+        "hil_sim.scenario.script:findings",
+        "hil_sim.scenario.schema:schema",
+        frozenset(["at", "expect", "title", "robot.scenario", "robot.seconds", "robot.imu", "robot.insole"]),
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One file's result; `kind` is None where it could not be read."""
+
+    file: Path
+    kind: str | None
+    findings: list[Finding]
+
+    def count(self, severity: Severity) -> int:
+        return sum(one.severity is severity for one in self.findings)
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms check`."""
+    parser = _parser()
+    arguments = parser.parse_args(argv)
+    if arguments.schema is not None:
+        say(json.dumps(_find(KINDS[arguments.schema].schema)(), indent=2, ensure_ascii=False) + "\n")
+        return 0
+    if not arguments.files:
+        parser.error("name a file, or say --schema")
+    results = [check(file, arguments.kind, machine=arguments.machine) for file in arguments.files]
+    for one in results:
+        say_json(_as_json(one)) if arguments.json else say(_as_text(one))
+    refused = {Severity.MISTAKE, Severity.WARNING} if arguments.strict else {Severity.MISTAKE}
+    return int(any(finding.severity in refused for one in results for finding in one.findings))
+
+
+def check(file: Path, kind: str | None = None, *, machine: bool = True) -> Checked:
+    """Everything that is wrong with a file, or likely is; its kind is what its tables show, unless given."""
+    try:
+        tables = read(file)
+    except Unreadable as error:
+        return Checked(file, kind, [error.finding])
+    found = kind or recognised(file, tables)
+    told = _find(KINDS[found].check)(file, tables, machine=machine)
+    return Checked(file, found, [Finding(where, key, text, Severity(how)) for how, where, key, text in told])
+
+
+def recognised(file: Path, tables: Mapping[str, Any]) -> str:
+    """Which kind of file it is: the one that has most of its tables; where none is known, by its name."""
+    robot = tables.get("robot")
+    keys = {*tables, *(f"robot.{key}" for key in (robot if isinstance(robot, dict) else ()))}
+
+    def likely(kind: str) -> tuple[int, bool]:
+        return len(KINDS[kind].marks & keys), kind in file.stem
+
+    return max(KINDS, key=likely)
+
+
+def _find(path: str) -> Callable[..., Any]:
+    module, _, name = path.partition(":")
+    found: Callable[..., Any] = getattr(importlib.import_module(module), name)
+    return found
+
+
+def _as_json(one: Checked) -> dict[str, object]:
+    return {
+        "file": str(one.file),
+        "kind": one.kind,
+        "ok": not one.count(Severity.MISTAKE),
+        "findings": [
+            {"severity": found.severity.value, "where": found.where, "key": found.key, "text": found.text}
+            for found in one.findings
+        ],
+    }
+
+
+def _as_text(one: Checked) -> str:
+    lines = [f"{one.file}: {found.severity}: {found.words}" for found in _worst_first(one.findings)]
+    return "\n".join([*lines, f"{one.file}: {_summary(one)}\n"])
+
+
+def _summary(one: Checked) -> str:
+    what = KINDS[one.kind].what if one.kind is not None else "not read"
+    said = [counted(number, severity.value) for severity in Severity if (number := one.count(severity))] or [
+        "nothing is wrong"
+    ]
+    return f"{what}, {', '.join(said)}"
+
+
+def _worst_first(findings: Iterable[Finding]) -> Sequence[Finding]:
+    return sorted(findings, key=lambda found: list(Severity).index(found.severity))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms check",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="a file to check")
+    parser.add_argument("--kind", choices=tuple(KINDS), help="what the files are, whatever their tables show")
+    parser.add_argument(
+        "--no-machine",
+        dest="machine",
+        action="store_false",
+        help="only the files and what lies beside them: no address, ports and CAN links of this computer",
+    )
+    parser.add_argument("--strict", action="store_true", help="exit status 1 for warnings too")
+    parser.add_argument("--json", action="store_true", help="one JSON object a file and line")
+    parser.add_argument(
+        "--schema", choices=tuple(KINDS), help="print the JSON Schema of such files, for editors, instead"
+    )
+    return parser

@@ -1,0 +1,97 @@
+"""What a robot's file needs beside itself: devices' files, and this computer's address, ports and CAN links.
+
+Nothing is opened for use: a gateway may be running. What is missing may come, so it is only warned of; a file
+that cannot be used is a mistake.
+"""
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+
+from drivers.bus.interfaces.opening import obstacle as bus_obstacle
+from drivers.port import obstacle as port_obstacle
+from gateway.config.robot import RobotConfig, header
+from gateway.modules.component.assembly import Robot, assemble
+from gateway.modules.control.catalogue import resolve
+from gateway.modules.control.parameters import Parameter
+from gateway.tables.finding import Finding, warning
+
+
+def beside(config: RobotConfig) -> Iterator[Finding]:
+    """What is wrong with files that it names, and with limits beside those of the EDS."""
+    robot = assemble(config)
+    for name, (kind, why) in robot.absent.items():
+        yield Finding(header(kind, name), "", why.removeprefix(f"{header(kind, name)}: "))
+    absent = {name: why for name, (_kind, why) in robot.absent.items()}
+    for parameter in resolve(config, robot.descriptions, absent).values():
+        if parameter.component not in absent:
+            yield from _about_parameter(config, robot, parameter)
+
+
+def here(config: RobotConfig) -> Iterator[Finding]:
+    """What this computer lacks, or has otherwise than the file says."""
+    for check in _HERE:
+        yield from check(config)
+
+
+def _about_parameter(config: RobotConfig, robot: Robot, parameter: Parameter) -> Iterator[Finding]:
+    settings = config.parameter.get(parameter.name)
+    if settings is None:  # offered by the EDS alone
+        if parameter.problem is not None:
+            yield warning(_table(config, parameter.component), "", parameter.problem)
+        return
+    where = header("parameter", parameter.name)
+    if parameter.problem is not None:
+        yield Finding(where, "", parameter.problem)
+        return
+    file = robot.descriptions[parameter.component].path.name
+    for key, own, counts in (("min", settings.min, parameter.min), ("max", settings.max, parameter.max)):
+        if own is not None and counts is not None and own != counts:
+            text = f"{own:g} is beyond {file}, where it is {counts:g}: that counts"
+            yield warning(where, key, text)
+
+
+def _table(config: RobotConfig, component: str) -> str:
+    return header("joint" if component in config.joint else "device", component)
+
+
+def _about_address(config: RobotConfig) -> Iterator[Finding]:
+    host = config.gateway.host
+    try:
+        found = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, kind, protocol, _, address = found[0]
+        with socket.socket(family, kind, protocol) as tried:
+            tried.bind(address)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        yield warning("[gateway]", "host", f"{host} is no address of this computer: {reason}")
+
+
+def _about_ports(config: RobotConfig) -> Iterator[Finding]:
+    for where, sensor in config.on_ports():
+        why = port_obstacle(sensor.port)
+        if why is not None:
+            yield warning(where, "port", why)
+
+
+def _about_buses(config: RobotConfig) -> Iterator[Finding]:
+    for name, bus in config.can.items():
+        why = bus_obstacle(bus)
+        if why is not None:
+            yield warning(header("can", name), "channel", why)
+
+
+def _about_records(config: RobotConfig) -> Iterator[Finding]:
+    folder = config.records
+    there = next(one for one in (folder, *folder.parents) if one.exists())
+    if not os.access(there, os.W_OK):
+        text = f"{folder} cannot be written by this user: journal and held stop would be lost"
+        yield warning("[gateway]", "records", text)
+
+
+_HERE: tuple[Callable[[RobotConfig], Iterator[Finding]], ...] = (
+    _about_address,
+    _about_ports,
+    _about_buses,
+    _about_records,
+)

@@ -1,0 +1,85 @@
+"""A file's TOML as nested tables; where it is none, the line is shown with what was likely meant."""
+
+import codecs
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.tables.finding import Finding
+
+_ENCODINGS: Final = (
+    (codecs.BOM_UTF8, "begins with a byte order mark (BOM): save it as UTF-8 without BOM"),
+    (codecs.BOM_UTF16_LE, "is UTF-16: save it as UTF-8"),
+    (codecs.BOM_UTF16_BE, "is UTF-16: save it as UTF-8"),
+)
+_PLACE: Final = r" \(at (?:line (?P<line>\d+), column \d+|end of document)\)$"
+# What a line with a mistake looks like, and what it likely should be; the first one counts.
+_HINTS: Final = (
+    (r"\s*\[[^\]]*$", "a table's header ends with ]"),
+    (r"\s*[\w.\"-]+\s*:\s", "write KEY = VALUE"),
+    (r"[^=]*=\s*[+-]?\d+,\d", "decimals are written with a point"),
+    (r"[^=]*=\s*(True|False|TRUE|FALSE)\b", "true and false are written small"),
+    (r"[^=]*=\s*\"[^\"]*\\", "a \\ within quotes begins a special character: take single quotes"),
+    (r"[^=]*=\s*(#.*)?$", "a key without its value"),
+    (r"[^=]*=\s*[A-Za-z_/~.*]", "text stands in quotes"),
+    (r"[^=]*=\s*\"[^\"]*$", "the quotes do not end in this line"),
+    (r"[^=]*=\s*\S+\s+[^#\s]", "something follows the value: a new key begins a new line"),
+)
+
+
+class Unreadable(Exception):
+    """The file is not there, is no text or no TOML."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.words)
+        self.finding = finding
+
+
+def read(file: Path) -> dict[str, Any]:
+    """The file's tables.
+
+    Raises:
+        Unreadable: there are none; it says at which line, and what was likely meant. Reading ends there.
+
+    """
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise Unreadable(Finding("", "", f"cannot be read: {error.strerror}; name one")) from error
+    for mark, remedy in _ENCODINGS:
+        if data.startswith(mark):
+            raise Unreadable(Finding("", "", remedy))
+    return parse(data)
+
+
+def parse(data: bytes) -> dict[str, Any]:
+    """The same for what stands in a file."""
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        said = "is no TOML: it is not in UTF-8; save it as UTF-8"
+        raise Unreadable(Finding(f"line {line}", "", said)) from error
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise Unreadable(_explained(str(error), text.splitlines())) from error
+
+
+def _explained(said: str, text: list[str]) -> Finding:
+    place = re.search(_PLACE, said)
+    what = said if place is None else said[: place.start()]
+    number = int(place["line"]) if place is not None and place["line"] else len(text)
+    line = text[number - 1].strip() if 0 < number <= len(text) else ""
+    hint = "it stands there twice" if _is_again(what) else _hint(text[number - 1] if line else "")
+    remedy = f"; {hint}" if hint else ""
+    return Finding(f"line {number}", "", f"is no TOML: {line[:80]!r}: {what}{remedy}")
+
+
+def _is_again(what: str) -> bool:
+    return "twice" in what or "overwrite" in what
+
+
+def _hint(line: str) -> str:
+    return next((hint for pattern, hint in _HINTS if re.match(pattern, line)), "")
