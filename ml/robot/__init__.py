@@ -1,5 +1,6 @@
 """What a robot's own models predict, from the channels that this robot has.
 
+classes.py    what they say: the names alone
 task.py       the tasks: classes, what labels mean, which sensors support what; the recipe for a robot
 groups.py     groups of sensors, by the robot's names of channels
 blocks.py     a group's windows → feature columns

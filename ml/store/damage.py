@@ -12,11 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow.fs import FileType
 
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.fragments import DataFile
 from ml.store.objects import Object
 from ml.store.sessions import footer
 from ml.store.store import Store
+from ml.store.translation import translated
 
 _LONGEST: Final = 300  # of what a library says
 _UNREADABLE: Final = (pa.ArrowException, OSError, ValueError)  # what pyarrow raises, of whatever bytes

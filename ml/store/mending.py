@@ -16,9 +16,10 @@ from deltalake.exceptions import CommitFailedError
 from deltalake.transaction import RemoveAction
 
 from ml.store import durable
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.fragments import DataFile, data_files
 from ml.store.store import NO_HOOKS, Store
+from ml.store.translation import translated
 
 _NOTED: Final = "mended"
 ATTEMPTS: Final = 10  # while others write to the table

@@ -16,8 +16,8 @@ from obstore.exceptions import AlreadyExistsError, NotFoundError
 from obstore.store import MemoryStore, ObjectStore, from_url
 
 from ml.store import durable
-from ml.store.errors import translated
 from ml.store.private import private_folder
+from ml.store.translation import translated
 
 CONNECT_TIMEOUT_S: Final = 5
 TIMEOUT_S: Final = 60

@@ -12,10 +12,11 @@ import duckdb
 import pyarrow as pa
 
 from ml.store import reading
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.precedence import OPENED
 from ml.store.store import Store
 from ml.store.tables import TABLES
+from ml.store.translation import translated
 
 Found = TypeVar("Found")
 BATCH_ROWS: Final = 50_000

@@ -5,10 +5,11 @@ from collections.abc import Iterator
 import pyarrow as pa
 import pyarrow.dataset
 
-from ml.store.errors import NoSuchTable, translated
+from ml.store.errors import NoSuchTable
 from ml.store.fragments import DataFile, data_files
 from ml.store.store import Store
 from ml.store.tables import Table
+from ml.store.translation import translated
 
 
 def dataset(store: Store, table: Table, robot: str | None = None) -> pyarrow.dataset.Dataset:

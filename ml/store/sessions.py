@@ -11,12 +11,13 @@ import pyarrow.dataset
 import pyarrow.parquet as pq
 
 from ml.store import reading
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.fragments import DataFile, Extent
 from ml.store.labels import holding
 from ml.store.precedence import last, recorded_order
 from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Table
+from ml.store.translation import translated
 
 ROWS_AT_ONCE: Final = 100_000  # of telemetry, about
 SHORTEST_NS: Final = 1_000_000_000  # that is read at once

@@ -2,12 +2,10 @@
 
 import contextlib
 import functools
-import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final, Self
-from urllib.parse import urlsplit
 
 import msgspec
 import pyarrow as pa
@@ -27,20 +25,14 @@ from deltalake.transaction import AddAction
 from pyarrow.fs import FileSystem
 
 from ml.store import durable, torn, writing
-from ml.store.errors import (
-    ColumnTaken,
-    NoSuchTable,
-    StoreError,
-    StoreRefused,
-    StoreUnreachable,
-    UnsafeStore,
-    translated,
-)
+from ml.store.errors import ColumnTaken, NoSuchTable, StoreError, StoreRefused, StoreUnreachable, UnsafeStore
 from ml.store.files import filesystem
 from ml.store.fragments import as_dataset
 from ml.store.objects import RETRIES, Objects, s3_options
 from ml.store.probe import probe
 from ml.store.tables import Known, Table
+from ml.store.translation import translated
+from ml.store.url import checked_url, default_url
 
 ATTEMPTS: Final = 20  # races that an append may lose before it gives up
 CHECKPOINT_EVERY: Final = 50  # commits; a reader never replays more log than this
@@ -58,13 +50,6 @@ class About(msgspec.Struct, frozen=True):
     format: int = FORMAT
     shards: int = 1  # of sharded tables; see docs/explanation/scale.md
     several_writers: bool = True
-
-
-def default_url() -> str:
-    """Under the user's own data (XDG base directories)."""
-    data = os.environ.get("XDG_DATA_HOME")
-    folder = (Path(data) if data else Path.home() / ".local" / "share") / "gwrms" / "store"
-    return folder.as_uri()
 
 
 class Store:
@@ -381,22 +366,3 @@ def writer_properties(schema: pa.Schema) -> WriterProperties:
         default_column_properties=plain,
         column_properties=numbers,
     )
-
-
-def checked_url(url: str) -> str:
-    """Return the URL without a slash at its end.
-
-    Raises:
-        StoreError: it is of another kind, or has credentials in it.
-
-    """
-    try:
-        parts = urlsplit(url)
-    except ValueError as error:
-        raise StoreError(f"{url!r} is no URL: {error}") from error
-    if parts.username or parts.password or parts.query:
-        raise StoreError("a store's URL has no keys in it: give them by the AWS environment or profile")
-    folder = parts.scheme == "file" and not parts.netloc and parts.path.startswith("/")
-    if not (folder or (parts.scheme == "s3" and parts.netloc)):
-        raise StoreError(f"{url!r} is no store: use file:///folder or s3://bucket/prefix")
-    return url.rstrip("/")

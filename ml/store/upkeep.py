@@ -22,9 +22,10 @@ from deltalake.exceptions import CommitFailedError
 
 from ml.store import reading
 from ml.store.compaction_lock import alone
-from ml.store.errors import NoSuchTable, StoreError, StoreRefused, translated
+from ml.store.errors import NoSuchTable, StoreError, StoreRefused
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table
+from ml.store.translation import translated
 
 TARGET_BYTES: Final = 256 << 20  # of a file that compaction makes
 GRACE: Final = timedelta(

@@ -22,10 +22,10 @@ from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import TASKS, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
-from ml.store.errors import translated
 from ml.store.labels import REGRESSION, Label, Source, holding, person, wearer
 from ml.store.sessions import newest
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY, Table
+from ml.store.translation import translated
 from ml.training.recorded import Recorded, recorded
 from ml.training.truth import NOBODY, Instants, Names, Said, activities, phases
 

@@ -11,10 +11,10 @@ from ml.registry.card import TableVersion
 from ml.robot.task import TASKS, Task
 from ml.store import Store
 from ml.store import sessions as stored
-from ml.store.errors import translated
 from ml.store.labels import holding
 from ml.store.sessions import Session, among
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY
+from ml.store.translation import translated
 from ml.training.dataset import Ask, LeftOut, Part, versions
 from ml.training.extract import extract
 

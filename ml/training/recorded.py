@@ -10,10 +10,10 @@ import pyarrow.compute as pc
 import pyarrow.dataset
 
 from ml.features.windows import Samples
-from ml.store.errors import translated
 from ml.store.sessions import ORDER
 from ml.store.store import Store
 from ml.store.tables import TELEMETRY
+from ml.store.translation import translated
 
 Instants = npt.NDArray[np.int64]
 

@@ -10,7 +10,8 @@ from gateway.cli.text import counted, say, say_json, size, warn
 from ml.store import sessions
 from ml.store.errors import StoreError
 from ml.store.sessions import Session
-from ml.store.store import Store, checked_url
+from ml.store.store import Store
+from ml.store.url import checked_url
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, url
 from server_gui.core.cloud import moved_store, partial_copy, spool_upload, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded

@@ -20,7 +20,7 @@ from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
 from ml.store.private import private_files
-from ml.store.store import checked_url
+from ml.store.url import checked_url
 from server_gui.cli.cloud_options import add_url, parser, url, when
 from server_gui.cli.models_show import told
 from server_gui.core.settings.server_file import load

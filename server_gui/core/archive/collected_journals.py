@@ -15,8 +15,8 @@ import pyarrow.compute as pc
 import pyarrow.dataset
 
 from ml.store import NoSuchTable, Store, StoreError, reading
-from ml.store.errors import translated
 from ml.store.tables import JOURNAL
+from ml.store.translation import translated
 from server_gui.core.audit import chains
 from server_gui.core.audit.chains import Entry
 from server_gui.core.cloud import spool_reader

@@ -9,10 +9,10 @@ import pyarrow.dataset
 
 from ml.serving.predictor import Prediction
 from ml.store import Store, reading
-from ml.store.errors import translated
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS
+from ml.store.translation import translated
 from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.tape import as_time
 from server_gui.core.settings.server_file import ServerSettings

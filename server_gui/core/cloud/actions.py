@@ -13,7 +13,7 @@ import pyarrow as pa
 from gateway.cli.text import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
-from ml.store.store import checked_url
+from ml.store.url import checked_url
 from server_gui.core.cloud import partial_copy, spool_upload, transfer, verify
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap

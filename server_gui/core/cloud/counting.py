@@ -13,11 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ml.store import checksums, damage
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.fragments import DataFile
 from ml.store.sessions import footer
 from ml.store.store import Store
 from ml.store.tables import TELEMETRY
+from ml.store.translation import translated
 from server_gui.core.cloud import extents
 from server_gui.core.recording.receipts import Mark, Part
 from server_gui.core.recording.tally import NAMING, NUMBER, Units, named, times_us

@@ -9,9 +9,10 @@ import duckdb
 import pyarrow as pa
 
 from ml.store import reading
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.store import Store
 from ml.store.tables import SESSIONS, TELEMETRY, Table
+from ml.store.translation import translated
 
 ROWS_AT_ONCE: Final = 20_000
 TOLD: Final = 3  # of contradictions

@@ -20,12 +20,12 @@ import pyarrow.compute as pc
 import pyarrow.dataset
 
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
-from ml.store.errors import translated
 from ml.store.labels import holding
 from ml.store.precedence import recorded_order
 from ml.store.sessions import Channel, Piece, Session, Source
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
+from ml.store.translation import translated
 from server_gui.core.cloud import spool_reader
 from server_gui.core.recording import missing_rows
 from server_gui.core.recording.columns import OWN, Columns

@@ -14,11 +14,12 @@ from urllib.parse import unquote, urlsplit
 
 from ml.store import durable
 from ml.store.compaction_lock import PLACE
-from ml.store.errors import StoreError, translated
+from ml.store.errors import StoreError
 from ml.store.objects import PIECE_BYTES, Object, Objects
 from ml.store.private import opener, private_folder
 from ml.store.probe import probe
 from ml.store.store import ABOUT, Store
+from ml.store.translation import translated
 from server_gui.core.cloud.checksums import Altered, Digest, proven
 
 Advance = Callable[[int], object]

@@ -16,10 +16,10 @@ from ml.errors import UnusableModel
 from ml.registry.registry import Registry
 from ml.robot.task import TASKS
 from ml.store import NoSuchTable, Store
-from ml.store.errors import translated
 from ml.store.fragments import DataFile, data_files
 from ml.store.labels import ACTIVITIES, INSTANTS, Label, holding
 from ml.store.tables import LABELS, PREDICTIONS, Table
+from ml.store.translation import translated
 from ml.training.recorded import Recorded
 from server_gui.core.prediction.scoring import Counts, Decisions, compared, counted, quality
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures

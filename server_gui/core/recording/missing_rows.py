@@ -13,9 +13,9 @@ import pyarrow.compute as pc
 import pyarrow.dataset
 
 from ml.store import checksums, upkeep
-from ml.store.errors import translated
 from ml.store.store import Store
 from ml.store.tables import Table
+from ml.store.translation import translated
 from server_gui.core.recording.errors import Contradicted
 
 TEXTS = ("robot", "session", "connection")  # alike in all rows of a run

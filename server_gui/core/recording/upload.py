@@ -14,9 +14,10 @@ import pyarrow.dataset
 
 from gateway.cli.text import counted
 from ml.store import upkeep
-from ml.store.errors import ColumnTaken, NoSuchTable, translated
+from ml.store.errors import ColumnTaken, NoSuchTable
 from ml.store.store import Store
 from ml.store.tables import EVENTS, SESSIONS, TABLES, TELEMETRY, Table
+from ml.store.translation import translated
 from server_gui.core.recording import missing_rows
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.clocks import Moment

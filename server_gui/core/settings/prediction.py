@@ -9,7 +9,7 @@ from typing import Annotated, Final
 from msgspec import Meta, Struct
 
 from gateway.tables.finding import unknown
-from ml.robot.task import ABNORMAL, TASKS
+from ml.robot.classes import ABNORMAL, CLASSES
 
 EVERY_MS: Final[Mapping[str, int]] = MappingProxyType({"activity": 100, "gait_phase": 40, "falling": 40})
 STEP_MS: Final = 20  # decisions are made at points of the models' grid
@@ -24,7 +24,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
     poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # between looks which models serve
 
     def __post_init__(self) -> None:
-        _refuse(_strange("every_ms", self.every_ms, TASKS))
+        _refuse(_strange("every_ms", self.every_ms, CLASSES))
 
     def every_ns(self, task: str) -> int:
         """Between two decisions of a task."""
@@ -54,8 +54,8 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
     action: Action = Action.ALARM
 
     def __post_init__(self) -> None:
-        labels = [*TASKS[self.task].support, ABNORMAL] if self.task in TASKS else [self.label]
-        wrong = [*_strange("task", [self.task], TASKS), *_strange("label", [self.label], labels)]
+        labels = [*CLASSES[self.task], ABNORMAL] if self.task in CLASSES else [self.label]
+        wrong = [*_strange("task", [self.task], CLASSES), *_strange("label", [self.label], labels)]
         if self.release is not None and self.release > self.at_least:
             wrong.append(f"release {self.release:g} is above at_least {self.at_least:g}")
         _refuse(wrong)

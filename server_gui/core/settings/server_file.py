@@ -32,8 +32,8 @@ from gateway.client import Address, BadAddress
 from gateway.tables.decoding import Decoding
 from gateway.tables.finding import Finding, Told, in_order, lines, mistakes, told, warning
 from gateway.tables.reading import Unreadable, read
-from ml.store import StoreError, default_url
-from ml.store.store import checked_url
+from ml.store import StoreError
+from ml.store.url import checked_url, default_url
 from server_gui.core.settings.prediction import Action, PredictionSettings, RuleSettings
 
 Table = TypeVar("Table", bound=Struct)

@@ -6,6 +6,8 @@ import pytest
 
 from ml.errors import UnusableModel
 from ml.features import FeatureStream, Recipe, features
+from ml.robot import task as tasks
+from ml.robot.classes import ABNORMAL, CLASSES
 from ml.robot.groups import GROUPS, present, unit
 from ml.robot.task import TASKS, recipe_named
 
@@ -128,3 +130,8 @@ def test_activity_does_not_know_left_from_right() -> None:
     phase = recipe_named("gait_phase/hips")
     window = walk(phase, phase.look_back).T[None]
     assert not np.allclose(phase.compute(window), phase.compute(window[:, ::-1]))
+
+
+def test_names_that_need_no_library_are_those_of_the_tasks() -> None:
+    assert {name: tuple(task.support) for name, task in TASKS.items()} == dict(CLASSES)
+    assert ABNORMAL == tasks.ABNORMAL

@@ -11,9 +11,9 @@ from typing import ClassVar
 import pytest
 
 from ml.store import Store, StoreError, StoreRefused, StoreUnreachable, UnsafeStore
-from ml.store.errors import translated
 from ml.store.objects import Objects
 from ml.store.tables import EVENTS
+from ml.store.translation import translated
 from tests.stores import SeaweedFS
 from tests.support.waiting import WAIT_S
 
