@@ -9,9 +9,7 @@ so that only one can; and removes both, the older first, when it has done its wo
 """
 
 import contextlib
-import fcntl
 import hashlib
-import os
 import uuid
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -20,6 +18,7 @@ from typing import Final
 
 import msgspec
 
+from ml.store import locks
 from ml.store.errors import StoreError
 from ml.store.store import Store
 
@@ -48,15 +47,12 @@ def alone(store: Store, location: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
+    with contextlib.ExitStack() as held:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            held.enter_context(locks.of_folder(folder))
         except BlockingIOError:
             raise StoreError(f"{folder} is being compacted by another process") from None
         yield
-    finally:
-        os.close(descriptor)
 
 
 @contextlib.contextmanager

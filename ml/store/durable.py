@@ -6,7 +6,6 @@ is on nothing that did not.
 """
 
 import contextlib
-import fcntl
 import json
 import os
 from collections.abc import Iterable, Iterator
@@ -15,10 +14,12 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote
 
+from ml.store import locks
 from ml.store.private import opener, private_folder
 
 LOG: Final = "_delta_log"
 _MARK: Final = "user.gwrms.lasts"
+_HAS_MARKS: Final = hasattr(os, "setxattr")  # without them, as on macOS, nobody knows what lasts
 _LEVELS: Final = 5  # of folders, from a file in a partition up to the store's own
 _AT_ONCE: Final = 8  # so that the disk can take several in one go
 
@@ -75,7 +76,7 @@ def create(file: Path, data: bytes) -> bool:
 @contextlib.contextmanager
 def unfinished(table: Path) -> Iterator[None]:
     """While there may be commits of ours that do not last yet: nobody sets them aside within the block."""
-    with _locked(table, fcntl.LOCK_SH):
+    with locks.of_folder(table / LOG, shared=True):
         yield
 
 
@@ -83,7 +84,7 @@ def unfinished(table: Path) -> Iterator[None]:
 def undisturbed(table: Path) -> Iterator[bool]:
     """Keep everybody's commits away within the block; False where somebody has some that do not last yet."""
     try:
-        with _locked(table, fcntl.LOCK_EX | fcntl.LOCK_NB):
+        with locks.of_folder(table / LOG):
             yield True
     except BlockingIOError:
         yield False
@@ -91,7 +92,7 @@ def undisturbed(table: Path) -> Iterator[bool]:
 
 def mark(synchronised: Iterable[Path]) -> None:
     """Say of entries or checkpoints that they last."""
-    for file in synchronised:
+    for file in synchronised if _HAS_MARKS else ():
         with contextlib.suppress(OSError):  # not every file system has attributes
             os.setxattr(file, _MARK, b"1")
 
@@ -99,7 +100,7 @@ def mark(synchronised: Iterable[Path]) -> None:
 def is_marked(file: Path) -> bool:
     """Return whether this is known to be synchronised; an entry may be acknowledged then."""
     try:
-        return os.getxattr(file, _MARK) == b"1"
+        return _HAS_MARKS and os.getxattr(file, _MARK) == b"1"
     except OSError:
         return False
 
@@ -121,16 +122,6 @@ def _open(table: Path, newest: int, known: int) -> Iterator[Path]:
         if not file.exists() or is_marked(file):  # not there: the log was cleaned below
             return
         yield file
-
-
-@contextlib.contextmanager
-def _locked(table: Path, how: int) -> Iterator[None]:
-    descriptor = os.open(table / LOG, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, how)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _sync_names(folder: Path) -> None:

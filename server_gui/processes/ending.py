@@ -4,7 +4,8 @@ import signal
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # the last not on Windows
+SIGNALS = tuple(number for name in _NAMES if (number := getattr(signal, name, None)) is not None)
 
 
 class Ended(Exception):

@@ -3,8 +3,6 @@
 import os
 import select
 import sys
-import termios
-import tty
 from enum import Enum
 from typing import Self
 
@@ -92,19 +90,23 @@ class Keyboard:
     """
 
     def __init__(self) -> None:
+        import termios  # not on Windows
+        import tty
+
+        self._termios, self._tty = termios, tty
         self._fd = sys.stdin.fileno() if sys.stdin.isatty() else None
         self._parser = KeyParser()
         self._before: list[int | list[bytes | int]] | None = None
 
     def __enter__(self) -> Self:
         if self._fd is not None:
-            self._before = termios.tcgetattr(self._fd)
-            tty.setcbreak(self._fd)
+            self._before = self._termios.tcgetattr(self._fd)
+            self._tty.setcbreak(self._fd)
         return self
 
     def __exit__(self, *exc: object) -> None:
         if self._fd is not None and self._before is not None:
-            termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
+            self._termios.tcsetattr(self._fd, self._termios.TCSADRAIN, self._before)
 
     def wait(self, timeout_s: float) -> list[Key]:
         """Return the keys pressed; returns at the first ones, or after `timeout_s` with none."""

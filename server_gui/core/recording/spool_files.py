@@ -11,7 +11,6 @@ somebody have removed files, what is written from then on goes to the store unde
 """
 
 import contextlib
-import fcntl
 import logging
 import os
 import re
@@ -22,7 +21,7 @@ from enum import Enum
 from pathlib import Path
 from typing import IO, Final
 
-from ml.store import durable
+from ml.store import durable, locks
 from ml.store.private import closed_folder, opener
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.segment import PAGE_BYTES, SUFFIXES, Segment
@@ -194,15 +193,18 @@ def has_log(file: Path) -> bool:
 def take(folder: Path) -> IO[bytes]:
     """Take the folder's lock, which ends with the process, however that ends."""
     try:
+        locks.check()
         closed_folder(folder)
         lock = open(folder / "lock", "ab", opener=opener)  # noqa: SIM115 - held as long as the spool
+    except locks.NoLocks as error:
+        raise SpoolUnusable(str(error)) from error
     except OSError as error:
         raise SpoolUnusable(
             f"the spool's folder {folder} cannot be used: {error.strerror or error}; "
             'give another one with spool = "…" in [recorder] of the server\'s file'
         ) from error
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        locks.hold(lock.fileno())
     except BlockingIOError as error:
         lock.close()
         raise SpoolUnusable(
