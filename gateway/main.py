@@ -34,6 +34,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "reset": ("gateway.cli.reset:main", "end a held stop: every drive switched off, none enabled"),
     "enable": ("gateway.cli.enable:main", "enable drives, as the master of a bench"),
     "completion": ("gateway.cli.completion:main", "complete commands in bash, zsh and fish"),
+    "docs": ("gateway.cli.docs:main", "the pages of the docs, as they were installed"),
     "eds": ("eds.cli.eds:main", "what an EDS or DCF file says, and what is wrong with it"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
@@ -84,12 +85,12 @@ def find(name: str) -> Callable[[list[str]], int]:
     return function
 
 
-def explain(error: Exception) -> str:
-    """An exception as the sentences a user can act on."""
+def explain(error: Exception, command: str) -> str:
+    """An exception of a command as the sentences a user can act on."""
     if isinstance(error, ModuleNotFoundError) and error.name is not None:
         from gateway import missing
 
-        return missing.explained(error.name)
+        return missing.explained(error.name, command)
     ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
     if ours or isinstance(error, OSError):
         return str(error)
@@ -139,11 +140,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             from gateway.cli.text import say_json
 
             kind = getattr(error, "kind", None) or type(error).__name__
-            say_json({"error": {"kind": str(kind), "message": explain(error)}})
+            say_json({"error": {"kind": str(kind), "message": explain(error, name)}})
         if debug:
             traceback.print_exc()
         else:
-            sys.stderr.write(f"gwrms {name}: {explain(error)}\n")
+            sys.stderr.write(f"gwrms {name}: {explain(error, name)}\n")
         return 1
 
 

@@ -5,6 +5,7 @@ they are also written down in `drawn/commands.json`, from which they are made ag
 """
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -23,6 +24,10 @@ _BRINGS: Final = {  # all else that a robot does not need comes with `collect`
     "skl2onnx": "onnx",
     "google": "onnx",
 }
+_ENOUGH: Final = {
+    "demo": "sim",
+    "top": "sim",
+}  # commands that need less than what else needs the same package
 
 
 class Argument(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -48,14 +53,16 @@ class Page(msgspec.Struct, frozen=True, omit_defaults=True):
     arguments: tuple[Argument, ...] = ()
 
 
-def extra_of(package: str) -> str:
-    """The extra of GWRMS that installs what is imported as `package`."""
-    return _BRINGS.get(package.partition(".")[0], "collect")
+def extra_of(package: str, command: str = "") -> str:
+    """The extra of GWRMS that installs what is imported as `package`, as far as `command` needs it."""
+    return _ENOUGH.get(command) or _BRINGS.get(package.partition(".")[0], "collect")
 
 
-def explained(package: str) -> str:
-    """What to do where this package is missing."""
-    extra = extra_of(package)
+def explained(package: str, command: str = "") -> str:
+    """What to do where `command` misses this package."""
+    if package in sys.stdlib_module_names:
+        return f"this does not run on {sys.platform}, where Python has no {package!r}: use Linux"
+    extra = extra_of(package, command)
     return (
         f"this needs the package {package!r}, which is not installed; "
         f"pip install 'gwrms[{extra}]' brings it (in a checkout: pip install '.[{extra}]')"

@@ -1,20 +1,15 @@
 """A part of GWRMS alone: every help is there, and what is missing is named with the extra that brings it."""
 
 import importlib.metadata
-import re
 import subprocess
 import sys
-import tomllib
-from pathlib import Path
 
 import pytest
 
 from gateway import main, missing
+from tests.support.extras import EXTRAS, ROOT, brought, imported, names, own
 from tools.draw.commands import commands
 
-ROOT = Path(__file__).parents[3]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-EXTRAS = {name: wanted for name, wanted in PROJECT["optional-dependencies"].items() if name != "dev"}
 # In a process of its own: what is imported once cannot be missing any more.
 ASKED = """
 import contextlib, io, sys
@@ -36,19 +31,8 @@ for words in {words}:
 """
 
 
-def _names(requirement: str) -> str:
-    return re.split(r"[\[<>=!;~ ]", requirement)[0].lower().replace("_", "-")
-
-
-def _imported(extra: str) -> set[str]:
-    """What is imported of the packages that this extra names itself."""
-    wanted = set(map(_names, EXTRAS[extra])) - {"gwrms"}
-    found = importlib.metadata.packages_distributions()
-    return {name for name, packages in found.items() if wanted & set(map(_names, packages))} - {"Shiboken"}
-
-
 def test_help_needs_no_extra() -> None:
-    absent = set().union(*map(_imported, EXTRAS))
+    absent = imported(set().union(*map(own, EXTRAS)))
     assert {"rich", "numpy", "PySide6", "obstore"} <= absent
     words = [[name] for name in main.COMMANDS] + [list(one.words) for one in commands()]
     script = ASKED.format(missing=absent, words=words)
@@ -60,11 +44,17 @@ def test_help_needs_no_extra() -> None:
 
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_what_is_missing_is_named_with_an_extra_that_brings_it(extra: str) -> None:
-    brought = {name: set(map(_names, wanted)) for name, wanted in EXTRAS.items()}
     packages = importlib.metadata.packages_distributions()
-    for name in _imported(extra):
-        assert brought[missing.extra_of(name)] & set(map(_names, packages[name])), name
+    for name in imported(own(extra)):
+        assert own(missing.extra_of(name)) & names(packages[name]), name
         assert f"pip install 'gwrms[{missing.extra_of(name)}]'" in missing.explained(name)
+
+
+@pytest.mark.parametrize("command", ["demo", "top"])
+def test_a_command_that_needs_less_says_so(command: str) -> None:
+    assert missing.extra_of("numpy", "collect") == "collect"
+    assert missing.extra_of("numpy", command) == missing.extra_of("rich", command) == "sim"
+    assert {"numpy", "rich"} <= brought("sim")
 
 
 def test_help_that_was_written_down_is_what_the_parser_says() -> None:
