@@ -79,7 +79,7 @@ rated_current = 5.0             # A, where 6075h does not
 """
 
 _NOT_SIMULATED = """
-# Not simulated, so nobody here knows them: {names}. docs/how-to/wire-a-joint.md tells how to describe them.
+# Not simulated, so nobody here knows them: {names}. gwrms docs wire-a-joint tells how to describe them.
 """
 
 _CONTROLLER_TABLE = """

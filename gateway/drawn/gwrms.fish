@@ -50,7 +50,7 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
 set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
 
 complete -c gwrms -e
@@ -186,6 +186,8 @@ complete -c gwrms -n '_shtab_gwrms_using enable' -l json -d 'one JSON object a l
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a completion -d 'Print what completes commands, options and files in a shell.'
 complete -c gwrms -n '_shtab_gwrms_using completion' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using completion; and test $_shtab_gwrms_npos -eq 0' -ka "bash zsh fish" -d shell
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a docs -d 'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
+complete -c gwrms -n '_shtab_gwrms_using docs' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a eds -d 'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
 complete -c gwrms -n '_shtab_gwrms_using eds' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using eds' -l node-id -x -d 'node id for COB-IDs that depend on it (1)'
@@ -470,7 +472,7 @@ complete -c gwrms -n '_shtab_gwrms_using sim' -l without -x -d 'joints, and gait
 complete -c gwrms -n '_shtab_gwrms_using sim' -l scenario -xka "walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day" -d 'default: walk'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l imu -xka "bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can" -d 'default: witmotion'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l insole -xka "brilliant-star insole-cobs insole-csv insole-frame" -d 'default: insole-cobs'
-complete -c gwrms -n '_shtab_gwrms_using sim' -l script -xka "(__fish_complete_path (commandline -ct))" -d 'a scenario file: what happens, and when'
+complete -c gwrms -n '_shtab_gwrms_using sim' -l script -xka "(__fish_complete_path (commandline -ct))" -d 'a scenario file, or one that ships: what happens, and when'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l seconds -x -d 'end after N seconds (default: run on)'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l speed -x -d 'times as fast as real time; max for as fast as it goes (default: 1)'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l seed -x -d 'of noise, losses and strides; same seed, same bytes (default: 0)'
@@ -481,7 +483,7 @@ complete -c gwrms -n '_shtab_gwrms_using sim; and test $_shtab_gwrms_npos -eq 0'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -l dir -xka "(__fish_complete_path (commandline -ct))" -d 'of the robot and of gateway.log; a robot.toml there is used (default: a new one)'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -l speed -x -d 'of the robot; the gateway'"'"'s own patience stays in real time (default: 1)'
-complete -c gwrms -n '_shtab_gwrms_using sim run; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a scenario'
+complete -c gwrms -n '_shtab_gwrms_using sim run; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a scenario, or one that ships, by name'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sim-record -d 'Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l out -xka "(__fish_complete_path (commandline -ct))" -d 'what is written; replaced'

@@ -20,6 +20,7 @@ _shtab_gwrms_commands() {
     cost:'What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.'
     demo:'A simulated exoskeleton, its gateway and a live view, with one command.'
     describe:'What a robot is made of: its components and what is wrong with them, its channels and their units,'
+    docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
     enable:'Enable drives, one confirmed transition at a time.'
     evaluate:'How well predictions hold for people, real or simulated, whom no model has seen.'
@@ -381,6 +382,14 @@ _shtab_gwrms_describe_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_describe_defaults_added=0
+
+_shtab_gwrms_docs_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  ":as in the list, or a link to it:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_docs_defaults_added=0
 
 _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -835,7 +844,7 @@ _shtab_gwrms_sim_options=(
   "--scenario[default\: walk]:scenario:(walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--imu[default\: witmotion]:imu:(bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can)"
   "--insole[default\: insole-cobs]:insole:(brilliant-star insole-cobs insole-csv insole-frame)"
-  "--script[a scenario file\: what happens, and when]:FILE:_files"
+  "--script[a scenario file, or one that ships\: what happens, and when]:FILE:_files"
   "--seconds[end after N seconds (default\: run on)]:N:"
   "--speed[times as fast as real time\; max for as fast as it goes (default\: 1)]:N:"
   "--seed[of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
@@ -880,7 +889,7 @@ _shtab_gwrms_sim_run_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--dir[of the robot and of gateway.log\; a robot.toml there is used (default\: a new one)]:DIR:_files"
   "--speed[of the robot\; the gateway\'s own patience stays in real time (default\: 1)]:N:"
-  "(*):a scenario:_files"
+  "(*):a scenario, or one that ships, by name:_files"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -990,6 +999,7 @@ _shtab_gwrms() {
         cost) _arguments -C -s $_shtab_gwrms_cost_options ;;
         demo) _arguments -C -s $_shtab_gwrms_demo_options ;;
         describe) _arguments -C -s $_shtab_gwrms_describe_options ;;
+        docs) _arguments -C -s $_shtab_gwrms_docs_options ;;
         eds) _arguments -C -s $_shtab_gwrms_eds_options ;;
         enable) _arguments -C -s $_shtab_gwrms_enable_options ;;
         evaluate) _arguments -C -s $_shtab_gwrms_evaluate_options ;;

@@ -22,7 +22,7 @@ from hil_sim.truth import phases
 _DESCRIPTION = """\
 Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and
 resolution of drives, insoles and IMU), together with what is really so. It needs no gateway and runs several
-times as fast as real time. Models learn from it: see docs/explanation/prediction.md.
+times as fast as real time. Models learn from it: see gwrms docs explanation/prediction.
 """
 
 _EPILOG = """\

@@ -82,8 +82,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str]) -> int:
     """Play; returns the exit code."""
+    parser = _parser()
+    if {"-h", "--help"} & set(argv):  # also behind --replay, which wants a file
+        parser.print_help()
+        return 0
     try:
-        arguments = _parser().parse_args(argv)
+        arguments = parser.parse_args(argv)
     except SystemExit as leave:
         return 2 if leave.code else 0
     robot = ReplayedRobot(

@@ -11,6 +11,7 @@ from hil_sim.cli.arguments import speed
 from hil_sim.scenario import report
 from hil_sim.scenario.runner import run
 from hil_sim.scenario.script import Script, load
+from hil_sim.scenario.shipped import locate, shipped
 from hil_sim.scenario.table import ScenarioError
 
 _DESCRIPTION = """\
@@ -18,12 +19,15 @@ Runs scenario files: each with a simulated robot and a gateway of its own, as a 
 happens to the robot, and what they expect of the gateway and of the robot is checked at the end.
 """
 
-_EPILOG = """\
+_EPILOG = f"""\
 exit codes: 0 all that was expected is so; 1 something is not, or it could not be run; 2 wrong usage, or a
-file that is no scenario. docs/how-to/bench.md tells how to write one; those in scenarios/ are examples.
+file that is no scenario. gwrms docs bench tells how to write one.
+
+scenarios that ship, found by their names
+  {", ".join(shipped())}
 
 example
-  gwrms sim run scenarios/node_lost.toml
+  gwrms sim run node_lost
 """
 
 
@@ -37,7 +41,9 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="a scenario")
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="a scenario, or one that ships, by name"
+    )
     parser.add_argument(
         "--dir",
         type=Path,
@@ -61,7 +67,7 @@ def main(argv: list[str]) -> int:
     except SystemExit as leave:
         return 2 if leave.code else 0
     try:
-        scripts = [load(file) for file in arguments.files]
+        scripts = [load(locate(file)) for file in arguments.files]
     except ScenarioError as error:
         sys.stderr.write(f"gwrms sim run: {error}\n")
         return 2

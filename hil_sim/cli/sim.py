@@ -12,6 +12,7 @@ from hil_sim.exoskeleton import CONTROLLER, JOINTS, Scenario
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
+from hil_sim.scenario.shipped import locate
 from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
 _DESCRIPTION = """\
@@ -76,7 +77,7 @@ sensors
 scenario files
   gwrms sim run FILE        runs it against a gateway and checks what it expects (--help says more)
   gwrms sim --script FILE   only lets happen what it says, for a gateway of your own
-  Those in the folder scenarios/ are examples.
+  Those that ship are found by their names, as in gwrms sim run node_lost.
 
 recordings
   gwrms sim --dir DIR --replay FILE …
@@ -140,7 +141,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--insole", choices=INSOLES, default=SensorChoice().insole, help="default: %(default)s"
     )
-    parser.add_argument("--script", type=Path, metavar="FILE", help="a scenario file: what happens, and when")
+    parser.add_argument(
+        "--script",
+        type=Path,
+        metavar="FILE",
+        help="a scenario file, or one that ships: what happens, and when",
+    )
     parser.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds (default: run on)")
     parser.add_argument(
         "--speed",
@@ -176,7 +182,7 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
     arguments = parser.parse_args(argv)
     if arguments.script is None:
         return arguments, Script()
-    script = load(arguments.script)
+    script = load(locate(arguments.script))
     parser.set_defaults(
         scenario=script.scenario,
         seed=script.seed,

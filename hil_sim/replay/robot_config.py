@@ -12,7 +12,7 @@ from hil_sim.replay.can_log import ReplayError
 _TEXT = """\
 # A recording, described for a gateway:  gwrms gateway {path}
 # The recording does not say what the robot is made of. Take its own robot.toml for that, with this bus and
-# these ports in it, or describe it here: docs/how-to/wire-a-joint.md and wire-a-sensor.md say how.
+# these ports in it, or describe it here: gwrms docs wire-a-joint and wire-a-sensor say how.
 
 [robot]
 name = "recording"

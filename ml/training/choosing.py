@@ -23,7 +23,7 @@ def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
     offered = {recipe.name: recipe for there in channels if (recipe := task.recipe(there))}
     if not offered:
         raise UnusableData(
-            f"no session has the channels that {task.name} takes (docs/explanation/prediction.md lists them)"
+            f"no session has the channels that {task.name} takes (see gwrms docs explanation/prediction)"
         )
     having = {
         name: sum(there >= set(recipe.channels) for there in channels) for name, recipe in offered.items()

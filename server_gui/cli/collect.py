@@ -57,7 +57,7 @@ the server's file (without --config: ~/.config/gwrms/server.toml, if it is there
   batch_s = 60                     # of recording that go to the store together
 
   [prediction]
-  enabled = true                   # what models say of each robot is recorded too; docs/how-to/predict.md
+  enabled = true                   # what models say of each robot is recorded too; gwrms docs predict
 
 examples
   gwrms collect --robot exo-01=192.0.2.7:7420 --operator Ada --notes "new insoles"

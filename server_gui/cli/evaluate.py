@@ -13,7 +13,7 @@ from ml.store.private import private_files
 EPILOG = f"""benchmarks
 {chr(10).join(f"  {one.name:<16} {one.asks}" for one in BENCHMARKS.values())}
 
-The recordings are .npz files of their own; docs/explanation/prediction.md says where they come from and
+The recordings are .npz files of their own; gwrms docs explanation/prediction says where they come from and
 what is in them.
 Those of sim-… are synthetic: gwrms sim-record writes them.
 Subjects are never on both sides, seeds are fixed and features look back only. Settings are fixed in the code;

@@ -28,7 +28,7 @@ _PLAIN: Final = (
 )
 _encoder = msgspec.json.Encoder(decimal_format="number")
 EPILOG = """The tables are telemetry, sessions, resources, events, journal, labels and predictions; their
-columns are in docs/reference/store.md, and `gwrms query "DESCRIBE telemetry"` shows them. A channel is a
+columns are in gwrms docs store, and `gwrms query "DESCRIBE telemetry"` shows them. A channel is a
 column; its name has a dot, so write it in double quotes. Name a robot and a time where you can: the rest is
 not read.
 

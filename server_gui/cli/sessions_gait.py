@@ -21,7 +21,7 @@ from server_gui.core.processing.recording import RecordedGait, summarise
 from server_gui.core.processing.wiring import Wiring
 
 EPILOG = """Means over all strides of which nothing is missing; where events come from, and every formula, is
-in docs/explanation/processing.md. A minute of recording takes a quarter of a second.
+in gwrms docs processing. A minute of recording takes a quarter of a second.
 
 example
   gwrms sessions gait 20261121T1530 --from 10 --to 70"""

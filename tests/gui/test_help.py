@@ -1,9 +1,5 @@
 """Help: every view has its section of the manual, by F1 and by a button, in the manual's own words."""
 
-import os
-import subprocess
-import sys
-import zipfile
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -58,18 +54,3 @@ def test_a_reset_layout_has_no_help(window: MainWindow) -> None:
     window.reset_layout()
     assert not window.help.isVisible()
     assert all(dock.isVisible() for dock in window.findChildren(QDockWidget) if dock.windowTitle() != "Help")
-
-
-def test_the_manual_is_in_what_is_installed(tmp_path: Path) -> None:
-    built = subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
-        cwd=DOCS.parents[2],
-        env=os.environ | {"PYTHONPATH": ""},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert built.returncode == 0, built.stderr
-    (wheel,) = tmp_path.glob("*.whl")
-    with zipfile.ZipFile(wheel) as files:
-        assert files.read(f"server_gui/{manual.SHIPPED}") == DOCS.read_bytes()

@@ -295,3 +295,12 @@ def test_wrong_usage_of_replay_is_2(
 ) -> None:
     assert main(["--dir", str(tmp_path), *arguments]) == 2
     assert "usage: gwrms sim" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--replay", "--help"], ["--replay-serial", "-h"], ["--help", "--replay"]]
+)
+def test_help_needs_no_recording(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 0
+    said = capsys.readouterr()
+    assert (said.out.startswith("usage: gwrms sim --dir DIR [--replay FILE"), said.err) == (True, "")

@@ -1,0 +1,47 @@
+"""`gwrms docs`: the pages that help and messages name, where there is no network."""
+
+import argparse
+
+from gateway.cli.text import did_you_mean, say, table, warn
+from gateway.pages import find, pages, title
+
+_DESCRIPTION = """\
+Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page's own name
+will do where no other page has it.
+"""
+_EPILOG = """\
+exit codes: 0 printed; 1 there is no such page; 2 usage
+
+examples
+  gwrms docs
+  gwrms docs first-robot | less
+  gwrms docs reference/robot-toml
+"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms docs`."""
+    wanted = _parser().parse_args(argv).page
+    known = pages()
+    if wanted is None:
+        say(table(("PAGE", ""), [(name, title(page)) for name, page in known.items()]))
+        return 0
+    page = find(wanted)
+    if page is not None:
+        say(page.read_text(encoding="utf-8"))
+        return 0
+    close = did_you_mean(wanted, {*known, *(name.rpartition("/")[2] for name in known)})
+    warn("docs", f"there is no page {wanted!r}{close or '; all are listed by gwrms docs'}")
+    return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms docs",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("page", nargs="?", metavar="PAGE", help="as in the list, or a link to it")
+    return parser

@@ -1,0 +1,32 @@
+"""The pages of the docs: as they were installed, or as they lie in a working copy."""
+
+from pathlib import Path
+from typing import Final
+
+_INSTALLED: Final = Path(__file__).with_name("docs")
+_WORKING_COPY: Final = Path(__file__).parents[1] / "docs"
+
+
+def folder() -> Path:
+    """Where the pages are."""
+    return _INSTALLED if _INSTALLED.is_dir() else _WORKING_COPY
+
+
+def pages() -> dict[str, Path]:
+    """Every page by its name, such as `how-to/predict`."""
+    found = sorted(folder().rglob("*.md"))
+    return {str(page.relative_to(folder()).with_suffix("")): page for page in found}
+
+
+def find(name: str) -> Path | None:
+    """The page that is meant by `how-to/predict`, `predict` or a link to it; None where there is none."""
+    known = pages()
+    by_last = {page.rpartition("/")[2]: path for page, path in known.items()}
+    wanted = name.removeprefix("docs/").removesuffix(".md")
+    return known.get(wanted) or by_last.get(wanted)
+
+
+def title(page: Path) -> str:
+    """What a page is about: its first heading."""
+    with page.open(encoding="utf-8") as lines:
+        return next((line.strip("# \n") for line in lines if line.startswith("# ")), "")
