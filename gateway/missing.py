@@ -16,6 +16,9 @@ FOLDER: Final = Path(__file__).with_name("drawn")  # by tools/draw/packaged.py
 DRAWN: Final = "commands.json"
 _BRINGS: Final = {  # all else that a robot does not need comes with `collect`
     "rich": "sim",
+    "duckdb": "query",
+    "mcap": "query",
+    "mcap_ros2": "query",
     "PySide6": "server",
     "PySide6-Essentials": "server",
     "pyqtgraph": "server",

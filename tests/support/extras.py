@@ -14,6 +14,7 @@ PROJECT: Final = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf
 EXTRAS: Final[dict[str, list[str]]] = {
     name: wanted for name, wanted in PROJECT["optional-dependencies"].items() if name != "dev"
 }
+NEVER: Final = {"Shiboken", "_duckdb", "adbc_driver_duckdb"}  # they come along, and we do not import them
 
 
 def names(requirements: Iterable[str]) -> set[str]:
@@ -53,6 +54,6 @@ def _required(name: str, extras: Iterable[str]) -> list[str]:
 
 
 def imported(packages: set[str]) -> set[str]:
-    """The names by which what is in these packages is imported."""
+    """The names by which we import what is in these packages."""
     found = importlib.metadata.packages_distributions()
-    return {name for name, of in found.items() if packages & set(map(canonicalize_name, of))} - {"Shiboken"}
+    return {name for name, of in found.items() if packages & set(map(canonicalize_name, of))} - NEVER

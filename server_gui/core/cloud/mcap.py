@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 import pyarrow as pa
-from mcap.records import Schema
-from mcap_ros2.writer import Writer
 
 from ml.store.sessions import Session
 from server_gui.core.atomic_files import draft
@@ -16,6 +14,10 @@ from server_gui.core.cloud.ros import definition, header
 from server_gui.core.cloud.selection import Recording, Row
 from server_gui.core.cloud.topics import Message, Topic, ros_name, topics
 from server_gui.core.recording.batching import EventKind
+
+if TYPE_CHECKING:
+    from mcap.records import Schema
+    from mcap_ros2.writer import Writer
 
 EVENTS_TOPIC: Final = "/diagnostics"
 _LEVELS: Final = {EventKind.MARKER.value: 0, EventKind.LOST.value: 2}  # of DiagnosticStatus; others are 1
@@ -28,6 +30,8 @@ def write_mcap(file: Path, recording: Recording) -> int:
 
     The session is in the file's metadata, and so are the channels' units, which ROS's messages do not say.
     """
+    from mcap_ros2.writer import Writer  # of an extra that a collector does not need
+
     robot = recording.session.robot
     with draft(file) as written, written.open("wb") as out, Writer(out) as writer:
         mcap = _Mcap(writer)
@@ -47,7 +51,7 @@ def write_mcap(file: Path, recording: Recording) -> int:
 class _Mcap:
     """Messages by topic; each kind's definition is written once."""
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, writer: "Writer") -> None:
         self.written = 0
         self._writer = writer
         self._schemas: dict[str, Schema] = {}

@@ -3,9 +3,8 @@
 import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-import duckdb
 import pyarrow as pa
 
 from ml.store import reading
@@ -13,6 +12,9 @@ from ml.store.errors import StoreError
 from ml.store.store import Store
 from ml.store.tables import SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
+
+if TYPE_CHECKING:
+    import duckdb
 
 ROWS_AT_ONCE: Final = 20_000
 TOLD: Final = 3  # of contradictions
@@ -69,8 +71,10 @@ class Merge:
                 yield reader.cast(schema)
 
     @contextlib.contextmanager
-    def _opened(self) -> Iterator[tuple[duckdb.DuckDBPyConnection, list[str]]]:
+    def _opened(self) -> Iterator[tuple["duckdb.DuckDBPyConnection", list[str]]]:
         """Both sides' rows as the views `ours` and `theirs`, with the same columns."""
+        import duckdb  # of an extra that a collector does not need
+
         sides = {"ours": self._source, "theirs": self._target}
         with (
             translated(f"{self._source.url}/{self._table.name} cannot be compared with {self._target.url}"),
@@ -107,6 +111,8 @@ class Merge:
 
 @contextlib.contextmanager
 def _said() -> Iterator[None]:
+    import duckdb
+
     try:
         yield
     except duckdb.Error as error:

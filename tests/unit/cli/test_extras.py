@@ -32,8 +32,15 @@ DESK = sorted(
     )
     for file in (ROOT / part).rglob("[!_]*.py")
 )
-WINDOW = [*DESK, "server_gui.app"]
-FOR = {None: BASE, "sim": [*BASE, *TERMINAL], "collect": [*BASE, *DESK], "server": [*BASE, *WINDOW]}
+ASKING = ["server_gui.cli.query", "ml.store.query"]
+COLLECTING = [name for name in DESK if name not in ASKING]
+FOR = {
+    None: BASE,
+    "sim": [*BASE, *TERMINAL],
+    "collect": [*BASE, *COLLECTING],
+    "query": DESK,
+    "server": [*DESK, "server_gui.app"],
+}
 # In a process of its own: what is imported once cannot be missing any more.
 ALONE = """
 import importlib, sys
