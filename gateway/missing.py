@@ -68,7 +68,8 @@ def explained(package: str, command: str = "") -> str:
     extra = extra_of(package, command)
     return (
         f"this needs the package {package!r}, which is not installed; "
-        f"pip install 'gwrms[{extra}]' brings it (in a checkout: pip install '.[{extra}]')"
+        f"pip install 'gwrms[{extra}]' brings it (in a checkout: pip install '.[{extra}]'); "
+        "gwrms docs install says more"
     )
 
 

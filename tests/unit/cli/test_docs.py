@@ -71,6 +71,15 @@ def test_a_page_that_is_not_meant_clearly(name: str, words: str, capsys: pytest.
     assert words in capsys.readouterr().err
 
 
+def test_pip_is_shown_with_an_environment_to_install_into() -> None:
+    shown = [
+        page for page in [*pages.pages().values(), ROOT / "README.md"] if "pip install" in page.read_text()
+    ]
+    assert shown
+    for page in shown:
+        assert re.search(r"-m venv |\bpipx install", page.read_text(encoding="utf-8")), page
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[zipfile.ZipFile]:
     folder = tmp_path_factory.mktemp("wheel")
