@@ -30,7 +30,7 @@ BY_HAND: Final[Mapping[str, tuple[str, ...]]] = {
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
     "how-to/install.md": ("the package index",),
     "how-to/record.md": ("root, and systemd",),
-    "how-to/release.md": ("a clone to build, and the package index",),
+    "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
     "how-to/run-as-a-service.md": ("root, and systemd",),
     "how-to/train.md": ("a wearer who steps for more than a minute, and a model of others", "a Dask cluster"),
     "how-to/wire-a-joint.md": ("root, and a CAN adapter",),
