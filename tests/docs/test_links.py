@@ -6,7 +6,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-_PARTS = ("docs", "tests", "eds", "hil_sim", "drivers", "gateway", "server_gui", "ml")
+_PARTS = (
+    "docs",
+    "docker",
+    "scenarios",
+    "tests",
+    "tools",
+    "gwrms",
+    "eds",
+    "hil_sim",
+    "drivers",
+    "gateway",
+    "server_gui",
+    "ml",
+)
 PAGES = sorted([*ROOT.glob("*.md"), *(page for part in _PARTS for page in (ROOT / part).rglob("*.md"))])
 _FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]*))?\)")
