@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "blame": ("gateway.cli.blame:main", "when the control loop is late, and what ran instead"),
     "watch": ("gateway.cli.watch:main", "follow channels live"),
     "top": ("server_gui.cli.top:main", "one robot in the terminal, live: tune, stop, reset"),
+    "plot": ("server_gui.cli.plot:main", "channels over time, in the window or the terminal"),
     "get": ("gateway.cli.get:main", "read parameters from the devices"),
     "set": ("gateway.cli.set:main", "change parameters, all or none, read back"),
     "params": ("gateway.cli.params:main", "parameters as files: save, compare, apply"),

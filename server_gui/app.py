@@ -6,7 +6,7 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,7 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
+from gateway.units import Units
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
@@ -26,7 +27,6 @@ from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.prediction.news import PredictionNews
-from server_gui.core.processing.units import Units
 from server_gui.core.settings.server_file import ServerSettings, name_of
 from server_gui.core.tuning.link import Link
 from server_gui.processes.own_robot import OwnRobot
@@ -205,10 +205,12 @@ def run(
     seconds: float | None = None,
     record: Record | None = None,
     file: Path | None = None,
+    signals: Sequence[str] = (),
 ) -> int:
     """Open the window until it is closed, or for so many seconds; the exit status.
 
-    `file` has the settings; without one they are not to be changed.
+    `file` has the settings; without one they are not to be changed. `signals` are globs of channels to begin
+    with.
     """
     sys.setswitchinterval(SWITCH_S)
     qt = QApplication(sys.argv[:1])
@@ -218,6 +220,8 @@ def run(
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())
+        if signals:
+            app.window.show_signals(signals)
         app.window.show()
         if seconds is not None:
             QTimer.singleShot(round(seconds * 1000), qt.quit)

@@ -30,7 +30,7 @@ exit codes: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
 
 examples
   gwrms check robot.toml
-  gwrms check --no-machine --json robot.toml server.toml *.toml
+  gwrms check --no-machine --json *.toml
   gwrms check --schema robot > robot.schema.json
 """
 

@@ -1,7 +1,9 @@
 """`gwrms get`: parameters, as the devices have them now."""
 
 from gateway.cli.connect import check_names, connect, parameter_names, parser, widened
+from gateway.cli.shown import add_degrees, unit_of
 from gateway.cli.text import exact, say, say_json, table
+from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 EPILOG = """examples:
@@ -19,6 +21,7 @@ def main(argv: list[str]) -> int:
         nargs="*",
         help="names, addresses, globs, or a component (default: all that can be changed)",
     )
+    add_degrees(made)
     arguments = made.parse_args(argv)
     with connect(arguments, "get") as robot:
         description = robot.describe()
@@ -29,12 +32,20 @@ def main(argv: list[str]) -> int:
         say_json({"values": values})
     else:
         infos = {info.name: info for info in description.parameters}
-        rows = [_row(infos[name], value) for name, value in values.items()]
+        rows = [
+            _row(infos[name], value, unit_of(value.unit, degrees=arguments.deg))
+            for name, value in values.items()
+        ]
         say(table(("PARAMETER", "VALUE", "UNIT", "RANGE", ""), rows, right=(1,)))
     return 1 if any(value.value is None for value in values.values()) else 0
 
 
-def _row(info: ParameterInfo, value: ParameterValue) -> tuple[str, ...]:
+def _row(info: ParameterInfo, value: ParameterValue, unit: Unit) -> tuple[str, ...]:
     read_only = f"read-only: {info.read_only}" if info.read_only else ""
-    bounds = f"{exact(value.min)} … {exact(value.max)}"
-    return info.name, exact(value.value), value.unit, bounds, value.problem or read_only
+    held, low, high = (_text(number, unit) for number in (value.value, value.min, value.max))
+    return info.name, held, unit.symbol, f"{low} … {high}", value.problem or read_only
+
+
+def _text(value: float | None, unit: Unit) -> str:
+    """A value with every digit that it has; in another unit, with those that are worth reading."""
+    return exact(value) if value is None or unit.symbol == unit.si else f"{value * unit.scale:.6g}"

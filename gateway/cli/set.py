@@ -1,12 +1,16 @@
 """`gwrms set`: parameters changed, all or none."""
 
 import argparse
-import contextlib
-import math
+import re
+from dataclasses import dataclass
+from typing import Final
 
 from gateway.cli.connect import check_names, connect, parameter_names, parser
 from gateway.cli.writing import add_trial, write
+from gateway.client import ClientError
 from gateway.coding import Number
+from gateway.units import unit_named
+from gateway.wire.robot import Description
 
 EPILOG = """All changes happen or none: they are checked first, written, read back from the devices, and
 taken back if one fails. Somebody else may be the one writer; then nothing is changed and it is said.
@@ -15,40 +19,67 @@ With --trial they are taken back by the robot itself after that time, and at onc
 any way, its terminal, computer or network included. Enter keeps them.
 
 examples:
-  gwrms set gait.step_length=0.42 left_knee.max_torque=0.8
+  gwrms set gait.step_length=0.42 left_knee.max_torque=40
+  gwrms set gait.trunk_angle=3deg gait.step_length=420mm
   gwrms set --trial 30 gait.cycle_time=1.1"""
+
+
+class UnknownUnit(ClientError):
+    """A value is given in a unit that its parameter cannot be in."""
+
+
+_CHANGE: Final = re.compile(r"([^=]+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) ?([^\d\s.].*)?")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What was typed: a number as it stands, and its unit, where one was given."""
+
+    name: str
+    number: str
+    unit: str | None
 
 
 def main(argv: list[str]) -> int:
     """Run `gwrms set`."""
     made = parser("set", "Change parameters: all or none, limit-checked, read back.", EPILOG)
     made.add_argument(
-        "changes", metavar="NAME=VALUE", nargs="+", type=_change, help="in the parameter's own unit"
+        "changes",
+        metavar="NAME=VALUE[UNIT]",
+        nargs="+",
+        type=_change,
+        help="in the parameter's own unit, or in another: 3deg, 420mm, 30rpm",
     )
     add_trial(made)
     arguments = made.parse_args(argv)
-    changes = dict(arguments.changes)
-    if len(changes) != len(arguments.changes):
+    if len({change.name for change in arguments.changes}) != len(arguments.changes):
         made.error("a parameter is named twice")
     with connect(arguments, "set") as robot:
         description = robot.describe()
-        check_names("parameter", changes, parameter_names(description))
+        check_names("parameter", [each.name for each in arguments.changes], parameter_names(description))
+        changes = {each.name: _value(each, description) for each in arguments.changes}
         return write(robot, changes, description, arguments)
 
 
-def _change(text: str) -> tuple[str, Number]:
-    name, equals, number = text.partition("=")
-    value = _number(number)
-    if not name or not equals or not math.isfinite(value):
+def _change(text: str) -> Change:
+    found = _CHANGE.fullmatch(text)
+    if found is None:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not NAME=VALUE with a number, as in gait.step_length=0.42"
+            f"{text!r} is not NAME=VALUE with a number, as in gait.step_length=0.42 or gait.trunk_angle=3deg"
         )
-    return name, value
+    return Change(found[1], found[2], found[3])
 
 
-def _number(text: str) -> Number:
-    """A whole number as such, so that none of its digits is lost; no number is NaN."""
-    for kind in (int, float):
-        with contextlib.suppress(ValueError):
-            return kind(text)
-    return math.nan
+def _value(change: Change, description: Description) -> Number:
+    """The value in the parameter's own unit; a whole number as such, so that none of its digits is lost."""
+    if change.unit is None:
+        return int(change.number) if change.number.lstrip("+-").isdecimal() else float(change.number)
+    si = next(
+        info.unit
+        for info in description.parameters
+        if change.name in (info.name, f"{info.component}.{info.object}")
+    )
+    try:
+        return unit_named(change.unit, si).si_value(change.number)
+    except ValueError as error:
+        raise UnknownUnit(f"{change.name}: {error}") from error

@@ -1,8 +1,10 @@
 """`gwrms watch`: channels, live."""
 
 import argparse
+import csv
 import fnmatch
 import itertools
+import sys
 from collections.abc import Iterator, Sequence
 
 from gateway.cli.arguments import number
@@ -14,10 +16,11 @@ from gateway.cli.connect import (
     parser,
     widened,
 )
+from gateway.cli.shown import Channels, add_degrees, utc
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, Robot
 from gateway.wire.component import ChannelInfo
-from gateway.wire.robot import Description
+from gateway.wire.robot import Clock, Description
 from gateway.wire.stream import ModuleName
 
 Row = tuple[int, dict[str, float | None]]
@@ -25,12 +28,14 @@ Row = tuple[int, dict[str, float | None]]
 MIN_WIDTH = 12
 
 EPILOG = """A missing or stale value is a dash (null with --json), never the old number. Time is the
-robot's, in seconds since the first line. Rows that were lost on the way are said on stderr.
-Ctrl-C ends it.
+robot's, in seconds since the first line; --json and --csv have it as UTC too, by the robot's own clock. Rows
+that were lost on the way are said on stderr. Ctrl-C ends it.
 
 examples:
   gwrms watch left_knee.position --rate 50
-  gwrms watch '*_insole.force' --count 100 --json > forces.jsonl"""
+  gwrms watch left_knee --deg
+  gwrms watch '*_insole.force' --count 100 --json > forces.jsonl
+  gwrms watch '*.position' --rate 100 --csv > walk.csv"""
 
 
 def main(argv: list[str]) -> int:
@@ -42,19 +47,26 @@ def main(argv: list[str]) -> int:
     made.add_argument(
         "--rate", type=_rate, default=10.0, metavar="HZ", help="ticks a second, 0.1 to 1000 (default 10)"
     )
+    made.add_argument(
+        "--csv", action="store_true", help="comma-separated, a column a channel; empty is missing"
+    )
+    add_degrees(made)
     made.add_argument("--count", type=_count, metavar="N", help="end after N lines")
     arguments = made.parse_args(argv)
     with connect(arguments, "watch") as robot:
         description = robot.describe()
         channels = widened(arguments.channels, description)
         check_names("channel", channels, channel_names(description), absent_components(description))
-        modules = _modules(channels, description)
-        rows = itertools.islice(_rows(robot, channels, modules, arguments.rate), arguments.count)
+        meant = _meant(channels, description)
+        rows = itertools.islice(_rows(robot, channels, _modules(meant), arguments.rate), arguments.count)
         try:
+            shown = Channels(description, degrees=arguments.deg)
             if arguments.json:
-                _follow_json(rows)
+                _follow_json(rows, description.clock)
+            elif arguments.csv:
+                _follow_csv(rows, [each.name for each in meant], shown, description.clock)
             else:
-                _follow(rows, description)
+                _follow(rows, shown)
         except KeyboardInterrupt:
             return 0  # how a watch ends
     return 0
@@ -73,13 +85,14 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _modules(globs: Sequence[str], description: Description) -> list[ModuleName]:
+def _meant(globs: Sequence[str], description: Description) -> list[ChannelInfo]:
+    return [each for each in description.channels if any(fnmatch.fnmatchcase(each.name, g) for g in globs)]
+
+
+def _modules(channels: Sequence[ChannelInfo]) -> list[ModuleName]:
     """The modules that give the channels: the computer's own are the resource module's."""
-    wanted = (
-        known for known in description.channels if any(fnmatch.fnmatchcase(known.name, g) for g in globs)
-    )
     modules: set[ModuleName] = {
-        "resource" if channel.component == "resource" else "component" for channel in wanted
+        "resource" if channel.component == "resource" else "component" for channel in channels
     }
     return sorted(modules)
 
@@ -106,29 +119,37 @@ def _report_losses(batch: Batch, dropped: int, shed: int) -> None:
         )
 
 
-def _follow_json(rows: Iterator[Row]) -> None:
+def _follow_json(rows: Iterator[Row], clock: Clock) -> None:
     for stamp_ns, values in rows:
-        say_json({"stamp_ns": stamp_ns, "values": values})
+        say_json({"stamp_ns": stamp_ns, "utc": utc(stamp_ns, clock), "values": values})
 
 
-def _follow(rows: Iterator[Row], description: Description) -> None:
-    channels = {channel.name: channel for channel in description.channels}
+def _follow_csv(rows: Iterator[Row], names: Sequence[str], shown: Channels, clock: Clock) -> None:
+    out = csv.writer(sys.stdout, lineterminator="\n")
+    out.writerow(["utc", "stamp_ns", *map(shown.title, names)])
+    for stamp_ns, values in rows:
+        cells = (shown.value(name, values.get(name)) for name in names)
+        out.writerow([utc(stamp_ns, clock), stamp_ns, *("" if cell is None else cell for cell in cells)])
+        sys.stdout.flush()
+
+
+def _follow(rows: Iterator[Row], shown: Channels) -> None:
     first_ns: int | None = None
     widths: dict[str, int] = {}
     for stamp_ns, values in rows:
         first_ns = stamp_ns if first_ns is None else first_ns
         if values.keys() != widths.keys():
-            widths = {name: _width(name, channels.get(name)) for name in values}
-            titles = (_title(name, channels.get(name)).rjust(width) for name, width in widths.items())
+            widths = {name: _width(name, shown) for name in values}
+            titles = (shown.title(name).rjust(width) for name, width in widths.items())
             say("  ".join([f"{'s':>9}", *titles]) + "\n")
-        cells = (measured(values[name], channels.get(name)).rjust(width) for name, width in widths.items())
+        cells = (
+            measured(shown.value(name, values[name]), shown.info(name)).rjust(width)
+            for name, width in widths.items()
+        )
         say("  ".join([f"{(stamp_ns - first_ns) / 1e9:9.3f}", *cells]) + "\n")
 
 
-def _title(name: str, channel: ChannelInfo | None) -> str:
-    return f"{name} [{channel.unit}]" if channel is not None and channel.unit else name
-
-
-def _width(name: str, channel: ChannelInfo | None) -> int:
+def _width(name: str, shown: Channels) -> int:
+    channel = shown.info(name)
     words = (channel.enum or {}).values() if channel is not None else ()
-    return max(MIN_WIDTH, len(_title(name, channel)), *map(len, words))
+    return max(MIN_WIDTH, len(shown.title(name)), *map(len, words))

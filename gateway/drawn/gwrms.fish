@@ -50,7 +50,7 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
 set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
 
 complete -c gwrms -e
@@ -111,15 +111,23 @@ complete -c gwrms -n '_shtab_gwrms_using watch' -s h -l help -d 'show this help 
 complete -c gwrms -n '_shtab_gwrms_using watch' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using watch' -l json -d 'one JSON object a line, for machines'
 complete -c gwrms -n '_shtab_gwrms_using watch' -l rate -x -d 'ticks a second, 0.1 to 1000 (default 10)'
+complete -c gwrms -n '_shtab_gwrms_using watch' -l csv -d 'comma-separated, a column a channel; empty is missing'
+complete -c gwrms -n '_shtab_gwrms_using watch' -l deg -d 'angles in degrees, not in rad; JSON stays in SI'
 complete -c gwrms -n '_shtab_gwrms_using watch' -l count -x -d 'end after N lines'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a top -d 'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
 complete -c gwrms -n '_shtab_gwrms_using top' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using top' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using top' -l seconds -x -d 'end after N seconds'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a plot -d 'Channels over time, live.'
+complete -c gwrms -n '_shtab_gwrms_using plot' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using plot' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
+complete -c gwrms -n '_shtab_gwrms_using plot' -l terminal -d 'in the terminal, display or not'
+complete -c gwrms -n '_shtab_gwrms_using plot' -l seconds -x -d 'end after N seconds'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a get -d 'Read parameters from the devices, now.'
 complete -c gwrms -n '_shtab_gwrms_using get' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using get' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using get' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using get' -l deg -d 'angles in degrees, not in rad; JSON stays in SI'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a set -d 'Change parameters: all or none, limit-checked, read back.'
 complete -c gwrms -n '_shtab_gwrms_using set' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using set' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'

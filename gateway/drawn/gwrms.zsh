@@ -32,6 +32,7 @@ _shtab_gwrms_commands() {
     label:'What robot and wearer did in a recorded session.'
     models:'learned models: look at, promote, roll back, export'
     params:'parameters as files: save, compare, apply'
+    plot:'Channels over time, live.'
     predict:'What robot and wearer are doing, and how far to believe that.'
     query:'SQL over the store'"'"'s tables.'
     reset:'End a held stop: every drive switched off, none enabled.'
@@ -438,6 +439,7 @@ _shtab_gwrms_get_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
+  "--deg[angles in degrees, not in rad\; JSON stays in SI]"
   "(*)::names, addresses, globs, or a component (default\: all that can be changed):"
 )
 
@@ -646,6 +648,17 @@ _shtab_gwrms_params_save_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_params_save_defaults_added=0
 
+_shtab_gwrms_plot_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--terminal[in the terminal, display or not]"
+  "--seconds[end after N seconds]:N:"
+  "(*):names, globs, or a component\: all of its channels:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_plot_defaults_added=0
+
 _shtab_gwrms_predict_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
@@ -830,7 +843,7 @@ _shtab_gwrms_set_options=(
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
   "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
-  "(*):in the parameter\'s own unit:"
+  "(*):in the parameter\'s own unit, or in another\: 3deg, 420mm, 30rpm:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -963,6 +976,8 @@ _shtab_gwrms_watch_options=(
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
   "--rate[ticks a second, 0.1 to 1000 (default 10)]:HZ:"
+  "--csv[comma-separated, a column a channel\; empty is missing]"
+  "--deg[angles in degrees, not in rad\; JSON stays in SI]"
   "--count[end after N lines]:N:"
   "(*):names, globs, or a component\: all of its channels:"
 )
@@ -1011,6 +1026,7 @@ _shtab_gwrms() {
         label) _arguments -C -s $_shtab_gwrms_label_options ;;
         models) _shtab_gwrms_models ;;
         params) _shtab_gwrms_params ;;
+        plot) _arguments -C -s $_shtab_gwrms_plot_options ;;
         predict) _arguments -C -s $_shtab_gwrms_predict_options ;;
         query) _arguments -C -s $_shtab_gwrms_query_options ;;
         reset) _arguments -C -s $_shtab_gwrms_reset_options ;;

@@ -4,9 +4,9 @@ import math
 import time
 from collections.abc import Callable
 
+from gateway.units import Units
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.units import Units
 from server_gui.core.tuning.edits import Change, refusal, unit_of
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.keys import Key

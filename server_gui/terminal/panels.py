@@ -13,13 +13,13 @@ from rich.text import Text
 
 from gateway.client import ConnectionState
 from gateway.plain import plain
+from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
-from server_gui.core.processing.units import Unit, Units
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState

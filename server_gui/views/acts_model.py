@@ -8,9 +8,9 @@ from typing import Any, Final
 from PySide6.QtCore import Qt
 
 from gateway.plain import plain
+from gateway.units import Unit
 from gateway.wire.method import Number
 from server_gui.core.audit.acts import Act
-from server_gui.core.processing.units import Unit
 from server_gui.views.parameters.tree import brief, exact
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip

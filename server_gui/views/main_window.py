@@ -1,6 +1,6 @@
 """The main window: header with STOP, robots left, tabs in the middle, parameters right, events below."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 from PySide6.QtCore import QByteArray, QSettings, Signal
@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.units import UNITS, Units
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
-from server_gui.core.processing.units import UNITS, Units
 from server_gui.views.audit import Audit
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.docks import Area, Docks
@@ -129,6 +129,11 @@ class MainWindow(QMainWindow):
         self.parameters.refresh()
         self.events.refresh()
         self._bar.refresh()
+
+    def show_signals(self, globs: Sequence[str]) -> None:
+        """Begin with these channels in sight."""
+        self.signals.usual = globs
+        self.tabs.setCurrentIndex(self._views.index(self.signals))
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.kept.setValue("geometry", self.saveGeometry())

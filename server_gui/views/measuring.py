@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
+from gateway.units import Unit
 from server_gui.core.desk.measuring import Measured
-from server_gui.core.processing.units import Unit
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 

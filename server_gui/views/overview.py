@@ -8,13 +8,13 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
+from gateway.units import Unit
 from ml.robot.task import ABNORMAL, UNKNOWN
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.soles import Sole, sole
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.gait_events import Leg
-from server_gui.core.processing.units import Unit
 from server_gui.views.joint_table import JointModel, JointTable
 from server_gui.views.marks import age_text
 from server_gui.views.predictions import ACTIVITY, label_text, lines, model_phases

@@ -1,6 +1,7 @@
 """Signals: chosen channels over time, one plot a unit; pause, zoom, measure, export while data go on."""
 
 import csv
+import fnmatch
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +22,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.units import Unit
 from gateway.wire.component import ChannelInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.units import Unit
 from server_gui.views.marks import age_text
 from server_gui.views.measuring import Measuring
 from server_gui.views.theme import Theme
@@ -73,6 +74,7 @@ class Signals(QWidget):
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._active = 0
         self._described: tuple[object, ...] = ()
+        self.usual: Sequence[str] = USUAL  # globs of what is ticked before anybody has chosen
         self.setObjectName("page")
         self.channels = QTreeWidget()
         self.channels.setHeaderHidden(True)
@@ -208,7 +210,8 @@ class Signals(QWidget):
         described = (station, self._desk.shown.revision, *(info.name for info in infos))
         if described == self._described:
             return
-        before = self.chosen if self._described else list(USUAL)
+        usual = [info.name for info in infos if any(fnmatch.fnmatchcase(info.name, g) for g in self.usual)]
+        before = self.chosen if self._items() else usual[:MOST_CURVES]
         self._described = described
         self.channels.blockSignals(True)
         self.channels.clear()

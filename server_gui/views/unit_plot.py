@@ -7,7 +7,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
-from server_gui.core.processing.units import Unit
+from gateway.units import Unit
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import rich

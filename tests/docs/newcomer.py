@@ -102,7 +102,7 @@ class Newcomer:
         if block.file is not None:
             file = self.home / block.file.removeprefix("~/")
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(self._here(block.text), encoding="utf-8")
+            file.write_text(self.here(block.text), encoding="utf-8")
         elif block.is_shell and not block.by_hand:
             for command in commands(block):
                 self._run(command, block)
@@ -122,10 +122,14 @@ class Newcomer:
             assert terminal.end() in (0, 130), terminal.said
 
     def _run(self, command: Command, block: Block) -> None:
-        here = Command(self._here(command.typed), command.shown)
+        here = Command(self.here(command.typed), command.shown)
         if block.terminal:
             self.start(here)
-            return
+        else:
+            self.run(here)
+
+    def run(self, here: Command) -> None:
+        """Wait for its end, which is well, and compare what it has said."""
         ran = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", here.typed],
             cwd=self.home,
@@ -142,7 +146,8 @@ class Newcomer:
         wrong = difference(here.shown, said)
         assert wrong is None, f"{here.typed}\n{wrong}"
 
-    def _here(self, text: str) -> str:
+    def here(self, text: str) -> str:
+        """Return what is typed here in the place of what a page names."""
         for word, stand_in in {PORT: str(self._port), **self._stand_ins}.items():
             text = text.replace(word, stand_in)
         return text

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 
+from gateway.units import Units
 from server_gui.core.archive.collected_journals import Found, Kept, KeptJournals
 from server_gui.core.audit.chains import chained, problem
 from server_gui.core.follow.events import Journalled
-from server_gui.core.processing.units import Units
 from server_gui.views.acts_model import (
     NEW,
     OLD,

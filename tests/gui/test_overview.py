@@ -8,11 +8,11 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
+from gateway.units import Units
 from gateway.wire.component import LayoutInfo
 from server_gui.core.desk.leg_phase import leg_phase, phase_at
 from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.processing.gait_events import Leg
-from server_gui.core.processing.units import Units
 from server_gui.views.joint_table import JointModel
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme

@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 
 from gateway.client import RemoteError
+from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.parameter import Confirmed, Reverted, Written
-from server_gui.core.processing.units import Units
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES

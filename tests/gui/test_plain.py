@@ -9,8 +9,8 @@ from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QApplication, QMessageBox, QWidget
 
 import server_gui.views
+from gateway.units import Units
 from gateway.wire.resource import ProcessUse
-from server_gui.core.processing.units import Units
 from server_gui.views.processes import ProcessModel
 from server_gui.views.theme import Theme
 from server_gui.views.unit_plot import UnitPlot

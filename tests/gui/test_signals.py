@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from server_gui.core.processing.units import Units
+from gateway.units import Units
 from server_gui.views.signals import MOST_CURVES, Signals
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
@@ -97,3 +97,15 @@ def test_the_range_follows_the_data_until_somebody_zooms(signals: Signals, bench
     low, high = plot.getViewBox().viewRange()[1]
     assert low < -20.0
     assert high > 20.0
+
+
+def test_the_view_begins_with_what_was_asked_for(theme: Theme, bench: Bench) -> None:
+    made = Signals(bench.desk, theme)
+    made.usual = ("left_*.torque", "right_hip.velocity")
+    made.refresh()  # nobody knows the robot's channels yet
+    bench.station.take([walking(300)])
+    made.refresh()
+    assert set(made.chosen) == {f"left_{name}.torque" for name in ("hip", "knee", "ankle")} | {
+        "right_hip.velocity"
+    }
+    destroy(made)

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from gateway.units import Units
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import News
-from server_gui.core.processing.units import Units
 
 
 @dataclass(slots=True)

@@ -9,6 +9,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from gateway.client import ConnectionState
+from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import ParameterInfo, Stored, Written
@@ -33,7 +34,6 @@ from server_gui.core.follow.robot_news import RobotNews
 from server_gui.core.prediction.current import StationPredictions
 from server_gui.core.prediction.news import PredictionNews, Ruled
 from server_gui.core.processing.robot_processing import RobotProcessing
-from server_gui.core.processing.units import Units
 from server_gui.core.threads.answers import Deliver, Result, when_done
 from server_gui.core.tuning.commands import Commands
 from server_gui.core.tuning.comparison import Comparison

@@ -212,7 +212,7 @@ class Spool:
         files = self._files.own()
         receipt = self.receipts.newest()
         kept = [number for number, kept in files if kept is not Kept.DAMAGED]
-        first = min([*kept, *([receipt.batch + 1] if receipt else [])], default=0)
+        first = min([*(number for number, _ in files), *([receipt.batch + 1] if receipt else [])], default=0)
         aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
         gone = set(range(first, written)) - {number for number, _ in files}
         if found := (aside | gone) - self._settled:

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gateway.coding import Limit, broken_limit, coding_of
+from gateway.units import Unit, Units
 from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo, ParameterValue
-from server_gui.core.processing.units import Unit, Units
 
 Values = Mapping[str, ParameterValue]
 _BROKEN: Mapping[Limit, str] = {

@@ -7,11 +7,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QSlider
 
+from gateway.units import Unit
 from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.units import Unit
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.tree import exact

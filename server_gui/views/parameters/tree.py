@@ -16,10 +16,10 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.parameter_files.comparison import Verdict
+from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.units import Unit
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.filter import NAME_ROLE, Filter

@@ -1,7 +1,9 @@
 """The asking commands, as a person and as a script meet them, against a gateway that speaks the contract."""
 
+import csv
 import json
 from collections.abc import Iterator
+from datetime import datetime
 
 import pytest
 
@@ -284,3 +286,59 @@ def test_stop_that_the_robot_refuses_is_loud(robot: FakeRobot, capsys: pytest.Ca
     robot.overrides["robot.stop"] = refuse
     assert run(robot, "stop") == 1
     assert "NOT CONFIRMED, take it that the robot still moves. the bus is not open" in capsys.readouterr().err
+
+
+# --- units and times as people think of them
+
+
+@pytest.mark.parametrize(
+    ("change", "value"),
+    [("gait.step_length=420mm", 0.42), ("gait.step_length=42cm", 0.42), ("gait.step_length=.42m", 0.42)],
+)
+def test_a_parameter_is_set_in_a_unit_that_is_named(robot: FakeRobot, change: str, value: float) -> None:
+    assert run(robot, "set", change) == 0
+    assert robot.parameters["gait.step_length"] == value
+
+
+@pytest.mark.parametrize("change", ["gait.step_length=3deg", "gait.step_length=420furlong"])
+def test_a_unit_that_a_parameter_cannot_be_in_is_refused(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], change: str
+) -> None:
+    assert run(robot, "set", change) == 1
+    assert "gait.step_length: it cannot be in" in (said := capsys.readouterr().err)
+    assert "write it in mm or cm or m" in said
+    assert robot.called("parameter.write") == []
+
+
+def test_angles_are_shown_in_degrees_where_asked(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "watch", "trunk", "--deg", "--count", "1", "--rate", "50") == 0
+    title, row = printed(capsys).splitlines()
+    assert "trunk.tilt_forward [°]" in title
+    assert run(robot, "watch", "trunk.tilt_forward", "--json", "--count", "1", "--rate", "50") == 0
+    line = json.loads(printed(capsys))
+    assert abs(line["values"]["trunk.tilt_forward"]) < 0.06
+    assert abs(float(row.split()[1])) < 4.0
+    assert datetime.fromisoformat(line["utc"]).tzinfo is not None
+
+
+def test_watch_writes_csv_with_a_column_a_channel(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.lost.add("left_insole")
+    wanted = ("trunk.tilt_side", "left_insole.force", "left_knee.state")
+    assert run(robot, "watch", *wanted, "--csv", "--count", "3", "--rate", "50") == 0
+    lines = list(csv.DictReader(printed(capsys).splitlines()))
+    assert len(lines) == 3
+    assert set(lines[0]) == {
+        "utc",
+        "stamp_ns",
+        "trunk.tilt_side [rad]",
+        "left_insole.force [N]",
+        "left_knee.state",
+    }
+    assert [line["left_insole.force [N]"] for line in lines] == [""] * 3
+    stamps = [int(line["stamp_ns"]) for line in lines]
+    assert stamps == sorted(stamps)
+    assert all(abs(float(line["trunk.tilt_side [rad]"])) <= 0.02 for line in lines)

@@ -3,9 +3,9 @@
 import pytest
 
 from gateway.client import CallTimeout, RemoteError
+from gateway.units import Units
 from gateway.wire.parameter import Confirmed, Reverted, Written
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.units import Units
 from server_gui.core.tuning.edits import Change
 from server_gui.core.tuning.writing import WriteState
 from tests.support.desk import HELD, Bench, described, looked

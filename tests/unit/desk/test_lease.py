@@ -3,10 +3,10 @@
 import time
 
 from gateway.client import RemoteError
+from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.parameter import Written
 from server_gui.core.follow.news import NewsKind
-from server_gui.core.processing.units import Units
 from tests.support.desk import Bench
 
 STEP = "gait.step_length"

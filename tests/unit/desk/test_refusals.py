@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.parameter_files.comparison import Verdict, compare
+from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo, ParameterValue
-from server_gui.core.processing.units import Unit
 from server_gui.core.tuning.edits import refusal
 
 METRE = Unit("m", "m")

@@ -3,10 +3,10 @@
 import pytest
 
 from gateway.client import LinkLost, RemoteError
+from gateway.units import Units
 from gateway.wire.component import ComponentInfo
 from gateway.wire.parameter import Stored, Written
 from server_gui.core.follow.events import Described
-from server_gui.core.processing.units import Units
 from server_gui.core.tuning.storing import Storable, objection, storable
 from server_gui.core.tuning.writing import WriteState
 from tests.support.desk import Bench, described, walking

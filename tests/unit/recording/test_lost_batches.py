@@ -104,6 +104,18 @@ def test_a_batch_that_is_lost_while_a_collector_runs_is_an_alarm_and_an_event(
     assert Store(folder_url).dataset(HERE).count_rows() == 2
 
 
+def test_a_batch_that_is_gone_behind_a_damaged_one_is_told_too(tmp_path: Path, folder_url: str) -> None:
+    recorded(spool := tmp_path / "spool", 2)
+    first, *_, last = sorted(spool.glob("*.db"))
+    first.write_bytes(b"")  # so that it is set aside as soon as the spool is opened
+    for gone in {*spool.glob("*.db")} - {first, last}:
+        gone.unlink()
+    with Spool(spool, reserve_bytes=0) as opened:
+        assert opened.damaged()
+        assert Uploader(opened, lambda: Store(folder_url))._empty(asked=True)
+    assert sorted(number for _, number in told(Store(folder_url))) == [*range(1, int(last.stem))]
+
+
 def test_the_oldest_batch_that_waits_is_missed_where_others_were_uploaded(
     tmp_path: Path, folder_url: str
 ) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from gateway.client import Address, Batch, ClockOffset, ConnectionState
+from gateway.units import Units
 from server_gui.core.follow.events import Event, Failed, LinkChanged, Telemetry
 from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.robot import Robot
-from server_gui.core.processing.units import Units
 from server_gui.core.tuning.edits import Change, unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState

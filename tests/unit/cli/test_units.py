@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server_gui.core.processing.units import UNITS, Unit, Units, percent_body_weight
+from gateway.units import UNITS, Unit, Units, percent_body_weight, unit_named
 
 ALL = [unit for units in UNITS.values() for unit in units] + [percent_body_weight(81.4)]
 values = st.floats(allow_nan=False, allow_infinity=False)
@@ -66,3 +66,22 @@ def test_what_cannot_be_is_refused_in_words() -> None:
     for typed in ("", "1,5", "nan", "inf", "12 °", "1e999", "-1e999", "1e-999", "1e9999999999999999999"):
         with pytest.raises(ValueError, match="is not a number in °"):
             UNITS["rad"][0].si_value(typed)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "si", "shown"),
+    [
+        ("deg", "rad", "°"),
+        ("°", "rad", "°"),
+        ("rad", "rad", "rad"),
+        ("rpm", "rad/s", "rpm"),
+        ("Nm", "N·m", "N·m"),
+    ],
+)
+def test_a_unit_is_found_as_people_type_it(symbol: str, si: str, shown: str) -> None:
+    assert unit_named(symbol, si).symbol == shown
+
+
+def test_a_unit_of_something_else_is_refused_with_what_there_is() -> None:
+    with pytest.raises(ValueError, match="'N': write it in ° or rad"):
+        unit_named("N", "rad")

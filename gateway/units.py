@@ -93,6 +93,27 @@ UNITS: Mapping[str, tuple[Unit, ...]] = MappingProxyType(
 )
 
 
+ALIASES: Mapping[str, str] = MappingProxyType(
+    {"deg": "°", "deg/s": "°/s", "Nm": "N·m", "N.m": "N·m", "degC": "°C", "m/s2": "m/s²", "m/s^2": "m/s²"}
+)  # as people type them
+
+
+def unit_named(symbol: str, si: str) -> Unit:
+    """Return the unit that a value of this SI unit was typed in; `si` itself where no symbol is given.
+
+    Raises:
+        ValueError: values of this SI unit cannot be in such a unit; says in which.
+
+    """
+    wanted = ALIASES.get(symbol, symbol)
+    known = (*UNITS.get(si, ()), Unit(si, si))
+    found = next((unit for unit in known if unit.symbol == wanted), None)
+    if found is None:
+        shown = dict.fromkeys(unit.symbol or "no unit" for unit in known)
+        raise ValueError(f"it cannot be in {symbol!r}: write it in {' or '.join(shown)}")
+    return found
+
+
 def percent_body_weight(body_mass: float) -> Unit:
     """Forces as a share of the wearer's weight; `body_mass` in kg, with the machine where it is worn.
 

@@ -1,0 +1,161 @@
+"""`gwrms plot`: channels over time, in the window or in the terminal."""
+
+import argparse
+import collections
+import contextlib
+import importlib.metadata
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from gateway.cli.arguments import seconds
+from gateway.cli.connect import absent_components, add_robot, channel_names, check_names, connect, widened
+from gateway.cli.shown import Channels
+from gateway.cli.text import measured, say
+from server_gui.qt_needs import NoWindow, check, prefer_x
+from server_gui.terminal.braille import Sample, draw, extent
+
+SPAN_S: Final = 10.0  # that is in sight
+RATE_HZ: Final = 50.0
+FRAME_S: Final = 0.2
+ROWS: Final = 6  # of a curve
+LABEL: Final = 10  # letters of a scale
+EPILOG: Final = f"""Where there is a display, the window opens on its Signals with these channels ticked, and
+records nothing; else, and with --terminal, they are drawn in the terminal: the last {SPAN_S:g} s, a curve a
+channel, angles in degrees. What is missing is a hole. Where the output is no terminal, the curves of
+--seconds are printed once.
+
+examples
+  gwrms plot left_knee.position right_knee.position
+  gwrms plot '*_insole.force' --terminal
+  gwrms plot trunk --terminal --seconds 10 > trunk.txt"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms plot`."""
+    arguments = _parser().parse_args(argv)
+    if not arguments.terminal and _has_window():
+        return _window(arguments)
+    return _terminal(arguments)
+
+
+def _window(arguments: argparse.Namespace) -> int:
+    from msgspec.structs import replace
+
+    from server_gui.app import run
+    from server_gui.core.settings.server_file import add_robots, load, name_of
+
+    with connect(arguments, "plot") as robot:
+        description = robot.describe()
+        channels = widened(arguments.channels, description)
+        check_names("channel", channels, channel_names(description), absent_components(description))
+    settings, address = load(), str(arguments.robot)
+    names = (name for name, each in settings.robots.items() if each.where == arguments.robot)
+    name = next(names, name_of(address))
+    alone = add_robots(replace(settings, robots={}), {name: address})
+    return run(alone, seconds=arguments.seconds, signals=channels)
+
+
+def _terminal(arguments: argparse.Namespace) -> int:
+    is_live = sys.stdout.isatty()
+    ends_s = time.monotonic() + (arguments.seconds or (float("inf") if is_live else SPAN_S))
+    with connect(arguments, "plot") as robot, contextlib.suppress(KeyboardInterrupt):
+        description = robot.describe()
+        channels = widened(arguments.channels, description)
+        check_names("channel", channels, channel_names(description), absent_components(description))
+        curves = Curves(
+            Channels(description, degrees=True), SPAN_S if is_live else arguments.seconds or SPAN_S
+        )
+        screen = _Screen() if is_live else None
+        for batch in robot.watch(*channels, rate_hz=RATE_HZ):
+            for stamp_ns, values in batch.rows():
+                curves.take(stamp_ns / 1e9, values)
+            if screen is not None:
+                screen.show(curves)
+            if time.monotonic() >= ends_s:
+                break
+        if screen is None:
+            say("\n".join(curves.lines(shutil.get_terminal_size().columns)) + "\n")
+    return 0
+
+
+class Curves:
+    """The last seconds of each channel."""
+
+    def __init__(self, shown: Channels, span_s: float) -> None:
+        self._shown = shown
+        self._span_s = span_s
+        self._samples: dict[str, collections.deque[Sample]] = {}
+        self._newest_s = 0.0
+
+    def take(self, time_s: float, values: dict[str, float | None]) -> None:
+        """Add a row, and let go what is out of sight."""
+        self._newest_s = max(self._newest_s, time_s)
+        for name, value in values.items():
+            samples = self._samples.setdefault(name, collections.deque())
+            samples.append((time_s, self._shown.value(name, value)))
+            while samples[0][0] < self._newest_s - self._span_s:
+                samples.popleft()
+
+    def lines(self, columns: int) -> list[str]:
+        """Return what is shown, a title and the curve of each channel."""
+        found: list[str] = []
+        for name, samples in self._samples.items():
+            found += self._curve(name, list(samples), columns)
+        return [*found, f"{'':>{LABEL}} the last {self._span_s:g} s"]
+
+    def _curve(self, name: str, samples: Sequence[Sample], columns: int) -> list[str]:
+        low, high = extent(samples)
+        size = max(10, columns - LABEL - 2), ROWS
+        curve = draw(samples, self._newest_s - self._span_s, self._newest_s, low, high, size)
+        scale = [f"{high:.6g}", *[""] * (ROWS - 2), f"{low:.6g}"]
+        newest = measured(samples[-1][1], self._shown.info(name))
+        title = f"{self._shown.title(name)}  {newest}"
+        return [title, *(f"{at:>{LABEL}} {line}" for at, line in zip(scale, curve, strict=True))]
+
+
+class _Screen:
+    """A terminal that is drawn anew some times a second, in its place."""
+
+    def __init__(self) -> None:
+        self._lines = 0
+        self._next_s = 0.0
+
+    def show(self, curves: Curves) -> None:
+        if time.monotonic() < self._next_s:
+            return
+        self._next_s = time.monotonic() + FRAME_S
+        columns, rows = shutil.get_terminal_size()
+        lines = [line[: columns - 1] for line in curves.lines(columns)][: rows - 1]
+        up = f"\x1b[{self._lines}F" if self._lines else ""  # ECMA-48, CPL and ED
+        sys.stdout.write(f"{up}\x1b[J")
+        say("\n".join(lines) + "\n")
+        self._lines = len(lines)
+
+
+def _has_window() -> bool:
+    try:
+        prefer_x()
+        check()
+    except (NoWindow, importlib.metadata.PackageNotFoundError):
+        return False
+    return True
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(
+        prog="gwrms plot",
+        description="Channels over time, live.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add_robot(made)
+    made.add_argument(
+        "channels", metavar="CHANNEL", nargs="+", help="names, globs, or a component: all of its channels"
+    )
+    made.add_argument("--terminal", action="store_true", help="in the terminal, display or not")
+    made.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds")
+    return made
