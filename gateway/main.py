@@ -109,6 +109,25 @@ def _help_without(error: Exception, arguments: Sequence[str]) -> str | None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `gwrms` with `argv` (default: the process's own arguments) and return its exit code."""
+    _replace_closed_streams()
+    try:
+        return _run(argv)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # The reader left: let the interpreter's own flush at exit go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _replace_closed_streams() -> None:
+    """What whoever started us has closed goes nowhere; nothing that is opened later takes its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: PTH123, SIM115 - for as long as we run
+
+
+def _run(argv: Sequence[str] | None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     debug = "--debug" in arguments
     arguments = [argument for argument in arguments if argument != "--debug"]
@@ -127,25 +146,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     try:
         return find(name)(rest)
-    except KeyboardInterrupt:
-        return 130
     except BrokenPipeError:
-        # The reader left: let the interpreter's own flush at exit go nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        raise
     except Exception as error:  # noqa: BLE001 - the one place where errors become words
         if page := _help_without(error, arguments):
             sys.stdout.write(page)
             return 0
+        if debug:
+            traceback.print_exc()
+        else:
+            sys.stderr.write(f"gwrms {name}: {explain(error, name)}\n")
         if "--json" in rest:  # who reads that finds the error where the answer would be
             from gateway.cli.text import say_json
 
             kind = getattr(error, "kind", None) or type(error).__name__
             say_json({"error": {"kind": str(kind), "message": explain(error, name)}})
-        if debug:
-            traceback.print_exc()
-        else:
-            sys.stderr.write(f"gwrms {name}: {explain(error, name)}\n")
         return 1
 
 

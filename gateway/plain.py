@@ -1,5 +1,24 @@
 """What somebody else has named or said, shown as what it is: no letter of it commands the terminal."""
 
+import re
+from typing import Final
+
+LONGEST_NAME: Final = 128
+NAME_SIGNS: Final = "letters, digits and _ . @ : + -"
+ROBOT_SIGNS: Final = f"{NAME_SIGNS} # , ( ) and spaces"
+_NAME: Final = re.compile(r"\w[\w.@:+-]*")
+_ROBOT_NAME: Final = re.compile(r"\w[\w.@:+#,() -]*")
+
+
+def is_name(text: str) -> bool:
+    """Return whether a desk takes this as the name of a component, channel or parameter."""
+    return len(text) <= LONGEST_NAME and _NAME.fullmatch(text) is not None
+
+
+def is_robot_name(text: str) -> bool:
+    """Return whether a desk takes this as what a robot calls itself."""
+    return len(text) <= LONGEST_NAME and _ROBOT_NAME.fullmatch(text) is not None
+
 
 def plain(text: str, keep: str = "") -> str:
     r"""Every letter that cannot be printed as its escape (`\x1b`, `\n`, `\u202e`), but for those in `keep`.

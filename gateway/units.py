@@ -39,9 +39,9 @@ class Unit:
         """
         try:
             number = Decimal(typed)
+            value = self._nearest(number) if number.is_finite() else math.nan
         except ArithmeticError:
-            number = Decimal("NaN")
-        value = self._nearest(number) if number.is_finite() else math.nan
+            number, value = Decimal("NaN"), math.nan
         if not math.isfinite(value) or (value == 0.0) != (number == 0):
             said = f"{typed!r} is not a number in {self.symbol or 'units'} that a robot could hold"
             raise ValueError(f"{said}: write one such as 12.5")

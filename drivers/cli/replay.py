@@ -1,6 +1,7 @@
 """`gwrms sensor record` and `replay`: raw bytes into a file, and again out of a pseudo-terminal."""
 
 import argparse
+import math
 import os
 import pty
 import sys
@@ -8,16 +9,17 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import msgspec
 
 from drivers.cli.listen import best, listen, nothing
 from drivers.errors import Unavailable
-from drivers.port import SerialPort
+from drivers.port import FIRST_RETRY_S, SerialPort
 
 TICK_S = 0.01
+LOOK_S = FIRST_RETRY_S / 2  # a port that goes away is seen before it is opened again
 DEFAULT_BAUDRATE = 115200
 
 
@@ -65,7 +67,7 @@ def replay_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namesp
 
 
 def record(options: argparse.Namespace) -> int:
-    """Record until the time is up or Ctrl-C.
+    """Record until the time is up or Ctrl-C; 1 where bytes may be missing in between.
 
     Raises:
         FileExistsError: there is such a file.
@@ -75,8 +77,7 @@ def record(options: argparse.Namespace) -> int:
     if options.file.exists():
         raise FileExistsError(f"{options.file} is there already: give another name, or remove it")
     baudrate, format_name = (options.baud or DEFAULT_BAUDRATE, None) if options.raw else _recognised(options)
-    done = threading.Event()
-    with options.file.open("xb") as file:
+    with options.file.open("xb", buffering=0) as file:  # what has come is there, whatever ends this
 
         def keep(data: bytes, _stamp_ns: int) -> None:
             file.write(data)
@@ -85,11 +86,8 @@ def record(options: argparse.Namespace) -> int:
         began = time.monotonic()
         port.start()
         try:
-            done.wait(options.seconds)
-        except KeyboardInterrupt:
-            done.set()
+            problem = _watch(port, options.seconds)
         finally:
-            problem = port.problem
             port.stop()
         size = file.tell()
     if not size:
@@ -97,8 +95,23 @@ def record(options: argparse.Namespace) -> int:
         raise Unavailable(problem or f"{options.port} sent nothing: check the sensor's power and its TX wire")
     about = About(baudrate, time.monotonic() - began, format_name)
     _beside(options.file).write_bytes(msgspec.json.encode(about))
-    sys.stdout.write(f"{size} bytes in {about.seconds:.1f} s at {baudrate} baud\n")
-    return 0
+    holes = "" if problem is None else ", NOT all that was sent"
+    sys.stdout.write(f"{size} bytes in {about.seconds:.1f} s at {baudrate} baud{holes}\n")
+    return 0 if problem is None else 1
+
+
+def _watch(port: SerialPort, seconds: float | None) -> str | None:
+    """Wait for the end; say what goes wrong before it at once, and return the last of that."""
+    ends_s = time.monotonic() + (math.inf if seconds is None else seconds)
+    told: str | None = None
+    never = threading.Event()
+    with suppress(KeyboardInterrupt):
+        while (left_s := ends_s - time.monotonic()) > 0:
+            never.wait(min(left_s, LOOK_S))
+            if port.problem not in (None, told):
+                told = port.problem
+                sys.stderr.write(f"gwrms sensor: {told}\n")
+    return port.problem or told
 
 
 def _recognised(options: argparse.Namespace) -> tuple[int, str]:

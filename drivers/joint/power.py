@@ -23,7 +23,7 @@ TRANSITION_S = 3.0  # how long one step up may take: brakes open in it
 RESET_S = 3.0  # how long the whole way down may take
 
 # What says that an axis whose voltage was disabled has none.
-_LIMP_STATES = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})
+LIMP_STATES = frozenset({DriveState.SWITCH_ON_DISABLED, DriveState.FAULT})
 _STOPS = (Controlword.QUICK_STOP, Controlword.DISABLE_VOLTAGE)
 
 
@@ -61,7 +61,7 @@ class PowerDrive:
     def disable_voltage(self) -> Future[StopOutcome]:
         """Take the motor's current away: an axis that a quick stop does not stop goes limp."""
         self._last_stop = object()
-        return self._stop(Controlword.DISABLE_VOLTAGE, _LIMP_STATES)
+        return self._stop(Controlword.DISABLE_VOLTAGE, LIMP_STATES)
 
     def nmt_stop(self) -> None:
         """Stop the whole node (NMT).

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 import psutil
 from msgspec import Struct
 
+from gateway.amounts import NONE, percent, size
 from gateway.cli.connect import connect, parser
-from gateway.cli.text import NONE, percent, say, say_json, size, table
+from gateway.cli.text import say, say_json, table
 from gateway.client import Batch, Robot
 from gateway.client.address import Address
 from gateway.client.clock import ClockOffset

@@ -3,9 +3,10 @@
 import time
 from collections import Counter
 
+from gateway.amounts import NONE
 from gateway.cli.arguments import seconds
 from gateway.cli.connect import connect, parser
-from gateway.cli.text import NONE, say, say_json, table
+from gateway.cli.text import say, say_json, table
 from gateway.wire.resource import Overrun, Overruns
 
 POLL_S = 1.0

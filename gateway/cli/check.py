@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.cli.text import counted, say, say_json
+from gateway.amounts import counted
+from gateway.cli.text import say, say_json
 from gateway.tables.finding import Finding, Severity
 from gateway.tables.reading import Unreadable, read
 
@@ -45,7 +46,6 @@ class Kind:
     marks: frozenset[str]
 
 
-_SINGLE = ("gateway", "stop", "guard", "control_loop", "robot.name")
 # What is not installed is needed by its own kind only.
 KINDS: Final[Mapping[str, Kind]] = {
     "robot": Kind(

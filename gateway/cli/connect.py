@@ -9,7 +9,9 @@ from types import MappingProxyType
 from gateway.cli.text import did_you_mean, say, warn
 from gateway.client import Address, BadAddress, ClientError, ConnectionState, LinkSettings, Robot
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
+from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
+from gateway.wire.stream import ModuleName
 
 
 class UnknownName(ClientError):
@@ -72,6 +74,11 @@ def widened(asked: Iterable[str], description: Description) -> list[str]:
     return [f"{name}.*" if name in components else name for name in asked]
 
 
+def meant(globs: Sequence[str], description: Description) -> list[ChannelInfo]:
+    """The channels that any of these globs names, in the robot's order."""
+    return [each for each in description.channels if any(fnmatch.fnmatchcase(each.name, g) for g in globs)]
+
+
 def check_names(
     what: str, asked: Iterable[str], known: Sequence[str], absent: Mapping[str, str] = MappingProxyType({})
 ) -> None:
@@ -89,6 +96,14 @@ def check_names(
             raise UnknownName(
                 f"the robot has no {what} {glob!r}{did_you_mean(glob, known)} (gwrms describe lists them)"
             )
+
+
+def modules_of(channels: Iterable[ChannelInfo]) -> list[ModuleName]:
+    """The modules that give the channels: the computer's own are the resource module's."""
+    modules: set[ModuleName] = {
+        "resource" if channel.component == "resource" else "component" for channel in channels
+    }
+    return sorted(modules)
 
 
 def choose(argv: list[str], commands: Mapping[str, Callable[[list[str]], int]], usage: str) -> int:

@@ -3,9 +3,10 @@
 import time
 from collections.abc import Iterator
 
+from gateway.amounts import NONE, percent, size
 from gateway.cli.arguments import seconds
 from gateway.cli.connect import connect, parser
-from gateway.cli.text import NONE, budget, percent, say, say_json, size, table
+from gateway.cli.text import budget, say, say_json, table
 from gateway.wire.cost import BusCost, ClientCost, GatewayCost, StreamCost
 
 SECONDS = 2.0

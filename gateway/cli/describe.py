@@ -5,8 +5,9 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
+from gateway.amounts import NONE
 from gateway.cli.connect import connect, parser
-from gateway.cli.text import NONE, budget, exact, say, say_json, table
+from gateway.cli.text import budget, exact, say, say_json, table
 from gateway.wire.component import ChannelInfo
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo

@@ -1,7 +1,8 @@
 """`gwrms enable`: enables drives, as the master of a bench."""
 
+from gateway.amounts import NONE
 from gateway.cli.connect import connect, parser
-from gateway.cli.text import NONE, say, say_json, table, warn
+from gateway.cli.text import say, say_json, table, warn
 from gateway.wire.stop import Enabled
 
 EPILOG = """Only where the gateway is the bus's master ([gateway] role = "master"), and while no stop is held.

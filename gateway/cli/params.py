@@ -5,8 +5,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from gateway.amounts import counted
 from gateway.cli.connect import ask, check_names, choose, connect, parameter_names, parser
-from gateway.cli.text import counted, exact, say, say_json, table, warn
+from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.writing import add_trial, write
 from gateway.client import Robot
 from gateway.coding import Number

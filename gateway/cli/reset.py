@@ -1,7 +1,8 @@
 """`gwrms reset`: ends a held stop."""
 
+from gateway.amounts import NONE
 from gateway.cli.connect import connect, parser
-from gateway.cli.text import NONE, say, say_json, table, warn
+from gateway.cli.text import say, say_json, table, warn
 from gateway.wire.stop import Reset
 
 EPILOG = """Each drive is led to "switch on disabled": one that moves is stopped before, a fault is reset, and

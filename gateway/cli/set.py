@@ -24,8 +24,12 @@ examples:
   gwrms set --trial 30 gait.cycle_time=1.1"""
 
 
+OBJECTS: Final = range(-(2**63), 2**64)  # what a device's object can hold
+LONGEST: Final = 20  # of such a number, with its sign
+
+
 class UnknownUnit(ClientError):
-    """A value is given in a unit that its parameter cannot be in."""
+    """A value is no number that there can be, or in a unit that its parameter cannot be in."""
 
 
 _CHANGE: Final = re.compile(r"([^=]+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) ?([^\d\s.].*)?")
@@ -72,14 +76,16 @@ def _change(text: str) -> Change:
 
 def _value(change: Change, description: Description) -> Number:
     """The value in the parameter's own unit; a whole number as such, so that none of its digits is lost."""
-    if change.unit is None:
-        return int(change.number) if change.number.lstrip("+-").isdecimal() else float(change.number)
+    if change.unit is None and change.number.lstrip("+-").isdecimal() and len(change.number) <= LONGEST:
+        whole = int(change.number)
+        if whole in OBJECTS:
+            return whole
     si = next(
         info.unit
         for info in description.parameters
         if change.name in (info.name, f"{info.component}.{info.object}")
     )
     try:
-        return unit_named(change.unit, si).si_value(change.number)
+        return unit_named(si if change.unit is None else change.unit, si).si_value(change.number)
     except ValueError as error:
         raise UnknownUnit(f"{change.name}: {error}") from error

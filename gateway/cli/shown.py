@@ -48,7 +48,15 @@ class Channels:
         return f"{name} [{info.unit}]" if info is not None and info.unit else name
 
 
-def utc(stamp_ns: int, clock: Clock) -> str:
-    """Return a time of the robot's monotonic clock as ISO 8601, by what it said of its clocks just before."""
+def utc(stamp_ns: int, clock: Clock | None) -> str | None:
+    """Return a time of the robot's monotonic clock as ISO 8601, by what it said of its clocks.
+
+    None where it said nothing, or something that is no time of any calendar.
+    """
+    if clock is None:
+        return None
     at_ns = stamp_ns - clock.monotonic_ns + clock.utc_ns
-    return (_EPOCH + timedelta(microseconds=at_ns // 1000)).isoformat(timespec="microseconds")
+    try:
+        return (_EPOCH + timedelta(microseconds=at_ns // 1000)).isoformat(timespec="microseconds")
+    except OverflowError:
+        return None

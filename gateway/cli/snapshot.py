@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import msgspec
 
+from gateway.amounts import NONE, age, percent, size
 from gateway.cli.connect import channel_names, check_names, connect, parser, widened
-from gateway.cli.text import NONE, age, exact, measured, percent, say, say_json, size, table
+from gateway.cli.text import exact, measured, say, say_json, table
 from gateway.client import Robot
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.resource import ControlProcess, ResourceSnapshot, ResourceSnapshotParams

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
+from gateway.amounts import NONE, percent
 from gateway.coding import text as digits
 from gateway.plain import json_plain, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.cost import BudgetInfo
 
-NONE = "–"
 DECIMALS = {"Pa": 0, "B": 0, "N": 1, "°C": 1, "%": 1}  # of a measured value; a parameter is shown whole
 OTHER_DECIMALS = 4
 
@@ -49,11 +49,6 @@ def warn(command: str, text: str) -> None:
     sys.stderr.write(f"gwrms {command}: {shown}\n")
 
 
-def counted(count: int, one: str, more: str = "") -> str:
-    """So many of something, in words."""
-    return f"{count} {one if count == 1 else more or f'{one}s'}"
-
-
 def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
     """A channel's value: a state as its word, a number with few decimals, a dash where there is none."""
     if value is None:
@@ -69,31 +64,10 @@ def exact(value: float | None) -> str:
     return NONE if value is None else digits(value)
 
 
-def percent(value: float | None) -> str:
-    """A share of one hundred."""
-    return NONE if value is None else f"{value:.1f} %"
-
-
-def size(count: float) -> str:
-    """Bytes in the unit that fits."""
-    for unit in ("B", "KiB", "MiB"):
-        if count < 1024:
-            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
-        count /= 1024
-    return f"{count:.2f} GiB"
-
-
 def budget(info: BudgetInfo) -> str:
     """What the gateway may use, and what its streams give up for it."""
     shed = f": streams send one row of {info.shed}" if info.shed > 1 else ""
     return f"at most {percent(info.max_cpu_percent)} of a core{shed}"
-
-
-def age(seconds: float | None) -> str:
-    """How old something is."""
-    if seconds is None:
-        return NONE
-    return f"{seconds * 1000:.0f} ms" if seconds < 10 else f"{seconds:.0f} s"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -2,7 +2,6 @@
 
 import argparse
 import csv
-import fnmatch
 import itertools
 import sys
 from collections.abc import Iterator, Sequence
@@ -13,17 +12,19 @@ from gateway.cli.connect import (
     channel_names,
     check_names,
     connect,
+    meant,
+    modules_of,
     parser,
     widened,
 )
 from gateway.cli.shown import Channels, add_degrees, utc
 from gateway.cli.text import measured, say, say_json, warn
-from gateway.client import Batch, Robot
-from gateway.wire.component import ChannelInfo
-from gateway.wire.robot import Clock, Description
+from gateway.client import Batch, ClientError, Robot
+from gateway.plain import plain
+from gateway.wire.robot import Clock
 from gateway.wire.stream import ModuleName
 
-Row = tuple[int, dict[str, float | None]]
+Row = tuple[int, str | None, dict[str, float | None]]  # its stamp, that in UTC, its values
 
 MIN_WIDTH = 12
 
@@ -57,14 +58,15 @@ def main(argv: list[str]) -> int:
         description = robot.describe()
         channels = widened(arguments.channels, description)
         check_names("channel", channels, channel_names(description), absent_components(description))
-        meant = _meant(channels, description)
-        rows = itertools.islice(_rows(robot, channels, _modules(meant), arguments.rate), arguments.count)
+        named = meant(channels, description)
+        every = _rows(robot, channels, modules_of(named), arguments.rate, description.clock)
+        rows = itertools.islice(every, arguments.count)
         try:
             shown = Channels(description, degrees=arguments.deg)
             if arguments.json:
-                _follow_json(rows, description.clock)
+                _follow_json(rows)
             elif arguments.csv:
-                _follow_csv(rows, [each.name for each in meant], shown, description.clock)
+                _follow_csv(rows, [each.name for each in named], shown)
             else:
                 _follow(rows, shown)
         except KeyboardInterrupt:
@@ -85,26 +87,26 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _meant(globs: Sequence[str], description: Description) -> list[ChannelInfo]:
-    return [each for each in description.channels if any(fnmatch.fnmatchcase(each.name, g) for g in globs)]
-
-
-def _modules(channels: Sequence[ChannelInfo]) -> list[ModuleName]:
-    """The modules that give the channels: the computer's own are the resource module's."""
-    modules: set[ModuleName] = {
-        "resource" if channel.component == "resource" else "component" for channel in channels
-    }
-    return sorted(modules)
-
-
 def _rows(
-    robot: Robot, channels: Sequence[str], modules: Sequence[ModuleName], rate_hz: float
+    robot: Robot, channels: Sequence[str], modules: Sequence[ModuleName], rate_hz: float, clock: Clock | None
 ) -> Iterator[Row]:
-    dropped, shed = 0, 1
+    dropped, shed, link = 0, 1, 1  # `clock` was told over the first
     for batch in robot.watch(*channels, rate_hz=rate_hz, modules=modules):
+        if batch.link != link:  # it may have booted anew: its clock is another one
+            clock = _clock(robot)
+        link = batch.link
         _report_losses(batch, dropped, shed)
         dropped, shed = batch.dropped, batch.shed
-        yield from batch.rows()
+        for stamp_ns, values in batch.rows():
+            yield stamp_ns, utc(stamp_ns, clock), values
+
+
+def _clock(robot: Robot) -> Clock | None:
+    """What it says of its clocks now; None where it does not: no time is better than a wrong one."""
+    try:
+        return robot.describe().clock
+    except ClientError:
+        return None
 
 
 def _report_losses(batch: Batch, dropped: int, shed: int) -> None:
@@ -119,25 +121,25 @@ def _report_losses(batch: Batch, dropped: int, shed: int) -> None:
         )
 
 
-def _follow_json(rows: Iterator[Row], clock: Clock) -> None:
-    for stamp_ns, values in rows:
-        say_json({"stamp_ns": stamp_ns, "utc": utc(stamp_ns, clock), "values": values})
+def _follow_json(rows: Iterator[Row]) -> None:
+    for stamp_ns, at, values in rows:
+        say_json({"stamp_ns": stamp_ns, "utc": at, "values": values})
 
 
-def _follow_csv(rows: Iterator[Row], names: Sequence[str], shown: Channels, clock: Clock) -> None:
+def _follow_csv(rows: Iterator[Row], names: Sequence[str], shown: Channels) -> None:
     out = csv.writer(sys.stdout, lineterminator="\n")
-    out.writerow(["utc", "stamp_ns", *map(shown.title, names)])
-    for stamp_ns, values in rows:
+    out.writerow(["utc", "stamp_ns", *(plain(shown.title(name)) for name in names)])
+    for stamp_ns, at, values in rows:
         cells = (shown.value(name, values.get(name)) for name in names)
-        out.writerow([utc(stamp_ns, clock), stamp_ns, *("" if cell is None else cell for cell in cells)])
+        out.writerow([at or "", stamp_ns, *("" if cell is None else cell for cell in cells)])
         sys.stdout.flush()
 
 
 def _follow(rows: Iterator[Row], shown: Channels) -> None:
     first_ns: int | None = None
     widths: dict[str, int] = {}
-    for stamp_ns, values in rows:
-        first_ns = stamp_ns if first_ns is None else first_ns
+    for stamp_ns, _at, values in rows:
+        first_ns = stamp_ns if first_ns is None else min(first_ns, stamp_ns)
         if values.keys() != widths.keys():
             widths = {name: _width(name, shown) for name in values}
             titles = (shown.title(name).rjust(width) for name, width in widths.items())

@@ -104,14 +104,18 @@ class Robot:
         rate_hz: float = 50.0,
         modules: Iterable[ModuleName] = ("component",),
         depth: int = 1024,
+        idle_s: float | None = None,
     ) -> Generator[Batch, None, None]:
-        """Batches of these channels for as long as the caller iterates, over dropped links too."""
+        """Batches of these channels for as long as the caller iterates, over dropped links too.
+
+        With `idle_s`, one without rows wherever nothing has come for so long.
+        """
         subscribed = self._client.subscribe(*channels, rate_hz=rate_hz, modules=modules, depth=depth)
         stream = self._wait(subscribed.__aenter__())
         try:
             with contextlib.suppress(StopAsyncIteration):
                 while True:
-                    yield self._wait(stream.__anext__())
+                    yield self._wait(stream.next_within(idle_s))
         finally:
             if not self._loop.is_closed():
                 self._wait(subscribed.__aexit__(None, None, None))

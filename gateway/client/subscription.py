@@ -85,6 +85,14 @@ class Subscription:
             await self._wake.wait()
         return self._waiting.popleft()
 
+    async def next_within(self, idle_s: float | None) -> Batch:
+        """Return the next batch, or one without rows where none comes within `idle_s`."""
+        try:
+            async with asyncio.timeout(idle_s):
+                return await self.__anext__()
+        except TimeoutError:
+            return Batch([], {}, self._last_seq or 0, 0, 0, self._link, time.monotonic_ns())
+
     # --- what the link calls
 
     def restarted(self, stream: int, link: int) -> None:

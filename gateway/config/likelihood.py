@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from drivers.bus.settings import CanSettings, Role
 from gateway.config.robot import RobotConfig, header
+from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.tables.finding import Finding, meant, warning
 
 BITRATES = (10_000, 20_000, 50_000, 83_333, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
@@ -35,6 +36,15 @@ def implausible(where: str, key: str, value: float, unit: str) -> Iterator[Findi
     if largest < abs(value) < math.inf:
         slip = f"{value:g}{other} is {round(value * factor, 4):g} {unit}"
         yield warning(where, key, f"{value:g} {unit} is more than an exoskeleton has: {slip}")
+
+
+def _about_names(config: RobotConfig) -> Iterator[Finding]:
+    refused = f"every desk refuses a robot with this name; at most {LONGEST_NAME} "
+    if not is_robot_name(config.robot.name):
+        yield warning("[robot]", "name", refused + ROBOT_SIGNS)
+    for name in config.parameter:
+        if not is_name(name):
+            yield warning(header("parameter", name), "", refused + NAME_SIGNS)
 
 
 def _about_host(config: RobotConfig) -> Iterator[Finding]:
@@ -122,6 +132,7 @@ def _about_parameters(config: RobotConfig) -> Iterator[Finding]:
 
 
 _CHECKS = (
+    _about_names,
     _about_host,
     _about_controller,
     _about_stop_times,

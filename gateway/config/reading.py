@@ -109,7 +109,9 @@ class _Reading:
         self._decoding.tables(document, TABLES)
         if "robot" not in document:
             self._decoding.complain("[robot]", "", 'is missing: write [robot] and below it name = "…"')
-        parts: dict[str, Any] = {"robot": RobotSettings(name="?")}  # so that the rest is told all the same
+        parts: dict[str, Any] = {
+            "robot": RobotSettings(name="unnamed")
+        }  # so that the rest is told all the same
         for table, kind in SINGLE.items():
             made = self._struct(f"[{table}]", document[table], kind) if table in document else None
             parts |= {} if made is None else {table: made}

@@ -223,15 +223,6 @@ class Request(Struct, frozen=True, forbid_unknown_fields=True):
     id: Id | UnsetType = UNSET
 
 
-class Response(Struct, frozen=True):
-    """An answer as a client reads it: exactly one of `result` and `error` is set."""
-
-    jsonrpc: Literal["2.0"]
-    id: Id
-    result: Raw | UnsetType = UNSET
-    error: ErrorBody | UnsetType = UNSET
-
-
 class Notification(Struct, frozen=True):
     """A message that nobody answers, as a client reads it."""
 

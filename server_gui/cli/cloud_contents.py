@@ -5,7 +5,8 @@ import functools
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from gateway.cli.text import NONE, say, say_json, size, table, warn
+from gateway.amounts import NONE, size
+from gateway.cli.text import say, say_json, table, warn
 from ml.store.errors import NoSuchTable, StoreError
 from ml.store.objects import Object
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool, url, when

@@ -4,8 +4,9 @@ import argparse
 import math
 from datetime import UTC, datetime, timedelta
 
+from gateway.amounts import counted
 from gateway.cli.connect import ask
-from gateway.cli.text import counted, say, say_json, table
+from gateway.cli.text import say, say_json, table
 from ml.store import TABLES, TELEMETRY, Store, UnsafeStore, upkeep
 from ml.store.tables import RESOURCES
 from server_gui.cli.cloud_options import add_url, parser, reach, when

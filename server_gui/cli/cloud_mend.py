@@ -4,8 +4,9 @@ import argparse
 import functools
 from pathlib import Path
 
+from gateway.amounts import counted
 from gateway.cli.connect import ask
-from gateway.cli.text import counted, say, say_json, warn
+from gateway.cli.text import say, say_json, warn
 from ml.store.errors import NoSuchTable, StoreError, UnsafeStore
 from ml.store.objects import Objects
 from ml.store.tables import TELEMETRY

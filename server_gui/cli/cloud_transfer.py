@@ -6,7 +6,8 @@ import functools
 from collections.abc import Sequence
 from pathlib import Path
 
-from gateway.cli.text import counted, say, say_json, size, warn
+from gateway.amounts import counted, size
+from gateway.cli.text import say, say_json, warn
 from ml.store import sessions
 from ml.store.errors import StoreError
 from ml.store.sessions import Session

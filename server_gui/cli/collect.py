@@ -12,7 +12,8 @@ from pathlib import Path
 
 import msgspec
 
-from gateway.cli.text import NONE, age, say, size, table, warn
+from gateway.amounts import NONE, age, size
+from gateway.cli.text import say, table, warn
 from gateway.plain import json_plain, plain
 from ml.store.private import private_files
 from server_gui.core.fleet.collector import Collector, CollectorReport

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from gateway.cli.text import NONE, counted, say, say_json, table, warn
+from gateway.amounts import NONE, counted
+from gateway.cli.text import say, say_json, table, warn
 from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
 from ml.store.private import private_files

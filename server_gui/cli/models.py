@@ -10,8 +10,9 @@ from urllib.parse import urlsplit
 
 import msgspec
 
+from gateway.amounts import NONE
 from gateway.cli.connect import choose
-from gateway.cli.text import NONE, did_you_mean, say, say_json, table, warn
+from gateway.cli.text import did_you_mean, say, say_json, table, warn
 from ml.errors import UnusableModel
 from ml.registry.card import Card, age_days
 from ml.registry.pointers import Pointer

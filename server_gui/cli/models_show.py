@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from gateway.cli.text import NONE, percent, table
+from gateway.amounts import NONE, percent
+from gateway.cli.text import table
 from ml.registry.card import Card, Metrics, age_days
 from server_gui.cli.cloud_options import when
 

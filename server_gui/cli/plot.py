@@ -11,21 +11,32 @@ from collections.abc import Sequence
 from typing import Final
 
 from gateway.cli.arguments import seconds
-from gateway.cli.connect import absent_components, add_robot, channel_names, check_names, connect, widened
+from gateway.cli.connect import (
+    absent_components,
+    add_robot,
+    channel_names,
+    check_names,
+    connect,
+    meant,
+    modules_of,
+    widened,
+)
 from gateway.cli.shown import Channels
 from gateway.cli.text import measured, say
+from gateway.client import LinkSettings, Robot
 from server_gui.qt_needs import NoWindow, check, prefer_x
 from server_gui.terminal.braille import Sample, draw, extent
 
 SPAN_S: Final = 10.0  # that is in sight
 RATE_HZ: Final = 50.0
 FRAME_S: Final = 0.2
+SILENT_S: Final = 1.0  # after which the newest value is none any more
 ROWS: Final = 6  # of a curve
 LABEL: Final = 10  # letters of a scale
 EPILOG: Final = f"""Where there is a display, the window opens on its Signals with these channels ticked, and
 records nothing; else, and with --terminal, they are drawn in the terminal: the last {SPAN_S:g} s, a curve a
-channel, angles in degrees. What is missing is a hole. Where the output is no terminal, the curves of
---seconds are printed once.
+channel, angles in degrees. What is missing is a hole; where nothing comes, the curves go on without it.
+Where the output is no terminal, the curves of --seconds are printed once.
 
 examples
   gwrms plot left_knee.position right_knee.position
@@ -61,15 +72,18 @@ def _window(arguments: argparse.Namespace) -> int:
 def _terminal(arguments: argparse.Namespace) -> int:
     is_live = sys.stdout.isatty()
     ends_s = time.monotonic() + (arguments.seconds or (float("inf") if is_live else SPAN_S))
-    with connect(arguments, "plot") as robot, contextlib.suppress(KeyboardInterrupt):
+    # A link that drops is told by the curves themselves: no line comes between them.
+    link = LinkSettings(client="gwrms plot")
+    with Robot(arguments.robot, link) as robot, contextlib.suppress(KeyboardInterrupt):
         description = robot.describe()
         channels = widened(arguments.channels, description)
         check_names("channel", channels, channel_names(description), absent_components(description))
+        modules = modules_of(meant(channels, description))
         curves = Curves(
             Channels(description, degrees=True), SPAN_S if is_live else arguments.seconds or SPAN_S
         )
         screen = _Screen() if is_live else None
-        for batch in robot.watch(*channels, rate_hz=RATE_HZ):
+        for batch in robot.watch(*channels, rate_hz=RATE_HZ, modules=modules, idle_s=FRAME_S):
             for stamp_ns, values in batch.rows():
                 curves.take(stamp_ns / 1e9, values)
             if screen is not None:
@@ -82,17 +96,20 @@ def _terminal(arguments: argparse.Namespace) -> int:
 
 
 class Curves:
-    """The last seconds of each channel."""
+    """The last seconds of each channel, which go on where nothing comes."""
 
     def __init__(self, shown: Channels, span_s: float) -> None:
         self._shown = shown
         self._span_s = span_s
         self._samples: dict[str, collections.deque[Sample]] = {}
         self._newest_s = 0.0
+        self._taken_s = time.monotonic()  # on our clock
 
     def take(self, time_s: float, values: dict[str, float | None]) -> None:
         """Add a row, and let go what is out of sight."""
-        self._newest_s = max(self._newest_s, time_s)
+        if time_s < self._newest_s:  # the robot has booted anew: its clock is another one
+            self._samples.clear()
+        self._newest_s, self._taken_s = time_s, time.monotonic()
         for name, value in values.items():
             samples = self._samples.setdefault(name, collections.deque())
             samples.append((time_s, self._shown.value(name, value)))
@@ -101,17 +118,21 @@ class Curves:
 
     def lines(self, columns: int) -> list[str]:
         """Return what is shown, a title and the curve of each channel."""
+        silent_s = time.monotonic() - self._taken_s
+        silent_s = silent_s if silent_s > SILENT_S else 0.0
         found: list[str] = []
         for name, samples in self._samples.items():
-            found += self._curve(name, list(samples), columns)
-        return [*found, f"{'':>{LABEL}} the last {self._span_s:g} s"]
+            found += self._curve(name, list(samples), columns, silent_s)
+        said = f", nothing came in the last {silent_s:.1f} s" if silent_s else ""
+        return [*found, f"{'':>{LABEL}} the last {self._span_s:g} s{said}"]
 
-    def _curve(self, name: str, samples: Sequence[Sample], columns: int) -> list[str]:
+    def _curve(self, name: str, samples: Sequence[Sample], columns: int, silent_s: float) -> list[str]:
         low, high = extent(samples)
         size = max(10, columns - LABEL - 2), ROWS
-        curve = draw(samples, self._newest_s - self._span_s, self._newest_s, low, high, size)
+        now_s = self._newest_s + silent_s
+        curve = draw(samples, now_s - self._span_s, now_s, low, high, size)
         scale = [f"{high:.6g}", *[""] * (ROWS - 2), f"{low:.6g}"]
-        newest = measured(samples[-1][1], self._shown.info(name))
+        newest = measured(None if silent_s else samples[-1][1], self._shown.info(name))
         title = f"{self._shown.title(name)}  {newest}"
         return [title, *(f"{at:>{LABEL}} {line}" for at, line in zip(scale, curve, strict=True))]
 

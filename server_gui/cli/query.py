@@ -10,7 +10,8 @@ import msgspec
 import pyarrow as pa
 import pyarrow.csv
 
-from gateway.cli.text import NONE, say, table, warn
+from gateway.amounts import NONE
+from gateway.cli.text import say, table, warn
 from gateway.plain import json_plain
 from ml.store.private import private_files
 from ml.store.query import Result, query

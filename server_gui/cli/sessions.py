@@ -11,8 +11,9 @@ from typing import Any, Final
 import msgspec
 import pyarrow as pa
 
+from gateway.amounts import NONE, size
 from gateway.cli.connect import choose as choose_command
-from gateway.cli.text import NONE, say, say_json, size, table, warn
+from gateway.cli.text import say, say_json, table, warn
 from ml.store.private import private_files
 from ml.store.sessions import Channel, Session
 from server_gui.cli.cloud_options import (

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 import pyarrow as pa
 
-from gateway.cli.text import NONE, say, say_json, table
+from gateway.amounts import NONE
+from gateway.cli.text import say, say_json, table
 from server_gui.cli.cloud_options import (
     absolute,
     add_url,

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from gateway.cli.text import NONE, say, say_json, size, table
+from gateway.amounts import NONE, size
+from gateway.cli.text import say, say_json, table
 from ml.store.sessions import Session
 from ml.store.tables import RESOURCES
 from server_gui.cli.cloud_options import add_url, parser, recordings

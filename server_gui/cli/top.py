@@ -8,6 +8,8 @@ from typing import Final
 
 from gateway.cli.arguments import seconds
 from gateway.cli.connect import add_robot
+from gateway.cli.text import warn
+from server_gui.core.tuning.stop import StopProgress, StopState
 
 EPILOG: Final = """keys
   s, space     STOP: quick stop on every drive (software, not safety-rated)
@@ -16,11 +18,13 @@ EPILOG: Final = """keys
   ← →          lower or raise it; the lease is held only while it is written
   q            end
 
-Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says how old.
+Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says
+how old. q waits until it is known what became of a STOP.
 Without a terminal: gwrms watch, gwrms describe.
 
 exit status
-  0 ended by q or after --seconds; 1 it cannot be shown; 130, 143 ended by Ctrl-C, SIGTERM"""
+  0 ended by q or after --seconds; 1 it cannot be shown, or the last STOP is NOT CONFIRMED;
+  130, 143 ended by Ctrl-C, SIGTERM"""
 
 
 def main(argv: list[str]) -> int:
@@ -45,8 +49,18 @@ def main(argv: list[str]) -> int:
         try:
             Dashboard(followed.station, Controls(followed.station), str(arguments.robot)).run(tick)
         except Ended as ended:
+            _tell(followed.station.stopping)
             return ended.status
-    return 0
+        return _tell(followed.station.stopping)
+
+
+def _tell(stopping: StopProgress) -> int:
+    """Say it where nothing has confirmed the last STOP: the screen that did is gone. Return 1 then."""
+    if stopping.state is StopState.SENT:
+        warn("top", "STOP NOT CONFIRMED: nobody has answered yet. Use the hardware stop")
+    elif stopping.state is StopState.NOT_CONFIRMED:
+        warn("top", stopping.text)
+    return int(stopping.state in (StopState.SENT, StopState.NOT_CONFIRMED))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -5,7 +5,8 @@ import getpass
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from gateway.cli.text import NONE, say, say_json, table
+from gateway.amounts import NONE
+from gateway.cli.text import say, say_json, table
 from ml.errors import Overtaken
 from ml.registry.card import Metrics
 from ml.registry.registry import Registry

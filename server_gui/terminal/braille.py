@@ -7,13 +7,17 @@ from typing import Final
 BLANK: Final = 0x2800
 # The bit of each dot, by row and column of a letter (Unicode 15.0, "Braille Patterns").
 DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
+LARGEST: Final = 1e300  # numbers beyond cannot be counted with
 Sample = tuple[float, float | None]  # when, s; and the value
 
 
 def draw(
     samples: Sequence[Sample], begin_s: float, end_s: float, low: float, high: float, size: tuple[int, int]
 ) -> list[str]:
-    """Return lines of letters, `size` columns and rows; a gap in time or a missing value leaves a hole."""
+    """Return lines of letters, `size` columns and rows.
+
+    A gap in time leaves a hole, and so does a value that is missing, no number, or too large to be drawn.
+    """
     columns, rows = size
     width, height = 2 * columns, 4 * rows
     cells = [[BLANK] * columns for _ in range(rows)]
@@ -30,7 +34,7 @@ def _dots(
     width, height = size
     before: tuple[int, int] | None = None
     for time_s, value in samples:
-        if value is None or not math.isfinite(value):
+        if value is None or not abs(value) < LARGEST:
             before = None
             continue
         x = round((time_s - begin_s) / (end_s - begin_s) * (width - 1))
@@ -47,7 +51,7 @@ def _dots(
 
 def extent(samples: Sequence[Sample]) -> tuple[float, float]:
     """Return round ends of what is drawn; never nothing, so that a value that stands still is a line."""
-    found = [value for _, value in samples if value is not None and math.isfinite(value)]
+    found = [value for _, value in samples if value is not None and abs(value) < LARGEST]
     low, high = min(found, default=0.0), max(found, default=0.0)
     span = max(high - low, 1e-3, 1e-3 * max(abs(low), abs(high)))
     step = 10.0 ** math.floor(math.log10(span))

@@ -1,6 +1,7 @@
 """What keys do: choose a parameter, raise or lower it, stop, end a held stop, quit. Draws nothing."""
 
 import math
+import sys
 import time
 from collections.abc import Callable
 
@@ -8,6 +9,7 @@ from gateway.units import Units
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.keys import Key
 
@@ -52,14 +54,23 @@ class Controls:
         return time.monotonic() < self._reset_until_s
 
     @property
+    def is_over(self) -> bool:
+        """Whether to end now: what a STOP comes to is waited for."""
+        return self.wants_to_quit and not self._stop_is_open
+
+    @property
     def writing(self) -> bool:
         """Whether a write is under way."""
         return self._station.writing.state is WriteState.WRITING
 
     def press(self, key: Key) -> None:
-        """Do what a key stands for; what a STOP came to is shown until the next key."""
-        self.stop_sent = key is Key.STOP
+        """Do what a key stands for; a STOP is shown until a key is pressed after it was answered, or not."""
+        self.stop_sent = key is Key.STOP or (self.stop_sent and self._stop_is_open)
         self._does[key]()
+
+    @property
+    def _stop_is_open(self) -> bool:
+        return self._station.stopping.state is StopState.SENT
 
     def _move(self, by: int) -> None:
         self._row = max(0, min(self._row + by, len(self.names) - 1))
@@ -101,8 +112,8 @@ class Controls:
 
 def step_of(low: float, high: float, largest: float | None) -> float:
     """Return a round step (1, 2 or 5 times a power of ten), about 1/20 of the range and within `largest`."""
-    wanted = (high - low) / STEPS
-    wanted = min(wanted, largest) if largest else wanted
+    wanted = high / STEPS - low / STEPS
+    wanted = max(min(wanted, largest) if largest else wanted, sys.float_info.min)
     power = 10.0 ** math.floor(math.log10(wanted) + 1e-9)
     return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= wanted * (1 + 1e-9))
 
@@ -113,8 +124,10 @@ def neighbour(value: float, by: int, info: ParameterInfo) -> float | None:
         return None
     step = step_of(info.min, info.max, info.max_step)
     places = value / step
+    if not math.isfinite(places):
+        return None
     on_grid = round(places)
     if abs(places - on_grid) > 1e-6:
         on_grid = math.floor(places) + (by < 0)
     # Ten digits: 0.42, not 0.42000000000000004.
-    return round(min(max((on_grid + by) * step, info.min), info.max), 10)
+    return min(max(float(f"{(on_grid + by) * step:.10g}"), info.min), info.max)

@@ -23,25 +23,39 @@ FRAME = 2  # lines of a panel that are its frame
 
 
 def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]) -> RenderableType:
-    """Draw a frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24."""
-    robot, gait = station.robot, station.processing.derived().gait
+    """Draw a frame for a screen of `size` (columns, lines); nothing that matters is left out of 80 × 24.
+
+    Whatever the size, the last lines are the keys, and what became of a STOP.
+    """
     columns, lines = size
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
-    page = Layout()
     above, below = 3 if look.roomy else 1, 2
-    joints = 2 + 1 + max(6, len(robot.names("joint")))
+    room, footer = lines - above - below, panels.footer(station, controls, where)
+    if room <= 0:
+        return footer
+    page = Layout()
     page.split_column(
-        Layout(panels.header(robot, where, look), size=above),
-        Layout(panels.joints(station, look), size=joints),
-        Layout(name="lower"),
-        Layout(panels.footer(station, controls, where), size=below),
+        Layout(panels.header(station.robot, where, look), size=above),
+        Layout(name="body"),
+        Layout(footer, size=below),
     )
-    page["lower"].split_row(Layout(name="left", ratio=3), Layout(panels.resources(station, look), ratio=2))
-    page["left"].split_column(
-        Layout(panels.feet_and_trunk(robot, gait, look), size=FEET_LINES),
-        Layout(panels.parameters(robot, controls, look, lines - above - joints - below - FEET_LINES - FRAME)),
-    )
+    joints = min(2 + 1 + max(6, len(station.robot.names("joint"))), room)
+    page["body"].split_column(Layout(panels.joints(station, look), size=joints), Layout(name="lower"))
+    _fill(page["lower"], station, controls, look, room - joints)
     return page
+
+
+def _fill(lower: Layout, station: Station, controls: Controls, look: panels.Look, room: int) -> None:
+    """Draw what stands below the joints; what no line is left for is out of sight."""
+    robot, gait = station.robot, station.processing.derived().gait
+    lower.visible = room > 0
+    lower.split_row(Layout(name="left", ratio=3), Layout(panels.resources(station, look), ratio=2))
+    feet = min(FEET_LINES, room)
+    parameters = panels.parameters(robot, controls, look, room - feet - FRAME)
+    lower["left"].split_column(
+        Layout(panels.feet_and_trunk(robot, gait, look), size=feet),
+        Layout(parameters, visible=room > feet),
+    )
 
 
 class Dashboard:
@@ -60,7 +74,7 @@ class Dashboard:
         )
         with Keyboard() as keyboard, live:
             next_frame = time.monotonic()
-            while tick() and not self._controls.wants_to_quit:
+            while tick() and not self._controls.is_over:
                 live.update(self._frame(console.size), refresh=True)
                 next_frame = max(next_frame + FRAME_S, time.monotonic())
                 for key in keyboard.wait(next_frame - time.monotonic()):

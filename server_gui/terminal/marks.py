@@ -65,10 +65,8 @@ def state_text(word: str, more: str = "") -> Text:
 def sparkline(values: Iterable[float | None], low: float, high: float, width: int) -> str:
     """Return the newest `width` values as blocks between `low` and `high`; a blank where there is none."""
     newest = list(values)[-width:]
-    span = (high - low) or 1.0
-    return "".join(" " if value is None else BLOCKS[_eighth((value - low) / span)] for value in newest).rjust(
-        width
-    )
+    blocks = (" " if value is None else BLOCKS[_eighth(_share(value, low, high))] for value in newest)
+    return "".join(blocks).rjust(width)
 
 
 def bar(share: float | None, width: int) -> str:
@@ -104,4 +102,11 @@ def _eighth(share: float) -> int:
 
 
 def _cell(value: float, low: float, high: float, width: int) -> int:
-    return min(max(round((value - low) / (high - low) * (width - 1)), 0), width - 1)
+    return round(_share(value, low, high) * (width - 1))
+
+
+def _share(value: float, low: float, high: float) -> float:
+    """How far on the way between the ends it is, 0 to 1; whatever numbers a robot sends."""
+    if value <= low:
+        return 0.0
+    return 1.0 if value >= high else (value / 2 - low / 2) / (high / 2 - low / 2)

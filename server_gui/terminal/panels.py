@@ -248,10 +248,13 @@ def resources(station: Station, look: Look) -> RenderableType:
     for _ in range(3):
         grid.add_column(justify="right", no_wrap=True)
     cpu = None if seen.cpu.percent is None else seen.cpu.percent / 100
-    memory = seen.memory.used / seen.memory.total
+    memory = seen.memory.used / seen.memory.total if seen.memory.total > 0 else None
     grid.add_row(words("CPU"), words(bar(cpu, look.share)), _percent(seen.cpu.percent), "")
     grid.add_row(
-        words("memory"), words(bar(memory, look.share)), f"{100 * memory:.0f} %", _mib(seen.memory.used)
+        words("memory"),
+        words(bar(memory, look.share)),
+        NONE if memory is None else f"{100 * memory:.0f} %",
+        _mib(seen.memory.used),
     )
     grid.add_row(
         words("this gateway", style=DIM), "", _percent(seen.gateway.cpu_percent), _mib(seen.gateway.rss_bytes)

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
-from gateway.cli.text import NONE, age, table
+from gateway.amounts import NONE, age
+from gateway.cli.text import table
 from gateway.client import ConnectionState
 from ml.registry.card import Card, age_days
 from ml.robot.task import ABNORMAL, TASKS, UNKNOWN

@@ -3,7 +3,7 @@
 import getpass
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Final
+from typing import Any
 
 from ml.store import StoreError
 from ml.store.labels import INSTANTS, Label, Source
@@ -12,10 +12,6 @@ from server_gui.core.archive.labelling import BadLabel, Kept, Labelling, Where
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 
-WHERE: Final = {
-    Where.STORE: "in the store",
-    Where.SPOOL: "safe here; it goes to the store with the next upload",
-}
 Do = Callable[[Callable[[], Any]], "Future[Any]"]  # does it in a thread
 
 

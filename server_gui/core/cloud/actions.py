@@ -10,7 +10,7 @@ from typing import Final
 
 import pyarrow as pa
 
-from gateway.cli.text import counted, size
+from gateway.amounts import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
 from ml.store.url import checked_url

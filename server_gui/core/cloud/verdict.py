@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gateway.cli.text import counted, size
+from gateway.amounts import counted, size
 from ml.store.fragments import DataFile
 from server_gui.core.cloud.receipt_check import Proof
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from gateway.cli.text import counted
+from gateway.amounts import counted
 from ml.store import mending, reading
 from ml.store.damage import damage
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused, StoreUnreachable

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
-from gateway.cli.text import size
+from gateway.amounts import size
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import AlarmKind

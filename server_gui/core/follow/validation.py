@@ -5,13 +5,13 @@ What does not pass raises `Unfit` and is as if it had never come. A robot may li
 
 import contextlib
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
 
 from gateway.client import Batch, ProtocolError
+from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import Described, Event, Journalled, Looked, Resources, Telemetry
 
@@ -22,7 +22,6 @@ COUNTS: Final = range(2**53)  # that every reader of JSON takes
 MOST_COLUMNS: Final = 4096  # that one robot may put into the store's table while this program runs
 MOST_LAYOUTS: Final = 1024  # sets of columns that come together, of one description
 MOST_ENTRIES: Final = 1000  # of a journal at once; as many as a gateway gives
-LONGEST_NAME: Final = 128
 LONGEST_UNIT: Final = 32
 LONGEST_HASH: Final = 128
 LONGEST_TEXT: Final = 1024  # who, what, boot id, version
@@ -30,8 +29,6 @@ MOST_BYTES: Final = {Described: 8 << 20, Resources: 4 << 20, Looked: 4 << 20}
 ENTRY_BYTES: Final = 64 << 10
 FAR_NS: Final = 366 * 86_400 * 1_000_000_000  # a row that is further from now has a wrong stamp
 DEEPEST: Final = 16  # values within values
-
-_NAME: Final = re.compile(r"\w[\w.@:+-]*")
 
 
 class Unfit(ProtocolError):
@@ -70,13 +67,14 @@ class Validator:
 
     def _described(self, description: Description) -> None:
         names = [
-            ("the robot", description.robot),
             *(("a component", part.name) for part in description.components),
             *(("a channel", channel.name) for channel in description.channels),
             *(("a parameter", parameter.name) for parameter in description.parameters),
         ]
         for what, given in names:
             name(what, given)
+        if not is_robot_name(description.robot):
+            raise _no_name("the robot", description.robot, ROBOT_SIGNS)
         for channel in description.channels:
             _text(f"the unit of {channel.name}", channel.unit, LONGEST_UNIT)
         _text("the boot id", description.boot_id, LONGEST_TEXT)
@@ -117,12 +115,13 @@ class Validator:
 
 
 def name(what: str, given: str) -> None:
-    """Refuse a name that is too long, or holds anything but letters, digits and `_ . @ : + -`."""
-    if len(given) > LONGEST_NAME or not _NAME.fullmatch(given):
-        raise Unfit(
-            f"{given!r:.80} is no name of {what}: letters, digits and _ . @ : + - only, "
-            f"at most {LONGEST_NAME} of them"
-        )
+    """Refuse what is no name."""
+    if not is_name(given):
+        raise _no_name(what, given, NAME_SIGNS)
+
+
+def _no_name(what: str, given: str, signs: str) -> Unfit:
+    return Unfit(f"{given!r:.80} is no name of {what}: {signs} only, at most {LONGEST_NAME} of them")
 
 
 def batch(stream: int, given: Batch) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-NANOSECONDS: Final = 1e9
 FINE_ROWS, COARSE_ROWS = 600, 480  # ten minutes at a look a second; eight hours
 COARSE_S: Final = 60.0
 

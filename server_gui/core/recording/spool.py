@@ -12,7 +12,7 @@ from typing import Final, Self
 
 import msgspec
 
-from gateway.cli.text import counted
+from gateway.amounts import counted
 from ml.store import durable
 from ml.store.precedence import opened_us
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable

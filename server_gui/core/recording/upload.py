@@ -12,7 +12,7 @@ import msgspec
 import pyarrow as pa
 import pyarrow.dataset
 
-from gateway.cli.text import counted
+from gateway.amounts import counted
 from ml.store import upkeep
 from ml.store.errors import ColumnTaken, NoSuchTable
 from ml.store.store import Store

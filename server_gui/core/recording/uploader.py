@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Self
 
-from gateway.cli.text import counted
+from gateway.amounts import counted
 from gateway.client.backoff import Backoff
 from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.store import Store

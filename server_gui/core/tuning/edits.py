@@ -59,13 +59,6 @@ class Edits:
         for name in names or tuple(self.staged):
             self.staged.pop(name, None)
 
-    def rebase(self, names: Values) -> None:
-        """What is seen now is agreed to be written over."""
-        self.revision += 1
-        for name, staged in self.staged.items():
-            if name in names:
-                self.staged[name] = Staged(staged.value, names[name].value)
-
     def vanished(self, known: Mapping[str, ParameterInfo]) -> list[str]:
         """Drop edits of parameters that the robot no longer has, or no longer lets write; their names."""
         gone = [name for name in self.staged if name not in known or known[name].read_only is not None]

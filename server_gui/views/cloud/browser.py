@@ -6,7 +6,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHeaderView, QSizePolicy, QTreeWidget, QTreeWidgetItem
 
-from gateway.cli.text import size
+from gateway.amounts import size
 from ml.store.objects import Object
 from server_gui.core.archive.library import Library
 from server_gui.core.cloud.usage import Usage

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.cli.text import size
+from gateway.amounts import size
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import set_tip

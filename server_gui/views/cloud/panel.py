@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.cli.text import size
+from gateway.amounts import size
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.actions import check, download, upload

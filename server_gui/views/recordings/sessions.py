@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.cli.text import size
+from gateway.amounts import size
 from gateway.plain import plain
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session

@@ -2,13 +2,16 @@
 
 import csv
 import json
+import threading
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import pytest
 
 from gateway.main import main
 from tests.fake_robot import JOINTS, FakeRobot, Refusal
+from tests.support.waiting import until
 
 
 @pytest.fixture
@@ -342,3 +345,78 @@ def test_watch_writes_csv_with_a_column_a_channel(
     stamps = [int(line["stamp_ns"]) for line in lines]
     assert stamps == sorted(stamps)
     assert all(abs(float(line["trunk.tilt_side [rad]"])) <= 0.02 for line in lines)
+
+
+def test_no_name_of_a_robot_commands_the_terminal_from_a_csv(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, described, values = "trunk.\x1b]0;owned\x07", robot.describe(), robot.values()
+    described["channels"].append({"name": name, "component": "trunk", "quantity": "x", "unit": "\x1b[2J"})
+    robot.overrides["robot.describe"] = lambda _params: described
+    robot.values = lambda: {**values, name: 1.0}  # type: ignore[method-assign]
+    assert run(robot, "watch", "trunk", "--csv", "--count", "1", "--rate", "50") == 0
+    assert all(line.isprintable() for line in printed(capsys).splitlines())
+
+
+@pytest.mark.parametrize("utc_ns", [10**30, -(10**20)])
+def test_a_clock_that_tells_no_time_of_a_calendar_leaves_it_out(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], utc_ns: int
+) -> None:
+    described = robot.describe()
+    described["clock"]["utc_ns"] = utc_ns
+    robot.overrides["robot.describe"] = lambda _params: described
+    assert run(robot, "watch", "trunk", "--csv", "--count", "1", "--rate", "50") == 0
+    assert printed(capsys).splitlines()[1].startswith(",")
+    assert run(robot, "watch", "trunk", "--json", "--count", "1", "--rate", "50") == 0
+    assert json.loads(printed(capsys))["utc"] is None
+
+
+def test_rows_after_a_reboot_are_told_by_the_clock_of_then(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    day = timedelta(days=1)
+
+    def describe(_params: object) -> dict[str, Any]:
+        described = robot.describe()
+        described["clock"]["utc_ns"] += (
+            (len(robot.called("hello")) - 1) * day // timedelta(microseconds=1) * 1000
+        )
+        return described
+
+    def reboot() -> None:
+        until(lambda: robot.called("stream.start"))
+        robot.cut()
+
+    robot.overrides["robot.describe"] = describe
+    rebooting = threading.Thread(target=reboot)
+    rebooting.start()
+    try:
+        status = run(robot, "watch", "trunk", "--json", "--count", "100", "--rate", "50")
+    finally:
+        rebooting.join()
+    assert status == 0
+    last = json.loads(printed(capsys).splitlines()[-1])
+    assert abs(datetime.fromisoformat(last["utc"]) - datetime.now(UTC) - day) < timedelta(hours=1)
+
+
+@pytest.mark.parametrize(
+    "number", ["1e400", "-1e400", "1e-400", "9" * 5000, "1e99999999999", "1e400mm", "1e999999kPa"]
+)
+def test_what_is_no_number_that_a_robot_could_hold_is_not_sent(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str], number: str
+) -> None:
+    assert run(robot, "set", f"gait.step_length={number}") == 1
+    said = capsys.readouterr().err
+    assert said.startswith("gwrms set: ")
+    assert "internal error" not in said
+    assert robot.called("parameter.write") == []
+
+
+@pytest.mark.parametrize(
+    ("typed", "sent"), [(str(2**64 - 1), 2**64 - 1), (str(-(2**63)), -(2**63)), (str(2**64), 2.0**64)]
+)
+def test_no_digit_of_a_whole_number_is_lost_that_an_object_can_hold(
+    robot: FakeRobot, typed: str, sent: float
+) -> None:
+    assert run(robot, "set", f"gait.step_length={typed}") == 1
+    assert [call["changes"]["gait.step_length"] for call in robot.called("parameter.write")] == [sent]

@@ -85,3 +85,10 @@ def test_a_unit_is_found_as_people_type_it(symbol: str, si: str, shown: str) -> 
 def test_a_unit_of_something_else_is_refused_with_what_there_is() -> None:
     with pytest.raises(ValueError, match="'N': write it in ° or rad"):
         unit_named("N", "rad")
+
+
+def test_a_number_beyond_all_floats_is_refused_in_every_unit() -> None:
+    for typed in ("1e999999", "-1e999999", "1e-999999", "1e99999999999"):
+        for unit in (unit for units in UNITS.values() for unit in units):
+            with pytest.raises(ValueError, match="is not a number in"):
+                unit.si_value(typed)

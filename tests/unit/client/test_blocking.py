@@ -74,6 +74,17 @@ def test_watch_goes_on_over_a_dropped_link(fake: FakeRobot) -> None:
         stream.close()
 
 
+def test_where_nothing_comes_a_batch_without_rows_does_if_asked_for(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot:
+        stream = robot.watch("left_knee.position", rate_hz=100, idle_s=0.05)
+        assert next(batch for batch in stream if batch.stamps_ns).columns
+        fake.frozen = True
+        assert next(batch for batch in stream if not batch.stamps_ns).columns == {}
+        fake.frozen = False
+        assert next(batch for batch in stream if batch.stamps_ns).columns
+        stream.close()
+
+
 def test_snapshots_come_typed(fake: FakeRobot) -> None:
     with Robot(fake.address, PATIENT) as robot:
         assert robot.resources().cpu.percent is None

@@ -103,6 +103,14 @@ def process(**fields: Any) -> Spoil:
     return spoil
 
 
+def named(name: str) -> Callable[[FakeRobot], None]:
+    def spoil(robot: FakeRobot) -> None:
+        described = robot.describe() | {"robot": name}
+        robot.overrides["robot.describe"] = lambda params: described
+
+    return spoil
+
+
 LIES = {
     "hash is an object": (entry(hash={"a": 1}), "the hash of entry 1 of its journal is no text"),
     "hash is null": (entry(hash=None), "entries without a number or a hash"),
@@ -132,6 +140,8 @@ LIES = {
     "an escape in a name": (channel(name="a\x1b[31m"), "is no name of a channel"),
     "markup in a name": (channel(name="<b>a</b>"), "is no name of a channel"),
     "a long name": (channel(name="a" * 1000), "is no name of a channel"),
+    "markup as what it calls itself": (named("<b>exo</b>"), "is no name of the robot"),
+    "an escape in what it calls itself": (named("exo \x1b[2J"), "is no name of the robot"),
     "a long unit": (channel(unit="m" * 1000), "the unit of trunk.more is longer than 32 letters"),
     "20,000 columns": (crowd, "more than 4096 different channels"),
     "a process with a huge number": (process(pid=2**70), "larger than 8 bytes hold"),

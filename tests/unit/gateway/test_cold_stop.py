@@ -2,14 +2,25 @@
 
 import threading
 from collections.abc import Iterator
+from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
+from drivers.joint.quick_stop import StopOutcome
+from gateway.config.stop import StopSettings
+from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.first_stop import FirstStop
+from gateway.modules.stop.stop import StopAnswers
+from gateway.modules.stop.stopper import Stopper
+from gateway.modules.stop.target import Report
+from gateway.process.futures import done
+from gateway.process.loop import Loop
 from gateway.registry import Context, Spec
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import Bench, Client, config, serving
@@ -192,3 +203,37 @@ def test_what_has_confirmed_is_not_kept_waiting_for_until_its_node_has_booted(
         drives = client.call("robot.stop")["drives"]
         assert drives == {"left_knee": "confirmed", "right_knee": "confirmed"}
     assert (bench.left.stops, bench.right.stops) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("first", "asked"),
+    [(StopOutcome.UNREACHABLE, 1), (StopOutcome.UNCONFIRMED, 1), (StopOutcome.CONFIRMED, 0)],
+)
+def test_what_could_not_be_reached_yet_is_asked_once_more_when_it_can_be(
+    first: StopOutcome, asked: int
+) -> None:
+    loop, knee = Loop(), FakeStopper()
+    ready: Future[None] = Future()
+    controllers = cast("Controllers", SimpleNamespace(targets={}, absent={}, names=frozenset()))
+    stoppers = cast("dict[str, Stopper]", {"knee": knee})
+    answers = StopAnswers(
+        loop, StopSettings(), stoppers, (), controllers, lambda _name: ready, lambda _name, _text: None
+    )
+    answer = answers.follow({"knee": done(Report(first))}, None)
+    answer.add_done_callback(lambda _answer: loop.stop())
+    loop.call_later(0.0, lambda: ready.set_result(None))
+    loop.run()
+    assert answer.result(0).drives == {"knee": "confirmed"}
+    assert knee.asked == asked
+    loop.close()
+
+
+class FakeStopper:
+    """A drive that confirms each stop."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def stop(self) -> "Future[Report]":
+        self.asked += 1
+        return done(Report(StopOutcome.CONFIRMED))

@@ -7,11 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from drivers.joint.quick_stop import StopOutcome
 from gateway.modules.stop.hold_record import HeldStop, HoldFile
 from gateway.modules.stop.stop_control import Asked, _newest_of_each
+from gateway.process.futures import done
 from gateway.records import durable
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
@@ -229,3 +231,20 @@ def test_what_stays_stopped_is_left_alone_after_a_restart_too(bench: Bench, tmp_
             lambda: client.call("clock.read")["monotonic_ns"] > began_ns + 600_000_000, "it has looked twice"
         )
         assert (bench.left.stops, bench.right.stops) == (1, 1)
+
+
+def test_a_stop_that_is_held_while_the_record_of_another_waits_to_be_removed_keeps_its_own(
+    tmp_path: Path,
+) -> None:
+    """The disk is slow: the first stop is not written yet when its reset has come to its end."""
+    disk = threading.Event()
+    hold = HoldFile(tmp_path / "stop.json", None, lambda _held, _problem: done(None))
+    hold._writer.submit(disk.wait)
+    hold.write("first", "stumbles")
+    removed = hold.remove()
+    hold.write("second", "falls")
+    disk.set()
+    hold.close()
+    assert removed.done()
+    found = msgspec.json.decode((tmp_path / "stop.json").read_bytes(), type=HeldStop)
+    assert (found.who, found.reason) == ("second", "falls")

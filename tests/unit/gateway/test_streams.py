@@ -402,3 +402,10 @@ def test_the_loop_has_no_timer_and_nothing_to_do_when_idle() -> None:
     assert loop._patience_s() is None
     assert len(loop._watched) == 1
     loop.close()
+
+
+def test_a_batch_that_is_larger_than_the_buffer_is_sent_all_the_same() -> None:
+    small = outlet(most_bytes=1)
+    for value in (1.0, 2.0):
+        small.offer(encode_batch([int(value)], {"knee.position": [value]}))
+    assert [(one["columns"], one["dropped"]) for one in taken(small)] == [({"knee.position": [2.0]}, 1)]

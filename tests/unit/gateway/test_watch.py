@@ -1,20 +1,22 @@
 """The watch over a held stop: whom it asks to stop again, and whom it leaves alone for a while."""
 
+import time
 from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
+from drivers.errors import DeviceTimeout
 from drivers.joint.quick_stop import StopOutcome
 from gateway.modules.stop.authority import Authority
-from gateway.modules.stop.controllers import Controllers
-from gateway.modules.stop.machine import Finding, Input
+from gateway.modules.stop.controllers import Controller, Controllers
+from gateway.modules.stop.machine import Finding, Input, Phase
 from gateway.modules.stop.reset import Lowering
 from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Report
 from gateway.modules.stop.watch import AT_LEAST_S, LOOK_S, Watch
-from gateway.process.futures import done
+from gateway.process.futures import done, failed
 from gateway.process.loop import Loop
 
 
@@ -80,3 +82,38 @@ def test_a_controller_that_is_only_asked_to_stop_keeps_no_reset_from_its_end(
     assert found.result(0).problems == {"gait": "it was not read within 0.05 s"}
     assert not found.result(0).findings["gait"].at_rest
     loop.close()
+
+
+def at_rest(*names: str) -> dict[str, Finding]:
+    return {name: Finding(at_rest=True, asked_ns=time.monotonic_ns()) for name in names}
+
+
+@pytest.mark.parametrize("is_being_proved", [False, True])
+def test_nobody_who_is_led_down_is_stopped_by_a_look(is_being_proved: bool) -> None:
+    """It would overtake the way down, or the end of the hold that was proved."""
+    knee = Unseen(object(), AT_LEAST_S)
+    authority = Authority({"knee"}, ())
+    authority.feed(Input.STOP, _nothing)
+    reset = authority.feed(Input.RESET, _nothing)
+    if is_being_proved:
+        authority.feed(Input.PROVED, _nothing, number=reset.number, findings=at_rest("knee"))
+    assert authority.state.phase is (Phase.RELEASING if is_being_proved else Phase.RESETTING)
+    Watch(authority, cast("dict[str, Stopper]", {"knee": knee}), {}, _nothing, _nothing).look()
+    assert knee.asked == 0
+
+
+@pytest.mark.parametrize("error", [DeviceTimeout("gait", "no answer"), None])
+def test_a_controller_that_does_not_tell_whether_it_is_stopped_is_asked_to_stop(
+    error: Exception | None,
+) -> None:
+    asked: list[str] = []
+    told = done(Finding(at_rest=True, asked_ns=1)) if error is None else failed(error)
+    gait = SimpleNamespace(running=False, look=lambda: told, stop=lambda: asked.append("stop"))
+    authority = Authority({"gait"}, ())
+    authority.feed(Input.STOP, _nothing)
+    Watch(authority, {}, cast("dict[str, Controller]", {"gait": gait}), _nothing, _nothing).look()
+    assert asked == ([] if error is None else ["stop"])
+
+
+def _nothing(*_what: object) -> None:
+    """Takes whatever is told."""

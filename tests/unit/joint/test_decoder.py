@@ -71,3 +71,9 @@ def test_fields_may_stand_in_any_order(order: tuple[int, int]) -> None:
     decoder = make_decoder(tpdo(16, 16), [parts[at] for at in order], STATUSWORD, STATE)
     values = dict(zip(decoder.channels, decoder.values(b"\x01\x00\x02\x00"), strict=True))
     assert values == {1: 1, 2: 2}
+
+
+def test_what_is_left_out_between_two_objects_need_not_be_whole_bytes() -> None:
+    fields = [Field(1, 0, 8, signed=False, linear=PLAIN), Field(2, 12, 16, signed=True, linear=PLAIN)]
+    decoder = make_decoder(tpdo(8, 4, 16), fields, STATUSWORD, STATE)
+    assert decoder.values(bytes.fromhex("AA EF FF 0F")) == (0xAA, -2)

@@ -11,6 +11,7 @@ from drivers.bus.sender import BusFull, StillLeaving
 from drivers.errors import Unavailable
 from drivers.joint.axis import Axis
 from drivers.joint.commands import CONTROLWORD, STATUSWORD, STOPPED_STATES, Controlword
+from drivers.joint.power import LIMP_STATES
 from drivers.joint.quick_stop import StopOutcome, Stopping
 from tests.unit.bus.direct import Direct
 
@@ -190,3 +191,16 @@ def test_a_confirmed_stop_knows_when_the_reads_were_begun_that_it_rests_on() -> 
     while stopping.turn(Axis(drive.channel, 0)) is None:
         asked_ns = asked_ns or time.monotonic_ns()  # behind the controlword, before the first read
     assert asked_ns <= stopping.read_ns <= time.monotonic_ns()
+
+
+@pytest.mark.parametrize("statusword", AFTER_QUICK_STOP)
+def test_only_an_axis_without_current_is_limp(statusword: int) -> None:
+    """One that still brakes after a fault has current."""
+    drive = Drive(statusword)
+    drive.refuses = True  # it stays where it is
+    stopping = Stopping(Controlword.DISABLE_VOLTAGE, LIMP_STATES, TIMEOUT_S, asked=False)
+    drive.channel.resume(urgent=True)
+    while (outcome := stopping.turn(Axis(drive.channel, 0))) is None:
+        pass
+    limp = statusword in (0x0040, 0x0008)
+    assert outcome is (StopOutcome.CONFIRMED if limp else StopOutcome.UNCONFIRMED)

@@ -15,7 +15,7 @@ from drivers.cli import listen, live, sensor
 from drivers.errors import SettingsError, Unavailable
 from drivers.identify import Match
 from tests.support.waiting import until
-from tests.unit.port.terminals import Terminal
+from tests.unit.port.terminals import Terminal, send_until
 from tests.unit.sensor_cli.streams import capture, streams
 
 ANGLE = bytes.fromhex("55 53 04 0c e1 ff 6f f2 cc 46 0b")
@@ -199,6 +199,27 @@ def test_recording_of_silence_leaves_no_file(
     with pytest.raises(Unavailable, match=why):
         sensor.main(["record", str(terminal.path), str(tmp_path / "walk.bin"), "--seconds", "0.1", how])
     assert not (tmp_path / "walk.bin").exists()
+
+
+def test_a_port_that_went_away_while_it_was_recorded_is_told_and_is_no_success(
+    terminal: Terminal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "walk.bin"
+
+    def unplug() -> None:
+        send_until(terminal, b"some", lambda: file.exists() and file.stat().st_size > 0, "it is recorded")
+        terminal.unplug()
+
+    unplugging = threading.Thread(target=unplug)
+    unplugging.start()
+    try:
+        argv = ["record", str(terminal.path), str(file), "--seconds", "1.5", "--baud", "115200", "--raw"]
+        assert sensor.main(argv) == 1
+    finally:
+        unplugging.join()
+    out, told = capsys.readouterr()
+    assert "went away: check its cable" in told
+    assert "NOT all that was sent" in out
 
 
 def test_noise_as_at_a_wrong_baud_rate_is_recorded_only_where_that_is_said(

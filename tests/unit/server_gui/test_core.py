@@ -272,3 +272,18 @@ def test_age_counts_the_robots_own_delay(fake: FakeRobot, network: Network) -> N
     watcher.until(lambda: any(isinstance(event, Telemetry) for event in watcher.events))
     ages = [event.age_ns for event in watcher.events if isinstance(event, Telemetry)]
     assert all(age is not None and 0 <= age < 30 * SECOND_NS and math.isfinite(age) for age in ages)
+
+
+@pytest.mark.parametrize("name", ["Exo 1 (Lab)", "exo-01", "Übungsroboter #2, links"])
+def test_a_robot_may_call_itself_as_people_do(name: str) -> None:
+    with FakeRobot() as robot:
+        described = robot.describe() | {"robot": name}
+        robot.overrides["robot.describe"] = lambda _params: described
+        with FollowedRobot(Address.parse(robot.address)) as followed:
+            waiting.until(
+                lambda: followed.station.robot.parts,
+                lambda: followed.station.robot.last_failure,
+                step=followed.update,
+            )
+            assert followed.station.robot.description is not None
+            assert followed.station.robot.description.robot == name

@@ -1,12 +1,13 @@
 """Keys, controls, drawings: what the terminal does with a robot's state."""
 
+import dataclasses
 import io
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 from rich.console import Console
@@ -14,6 +15,7 @@ from rich.console import Console
 from gateway.client import Batch, ConnectionState, LinkLost
 from gateway.wire.component import ChannelInfo, ComponentInfo, QualityInfo, Snapshot
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Written
+from gateway.wire.resource import MemoryUse
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import Reset, StopInfo, Stopped
 from server_gui.core.desk.station import Station
@@ -27,7 +29,7 @@ from server_gui.terminal import headless, marks
 from server_gui.terminal.controls import Controls, neighbour, step_of
 from server_gui.terminal.dashboard import draw
 from server_gui.terminal.keys import Key, KeyParser
-from tests.support.desk import FakeCommands
+from tests.support.desk import FakeCommands, resources
 
 
 def parameter(
@@ -157,6 +159,27 @@ def test_stop_goes_out_also_during_a_write_and_each_time() -> None:
     assert len(asked.named("stop")) == 2
 
 
+def test_what_a_stop_comes_to_is_shown_whatever_keys_were_pressed_meanwhile() -> None:
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
+    controls.press(Key.STOP)
+    controls.press(Key.DOWN)
+    station.take([LinkChanged(ConnectionState.WAITING, "no gateway at 127.0.0.1:7420", 0)])
+    asked.fail(LinkLost("there is no link"))
+    assert "STOP NOT CONFIRMED: there is no link" in screen(station, controls)
+
+
+def test_what_a_stop_comes_to_is_waited_for_before_the_end() -> None:
+    asked = FakeCommands()
+    controls = Controls(a_station(asked))
+    controls.press(Key.STOP)
+    controls.press(Key.QUIT)
+    assert not controls.is_over
+    asked.answer(Stopped({"left_knee": "confirmed"}, True))
+    assert controls.is_over
+
+
 def test_a_reset_needs_the_key_twice_within_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 100.0
     monkeypatch.setattr("server_gui.terminal.controls.time.monotonic", lambda: now_s)
@@ -182,6 +205,23 @@ def test_step_is_round_and_within_the_largest(
     low: float, high: float, largest: float | None, step: float
 ) -> None:
     assert step_of(low, high, largest) == pytest.approx(step)
+
+
+@given(
+    value=st.floats(allow_nan=False, allow_infinity=False),
+    ends=st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 2),
+    largest=st.none() | st.floats(0, 1e300),
+    by=st.sampled_from([-1, 1]),
+)
+@example(value=0.0, ends=(-1.7e308, 1.7e308), largest=None, by=1)
+@example(value=1e308, ends=(0.0, 0.5), largest=None, by=1)
+@example(value=0.0, ends=(0.0, 5e-324), largest=None, by=1)
+def test_whatever_a_robot_says_of_a_parameter_its_neighbour_is_within_its_limits_or_none(
+    value: float, ends: tuple[float, float], largest: float | None, by: int
+) -> None:
+    low, high = min(ends), max(ends)
+    target = neighbour(value, by, parameter("x", low, high, largest))
+    assert target is None or low <= target <= high
 
 
 @given(
@@ -223,10 +263,39 @@ def test_needle_marks_zero_and_the_value() -> None:
     assert marks.needle(9.0, 0.0, 1.0, 3) == "──◆"
 
 
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(value=NUMBERS, low=NUMBERS, high=NUMBERS)
+@example(value=1.7e308, low=-0.5, high=1.3)
+@example(value=0.0, low=-1.7e308, high=1.7e308)
+@example(value=2.0, low=2.0, high=2.0)
+def test_no_number_of_a_robot_cannot_be_drawn(value: float, low: float, high: float) -> None:
+    assert len(marks.needle(value, low, high, 9)) == 9
+    assert len(marks.sparkline([value], low, high, 9)) == 9
+
+
 def test_scale_stands_above_the_ends_and_the_zero_of_its_needle() -> None:
     low, high = math.radians(-30), math.radians(75)
     assert marks.scale(low, high, 22) == "-30°  0°           75°"
     assert marks.needle(None, low, high, 22).index("┼") == 6
+
+
+@pytest.mark.parametrize("size", [(20, 5), (40, 10), (80, 12), (10, 2), (200, 3)])
+def test_what_became_of_a_stop_is_shown_however_small_the_terminal_is(size: tuple[int, int]) -> None:
+    asked = FakeCommands()
+    station = a_station(asked)
+    controls = Controls(station)
+    controls.press(Key.STOP)
+    asked.fail(LinkLost("there is no link"))
+    assert "STOP NOT C"[: size[0] - 1] in screen(station, controls, size)
+
+
+def test_a_computer_without_memory_is_no_end_of_the_screen() -> None:
+    station = a_station()
+    seen = resources()
+    station.take([dataclasses.replace(seen, snapshot=replace(seen.snapshot, memory=MemoryUse(0, 0, 0, 0)))])
+    assert "memory" in screen(station)
 
 
 @pytest.mark.parametrize("size", [(118, 27), (80, 24), (160, 45)])

@@ -37,6 +37,28 @@ def test_a_robot_is_shown_and_q_ends_it() -> None:
             os.close(ours)
 
 
+def test_a_stop_that_nobody_confirms_is_waited_for_and_is_an_error_at_the_end() -> None:
+    ours, theirs = pty.openpty()
+    with FakeRobot() as robot:
+        command = [sys.executable, "-m", "gateway.main", "top", "--robot", robot.address]
+        running = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=subprocess.PIPE)
+        os.close(theirs)
+        try:
+            _read_until(ours, "exo-fake.*left knee.*gait.step_length")
+            robot.mute = True
+            os.write(ours, b"sq")
+            _read_until(ours, "STOP sent")
+            robot.cut()
+            _read_until(ours, None)
+            _, told = running.communicate(timeout=WAIT_S)
+        finally:
+            running.kill()
+            running.wait()
+            os.close(ours)
+    assert running.returncode == 1
+    assert told.startswith(b"gwrms top: STOP NOT CONFIRMED: ")
+
+
 def _read_until(terminal: int, pattern: str | None) -> None:
     """Read what is shown until it has this, or until nobody shows anything any more."""
     shown, until_s = "", time.monotonic() + WAIT_S

@@ -1,0 +1,36 @@
+"""The `gwrms` command itself, whatever it is started with."""
+
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from tests.fake_robot import FakeRobot
+
+GWRMS = (sys.executable, "-m", "gateway.main")
+
+
+@pytest.mark.parametrize("closed", [">&-", "<&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_stop_goes_out_and_counts_whatever_stream_is_closed(closed: str) -> None:
+    with FakeRobot() as robot:
+        command = f"{shlex.join(GWRMS)} stop --robot {robot.address} {closed}"
+        ended = subprocess.run(["bash", "-c", command], capture_output=True, timeout=300, check=False)
+        assert (ended.returncode, ended.stderr) == (0, b"")
+        assert len(robot.called("robot.stop")) == 1
+
+
+@pytest.mark.parametrize("command", ["describe --robot 127.0.0.1:1 --json", "--help", "describe --help"])
+def test_a_reader_that_has_left_is_no_mistake_of_ours(command: str) -> None:
+    left, ours = os.pipe()
+    os.close(left)
+    try:
+        words = [*GWRMS, *command.split()]
+        ended = subprocess.run(
+            words, stdout=ours, stderr=subprocess.PIPE, text=True, timeout=300, check=False
+        )
+    finally:
+        os.close(ours)
+    assert "Traceback" not in ended.stderr
+    assert "Exception ignored" not in ended.stderr
