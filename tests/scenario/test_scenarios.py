@@ -3,6 +3,7 @@
 These take as long as what happens in them; `gwrms sim run scenarios/*.toml` runs every one.
 """
 
+import json
 import re
 import signal
 import socket
@@ -127,10 +128,12 @@ def test_a_script_happens_to_a_robot_without_a_gateway(tmp_path: Path) -> None:
         with socket.socket(socket.AF_UNIX) as control:
             control.settimeout(DEADLINE_S)
             control.connect(str(tmp_path / "robot" / "control"))
-            answer = b""
-            while b"sensor_unplugged" not in answer:
-                control.sendall(b'{"list": true}\n')
-                answer = control.recv(65536)
+            with control.makefile("rb") as answers:
+                active: list[dict[str, object]] = []
+                while not active:
+                    control.sendall(b'{"list": true}\n')
+                    active = json.loads(answers.readline())["active"]
+        assert active[0]["name"] == "sensor_unplugged"
         assert not (tmp_path / "robot" / "trunk").exists()
         simulator.terminate()
     assert simulator.returncode == 0
