@@ -83,13 +83,13 @@ def main(argv: list[str]) -> int:
     except SystemExit as leave:
         return 2 if leave.code else 0
     try:
-        scripts = {file: load(file) for file in arguments.files}
+        scripts = [(file, load(file)) for file in arguments.files]
     except ScenarioError as error:
         sys.stderr.write(f"gwrms sim run: {error}\n")
         return 2
     before = signal.signal(signal.SIGTERM, lambda _signal, _frame: sys.exit(_TERMINATED))
     try:
-        runs = [_run(file, script, arguments) for file, script in scripts.items()]
+        runs = [_run(file, script, arguments) for file, script in scripts]
     finally:
         signal.signal(signal.SIGTERM, before)
     results = [ran.outcome.result for ran in runs]

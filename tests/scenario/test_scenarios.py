@@ -3,17 +3,21 @@
 These take as long as what happens in them; `gwrms sim run scenarios/*.toml` runs every one.
 """
 
+import contextlib
 import json
 import re
 import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import psutil
 import pytest
 
+from hil_sim.control_socket import ask
+from hil_sim.errors import SimulatorError
 from tests.support.waiting import until
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
@@ -83,6 +87,30 @@ def test_what_is_not_as_expected_is_told_and_the_exit_status_is_1(tmp_path: Path
     if not slow:
         assert "of 4 expectations 3 failed" in lines
         assert lines[-1] == "1 scenario: 1 failed"
+
+
+def test_a_failure_while_the_computer_had_no_time_is_inconclusive_and_the_exit_status_is_3(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "never.toml"
+    file.write_text('[[expect]]\ntruth = "gait.state"\nis = "asleep"\nwithin_s = [0, 10]\n', encoding="utf-8")
+    command = [sys.executable, "-P", "-m", "gateway.main", "sim", "run", str(file)]
+    with subprocess.Popen([*command, "--dir", str(tmp_path)], stdout=subprocess.PIPE, text=True) as running:
+        until(lambda: answers(tmp_path), "the robot runs")
+        running.send_signal(signal.SIGSTOP)
+        time.sleep(2.0)  # in which nobody runs
+        running.send_signal(signal.SIGCONT)
+        said, _ = running.communicate(timeout=DEADLINE_S)
+    assert running.returncode == 3, said
+    assert "inconclusive: this computer was too slow between 0 and 10 s" in said
+    assert said.splitlines()[-1] == "1 scenario: 1 inconclusive"
+
+
+def answers(folder: Path) -> bool:
+    """Whether the robot's own loop turns."""
+    with contextlib.suppress(SimulatorError):
+        return "active" in ask(folder, {"list": True})
+    return False
 
 
 def test_a_gateway_that_does_not_start_is_told_with_its_last_words(tmp_path: Path) -> None:
