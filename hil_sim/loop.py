@@ -33,6 +33,7 @@ class Loop:
         )  # it waits to the microsecond; others in whole milliseconds
         self._each_turn: list[Callable[[], None]] = []
         self._stopped = False
+        self._late_ns = 0
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._selector.register(self._wake, selectors.EVENT_READ, lambda _: os.eventfd_read(self._wake))
 
@@ -59,11 +60,17 @@ class Loop:
         self._selector.close()
         os.close(self._wake)
 
+    def take_late_ns(self) -> int:
+        """Return by how much the latest event since the last call came late, with what was left out."""
+        late_ns, self._late_ns = self._late_ns, 0
+        return late_ns
+
     def run(self, until_ns: int | None = None) -> None:
         """Run until `stop`, or until simulated time reaches `until_ns`."""
         self._anchor(self.clock.now_ns)
         while not self._stopped and (until_ns is None or self.clock.now_ns < until_ns):
             target = self._target_ns()
+            self._note_late(target)
             self.clock.run_until(target if until_ns is None else min(target, until_ns))
             for action in self._each_turn:
                 action()
@@ -83,9 +90,15 @@ class Loop:
         target = self._simulated_start_ns + round(elapsed_ns * self._speed)
         if target - now_ns > _CATCH_UP_NS * max(self._speed, 1.0):
             self.skipped_ns += target - now_ns
+            self._late_ns += target - now_ns
             self._anchor(now_ns)
             return now_ns
         return target - (target - self._simulated_start_ns) % self._step_ns
+
+    def _note_late(self, target_ns: int) -> None:
+        due_ns = self.clock.next_due_ns()
+        if due_ns is not None and self._speed is not None:
+            self._late_ns = max(self._late_ns, target_ns - due_ns)
 
     def _wait_s(self) -> float | None:
         if self._speed is None:

@@ -8,6 +8,7 @@ from hil_sim import controller
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.injector import Faults, check_fault, find
+from hil_sim.faults.registry import FAULTS
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.timetable import Entry
 
@@ -60,7 +61,13 @@ class Operator:
         return {"controller": self._robot.controller.controller_state.name.lower()}
 
     def _list(self, _request: Request) -> Answer:
-        return {"active": [asdict(active) for active in self._faults.active]}
+        """Every fault with its keys and where it is on now, and those that are on."""
+        active = self._faults.active
+        faults = {
+            name: fault.facts | {"active": [one.on for one in active if one.name == name]}
+            for name, fault in FAULTS.items()
+        }
+        return {"active": [asdict(one) for one in active], "faults": faults}
 
 
 def verb_of(request: Request) -> str:

@@ -1,13 +1,16 @@
 """The simulated robot with its doors open: bus by hub, interface or channel, sensors on pseudo-terminals."""
 
+import tomllib
 from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from hil_sim import robot_file
 from hil_sim.bus.load import LoadWatch
 from hil_sim.bus.socketcan import SocketCanBridge
 from hil_sim.control_socket import ControlSocket
+from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.housing import Housing
@@ -27,9 +30,9 @@ class SimulatedRobot(Housing):
 
     The wearer is subject `person`; the ground truth is written to `truth`; `drives` names the files of joints
     with other drives than ours. With `interface` the bus is that CAN interface of Linux; the nodes named in
-    `without` are not simulated. `say` is told when the interface goes and comes back, and when the bus is
-    overloaded. `faults` and `operator` belong to the thread that runs it; others use the control socket in
-    the folder. For the rest see `Housing`.
+    `without` are not simulated. `guard` is that table of robot.toml. `say` is told when the interface goes
+    and comes back, and when the bus is overloaded. `faults` and `operator` belong to the thread that runs it;
+    others use the control socket in the folder. For the rest see `Housing`.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class SimulatedRobot(Housing):
         interface: str | None = None,
         say: Callable[[str], object] = lambda _: None,
         without: Collection[str] = (),
+        guard: Mapping[str, Any] | None = None,
     ) -> None:
         self.exoskeleton = Exoskeleton(scenario, seed, sensors, person, drives, without)
         super().__init__(folder, self.exoskeleton.bus, virtual_channel, speed, epoch_s)
@@ -55,12 +59,23 @@ class SimulatedRobot(Housing):
         self._truth = truth
         self._interface = interface
         self._say = say
+        self._guard = guard
 
     def _config_text(self, bus: str) -> str:
-        return robot_file.text(self.folder.path, bus, self.exoskeleton)
+        return robot_file.text(self.folder.path, bus, self.exoskeleton, self._guard)
 
     def _companions(self) -> Mapping[str, str]:
         return companions(self.exoskeleton.sensors.choice)
+
+    def _check_guard(self) -> None:
+        """What was there before stays, so it must be what is wanted; raises `SimulatorError`."""
+        if self._guard is None or self.config_is_ours:
+            return
+        if tomllib.loads(self.config.read_text(encoding="utf-8")).get("guard") != self._guard:
+            raise SimulatorError(
+                f"{self.config} is there already, and its [guard] is not the scenario's; "
+                "delete it, or choose another folder"
+            )
 
     def _open_bus(self, loop: Loop, closing: ExitStack) -> str:
         if self._interface is None:
@@ -71,6 +86,7 @@ class SimulatedRobot(Housing):
         return robot_file.socketcan_bus(self._interface)
 
     def _furnish(self, loop: Loop, closing: ExitStack) -> None:
+        self._check_guard()
         for drive in self.exoskeleton.simulated_drives:
             drive.storage.memory = self.folder.memory(drive)
         for name, line in self.exoskeleton.sensors.lines.items():

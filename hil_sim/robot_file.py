@@ -1,9 +1,11 @@
 """The robot's file that a gateway needs for the simulated robot, written as an example to learn from."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from hil_sim import personality
+from hil_sim import personality, toml_text
 from hil_sim.bus.hub import HOST
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_EDS, CONTROLLER_NODE, DRIVE_EDS, Exoskeleton
@@ -49,6 +51,14 @@ _SOCKETCAN = """\
 [can.main]                      # one CAN bus; its name is what `bus = …` below refers to
 interface = "socketcan"         # Linux's own CAN interfaces
 channel = "{channel}"               # as `ip link` calls it
+"""
+
+_OUR_NODE = """\
+node_id = 100                   # ours, by which the guard's heartbeat is known
+"""
+
+_GUARD_NOTE = """
+# The guard of the scenario.
 """
 
 _FIRST_JOINT = """
@@ -186,14 +196,14 @@ def socketcan_bus(interface: str) -> str:
     return _SOCKETCAN.format(channel=interface)
 
 
-def text(folder: Path, bus: str, robot: Exoskeleton) -> str:
-    """Return the file for the simulator in `folder` (absolute), with the tables of bus and sensors."""
+def text(folder: Path, bus: str, robot: Exoskeleton, guard: Mapping[str, Any] | None = None) -> str:
+    """Return the file for the simulator in `folder` (absolute), with the tables of bus, sensors and guard."""
     drives = robot.simulated_drives
     templates = (_FIRST_JOINT, *[_JOINT] * (len(drives) - 1))
     led = CONTROLLER not in robot.without
     return "".join(
         (
-            _HEAD.format(path=folder / "robot.toml", bus=bus),
+            _HEAD.format(path=folder / "robot.toml", bus=bus + _OUR_NODE * ("heartbeat_ms" in (guard or {}))),
             *map(_joint, templates, drives),
             _NOT_SIMULATED.format(names=", ".join(sorted(robot.without))) if robot.without else "",
             _controller_table() if led else "",
@@ -203,6 +213,7 @@ def text(folder: Path, bus: str, robot: Exoskeleton) -> str:
             _CONTROLLER_PARAMETERS if led else "",
             _JOINT_PARAMETERS_NOTE,
             *map(_joint_parameters, drives),
+            "" if guard is None else _GUARD_NOTE + toml_text.table("guard", guard),
         )
     )
 

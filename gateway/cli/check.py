@@ -76,9 +76,11 @@ KINDS: Final[Mapping[str, Kind]] = {
     ),
     "scenario": Kind(
         "a scenario",
-        "hil_sim.scenario.script:findings",
-        "hil_sim.scenario.schema:schema",
-        frozenset(["at", "expect", "title", "robot.scenario", "robot.seconds", "robot.imu", "robot.insole"]),
+        "gateway.cli.check_scenario:findings",
+        "gateway.cli.check_scenario:schema",
+        frozenset(
+            ["at", "expect", "guard", "title", "robot.scenario", "robot.seconds", "robot.imu", "robot.insole"]
+        ),
     ),
 }
 

@@ -9,6 +9,7 @@ from gateway.client import RemoteError, Robot
 from gateway.wire.framing import Kind
 from gateway.wire.parameter import Written
 
+_CHOICE = "Enter keeps it, Ctrl-C takes it back; nobody else can write meanwhile"
 LOOK_S = 1.0  # how often the robot is asked whether the trial still stands
 
 
@@ -16,7 +17,7 @@ def wait_for_decision(robot: Robot, written: Written, *, json: bool) -> int:
     """Keep the trial when a line comes on standard input; 0 when it was kept, 1 when it was taken back."""
     interactive = sys.stdin.isatty() and not json
     if not json:
-        say(f"on trial for {exact(written.trial_s)} s: Enter keeps it, Ctrl-C takes it back\n")
+        say(f"on trial for {exact(written.trial_s)} s: {_CHOICE}\n")
     ends = time.monotonic() + (written.trial_s or 0.0)
     try:
         kept = _wait(robot, written.write, ends, countdown=interactive)

@@ -62,7 +62,7 @@ WRITE_TIMEOUT_S = 30.0  # a transaction over several drives, verified and perhap
 STORE_TIMEOUT_S = 120.0  # devices write their memory, and are compared before and after
 STOP_TIMEOUT_S = 5.0
 LEADING_TIMEOUT_S = 30.0  # drives are led from state to state, each confirmed
-LEASE_MARGIN_S = 30.0
+LEASE_MARGIN_S = 5.0  # beyond a trial's time, for what is said at its end to come through
 LONGEST_LEASE_S = 300.0
 
 
@@ -192,14 +192,18 @@ class Client:
     async def trial(self, changes: Mapping[str, float], trial_s: float) -> AsyncIterator[Written]:
         """Try parameters for a block; what was not confirmed in it is taken back at its end.
 
+        The lease is given back at the end of the block, and ends soon after the trial's time in any case.
+
         async with robot.trial({"gait.step_length": 0.42}, trial_s=30) as written:
             ...
             await robot.confirm(written.write)
         """
         async with self.writing(min(trial_s + LEASE_MARGIN_S, LONGEST_LEASE_S)):
+            await self.acquire(min(max(self._writing) + WRITE_TIMEOUT_S, LONGEST_LEASE_S))
             written = await self.write(changes, trial_s)
             self._trying.add(written.write)
             try:
+                await self.acquire(max(self._writing))  # it is written: others are told when they may write
                 yield written
             finally:  # before the lease is given back: that would take it back too, but is answered sooner
                 if written.write in self._trying:

@@ -27,15 +27,27 @@ def schema() -> Schema:
     del can["properties"]["more"]
     can["additionalProperties"] = True  # python-can's own
     can["properties"]["interface"] |= {"anyOf": [{"enum": list(interfaces())}, {"type": "string"}]}
-    for struct in _rules():
-        watched = [name for name, watch in WATCHES.items() if watch.rule is struct]
-        defs[struct.__name__]["properties"]["watch"]["enum"] = watched
-    defs[GuardSettings.__name__]["properties"]["rule"] = named({"anyOf": [ref(one) for one in _rules()]})
+    _tell_rules(defs)
     properties = {name: ref(struct) for name, struct in SINGLE.items()}
     properties |= {name: named(ref(struct)) for name, struct in plain.items()}
     properties["imu"] = named({"anyOf": [ref(one) for one in _IMUS]})
     properties["guard"] = ref(GuardSettings)
     return document("robot.toml", properties, ["robot"], defs)
+
+
+def guard() -> tuple[Schema, dict[str, Schema]]:
+    """`[guard]` alone, and the definitions that it refers to."""
+    defs = definitions([GuardSettings, *_rules()])
+    _tell_rules(defs)
+    return ref(GuardSettings), defs
+
+
+def _tell_rules(defs: dict[str, Schema]) -> None:
+    """What each kind of rule can watch, and that a guard's rules are of these kinds."""
+    for struct in _rules():
+        watched = [name for name, watch in WATCHES.items() if watch.rule is struct]
+        defs[struct.__name__]["properties"]["watch"]["enum"] = watched
+    defs[GuardSettings.__name__]["properties"]["rule"] = named({"anyOf": [ref(one) for one in _rules()]})
 
 
 def _rules() -> list[type[Struct]]:

@@ -51,7 +51,7 @@ function _shtab_gwrms_using
 end
 
 set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -280,6 +280,7 @@ complete -c gwrms -n '_shtab_gwrms_using sessions; and test $_shtab_gwrms_npos -
 complete -c gwrms -n '_shtab_gwrms_using sessions resources' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sessions resources' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'
 complete -c gwrms -n '_shtab_gwrms_using sessions resources' -l json -d 'for machines'
+complete -c gwrms -n '_shtab_gwrms_using sessions resources' -l all -d 'also those that never used anything'
 complete -c gwrms -n '_shtab_gwrms_using sessions resources' -l url -x -d 'file:///folder or s3://bucket/prefix (default: of the server'"'"'s file)'
 complete -c gwrms -n '_shtab_gwrms_using sessions; and test $_shtab_gwrms_npos -eq 0' -a compare -d 'Which programs take more in sessions than in earlier ones.'
 complete -c gwrms -n '_shtab_gwrms_using sessions compare' -s h -l help -d 'show this help message and exit'
@@ -491,6 +492,8 @@ complete -c gwrms -n '_shtab_gwrms_using sim; and test $_shtab_gwrms_npos -eq 0'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -l dir -xka "(__fish_complete_path (commandline -ct))" -d 'of the robot and of gateway.log; a robot.toml there is used (default: a new one)'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -l speed -x -d 'of the robot; the gateway'"'"'s own patience stays in real time (default: 1)'
+complete -c gwrms -n '_shtab_gwrms_using sim run' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the results there as JUnit'"'"'s XML, for CI systems'
+complete -c gwrms -n '_shtab_gwrms_using sim run' -l json -d 'one JSON object a scenario and line, and a total'
 complete -c gwrms -n '_shtab_gwrms_using sim run; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a scenario, or one that ships, by name'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sim-record -d 'Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -s h -l help -d 'show this help message and exit'

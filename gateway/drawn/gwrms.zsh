@@ -820,6 +820,7 @@ _shtab_gwrms_sessions_resources_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
   "--json[for machines]"
+  "--all[also those that never used anything]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":its name, or how that alone begins:"
 )
@@ -902,6 +903,8 @@ _shtab_gwrms_sim_run_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--dir[of the robot and of gateway.log\; a robot.toml there is used (default\: a new one)]:DIR:_files"
   "--speed[of the robot\; the gateway\'s own patience stays in real time (default\: 1)]:N:"
+  "--junit[write the results there as JUnit\'s XML, for CI systems]:FILE.xml:_files"
+  "--json[one JSON object a scenario and line, and a total]"
   "(*):a scenario, or one that ships, by name:_files"
 )
 

@@ -221,6 +221,7 @@ def main(argv: list[str]) -> int:
         interface=arguments.bus,
         say=running.say,
         without=arguments.without,
+        guard=script.guard,
     )
 
     return running.run(robot, arguments.seconds, lambda: schedule(script.lines, robot))

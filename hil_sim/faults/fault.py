@@ -67,6 +67,12 @@ class Number:
             )
         return number
 
+    @property
+    def facts(self) -> dict[str, Value]:
+        """What a program has to know to write it."""
+        bounds: dict[str, Value] = {"default": self.default, "min": self.low, "max": self.high}
+        return bounds | {"unit": self.unit, "what": self.what}
+
     def show(self, value: Value) -> str:
         """Return a value as people write it, with its unit."""
         number = f"0x{int(value):X}" if self.form is Form.CODE else f"{value:g}"
@@ -85,6 +91,11 @@ class FolderName:
         if not isinstance(value, str) or (value and not os.access(Path(value) / ".", os.W_OK)):
             raise FaultRefused(f"{name} = {value!r} is no folder to write in ({self.what}): name another one")
         return value
+
+    @property
+    def facts(self) -> dict[str, Value]:
+        """What a program has to know to write it."""
+        return {"default": self.default, "what": self.what}
 
     def show(self, value: Value) -> str:
         """Return a value as people write it."""
@@ -138,6 +149,12 @@ class Fault:
     looks: str
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     momentary: bool = False
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What a program has to know to ask for it."""
+        params = {key: parameter.facts for key, parameter in self.parameters.items()}
+        return {"on": self.on.value, "looks": self.looks, "momentary": self.momentary, "params": params}
 
 
 def _number(value: object) -> float | None:

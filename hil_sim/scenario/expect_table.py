@@ -2,7 +2,7 @@
 
 import fnmatch
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 
 from hil_sim.exoskeleton import CONTROLLER, JOINTS, SENSORS
 from hil_sim.scenario.expectation import Condition, Expectation, Seen, Timing, Track, When
@@ -16,21 +16,25 @@ SUBJECTS = {
     "channel": ("min", "max", "is", "missing"),
     "truth": ("min", "max", "is"),
     "answer": ("is", "says"),
+    "rule": ("tripped", "reason", "stop"),
 }
+# conditions that look at something else than their subject does
+_TRACKS = {"problem": Track.PROBLEM, "reason": Track.REASON, "stop": Track.STOP}
 
 
+TRIPPED = "tripped"  # of a guard's rule
 STATES = ("ok", "stale", "lost", "fault")  # of a component, as gateways say them
 COMPONENTS = (*JOINTS, CONTROLLER, *SENSORS)  # of the robot's own file
 
 
-def read(table: Table) -> list[Expectation]:
-    """Return the expectations of one table; raises `Unusable`."""
+def read(table: Table, rules: Collection[str] = ()) -> list[Expectation]:
+    """Return the expectations of one table, where the scenario's guard has these rules; raises `Unusable`."""
     subject = table.one_of(SUBJECTS)
     table.only({subject, *SUBJECTS[subject], *TIMINGS})
     glob, timing = table.text(subject), _timing(table)
-    _check_name(table, subject, glob)
+    _check_name(table, subject, glob, rules)
     found = [
-        Expectation(Track.PROBLEM if key == "problem" else Track(subject), glob, condition, timing)
+        Expectation(_TRACKS.get(key, Track(subject)), glob, condition, timing)
         for key, condition in _conditions(table, SUBJECTS[subject])
     ]
     if not found:
@@ -38,13 +42,13 @@ def read(table: Table) -> list[Expectation]:
     return found
 
 
-def _check_name(table: Table, subject: str, glob: str) -> None:
+def _check_name(table: Table, subject: str, glob: str, rules: Collection[str]) -> None:
     """Warn of a name that the robot does not have; a robot.toml of one's own may have others."""
-    known: tuple[str, ...] = names() if subject == "truth" else COMPONENTS
+    known: Collection[str] = {"truth": names(), "rule": sorted(rules)}.get(subject, COMPONENTS)
     asked = glob.partition(".")[0] if subject == "channel" else glob
-    if subject == "answer" or asked == "resource" or fnmatch.filter(known, asked):
+    if subject == "answer" or asked in ("resource", "guard") or fnmatch.filter(known, asked):
         return
-    table.warn(subject, unknown(asked, known))
+    table.warn(subject, unknown(asked, known) if known else "the scenario has no [guard.rule.NAME]")
 
 
 def _timing(table: Table) -> Timing:
@@ -97,6 +101,12 @@ def _missing(table: Table, key: str) -> Condition:
     return Condition("has a value", lambda seen: seen is not None)
 
 
+def _tripped(table: Table, key: str) -> Condition:
+    if table.flag(key):
+        return Condition("is tripped", lambda seen: seen == TRIPPED)
+    return Condition("is not tripped", lambda seen: seen != TRIPPED)
+
+
 _CONDITIONS: Mapping[str, Callable[[Table, str], Condition]] = {
     "state": _state,
     "problem": _contains,
@@ -105,4 +115,7 @@ _CONDITIONS: Mapping[str, Callable[[Table, str], Condition]] = {
     "min": _in_range,
     "max": _in_range,
     "missing": _missing,
+    "tripped": _tripped,
+    "reason": _contains,
+    "stop": _contains,
 }

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
@@ -19,6 +19,9 @@ class Track(Enum):
     CHANNEL = "channel"  # each channel's value at the gateway, the word where it has words
     TRUTH = "truth"  # the robot itself
     ANSWER = "answer"  # what the gateway answered to a line of the scenario
+    RULE = "rule"  # each guard rule's state, as the gateway says
+    REASON = "reason"  # … and why, in words
+    STOP = "stop"  # … and why the robot is held stopped, where that is this rule's doing; "" where not
 
 
 class Moment(NamedTuple):
@@ -29,6 +32,32 @@ class Moment(NamedTuple):
 
 
 Observed = Mapping[Track, Sequence[Moment]]
+
+# How a line of the result begins.
+_WHOSE = {
+    Track.TRUTH: "true ",
+    Track.ANSWER: "answer to ",
+    Track.PROBLEM: "problem of ",
+    Track.RULE: "guard rule ",
+    Track.REASON: "reason of guard rule ",
+    Track.STOP: "stop by guard rule ",
+}
+# What a glob names, where the track is not called so.
+_NAMED = {
+    Track.PROBLEM: "component",
+    Track.RULE: "guard rule",
+    Track.REASON: "guard rule",
+    Track.STOP: "guard rule",
+}
+
+
+class Result(StrEnum):
+    """What came of an expectation, or of a scenario."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    INCONCLUSIVE = "inconclusive"  # it failed where the computer was too slow to judge
+    NOT_RUN = "not run"
 
 
 class When(Enum):
@@ -56,6 +85,11 @@ class Timing:
             When.BETWEEN: f"always between {window}",
         }[self.when]
 
+    @property
+    def over_s(self) -> float:
+        """When nothing that comes later counts."""
+        return self.begin_s if self.when is When.AT else self.end_s
+
     def choose(self, moments: Sequence[Moment]) -> list[Moment]:
         """Return the moments that count."""
         if self.when is When.AT:
@@ -73,11 +107,22 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One line of the result: what was expected, and what was seen."""
+    """One line of the result: what was expected, what was seen, and by when that was clear (simulated s).
+
+    `doubt` says why a failure proves nothing.
+    """
 
     ok: bool
     expected: str
     seen: str
+    decided_s: float = 0.0
+    doubt: str = ""
+
+    @property
+    def result(self) -> Result:
+        if self.ok:
+            return Result.PASSED
+        return Result.INCONCLUSIVE if self.doubt else Result.FAILED
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +136,7 @@ class Expectation:
 
     @property
     def words(self) -> str:
-        what = {Track.TRUTH: "true ", Track.ANSWER: "answer to ", Track.PROBLEM: "problem of "}
-        return f"{what.get(self.track, '')}{self.glob} {self.condition.words} {self.timing.words}"
+        return f"{_WHOSE.get(self.track, '')}{self.glob} {self.condition.words} {self.timing.words}"
 
     def is_open(self, observed: Observed, now_s: float) -> bool:
         """Return whether what comes later can still change the verdict."""
@@ -106,7 +150,8 @@ class Expectation:
         moments = observed.get(self.track, ())
         names = sorted({name for moment in moments for name in moment.values if fnmatchcase(name, self.glob)})
         if not names:
-            return Verdict(False, self.words, f"there is no {self.track.value} {self.glob}")
+            named = _NAMED.get(self.track, self.track.value)
+            return Verdict(False, self.words, f"there is no {named} {self.glob}", self.timing.over_s)
         verdicts = [self._judge_one(name, moments) for name in names]
         return next((verdict for verdict in verdicts if not verdict.ok), verdicts[-1])
 
@@ -114,12 +159,14 @@ class Expectation:
         chosen = self.timing.choose([moment for moment in moments if name in moment.values])
         series = [(moment.time_s, moment.values[name]) for moment in chosen]
         if not series:
-            return Verdict(False, self.words, f"nothing was seen of {name} then")
+            return Verdict(False, self.words, f"nothing was seen of {name} then", self.timing.over_s)
         right = [(time_s, value) for time_s, value in series if self.condition.holds(value)]
         wrong = [(time_s, value) for time_s, value in series if not self.condition.holds(value)]
-        if self.timing.when is When.BETWEEN:
-            return Verdict(not wrong, self.words, f"{name} was {_story(wrong or right)}")
-        return Verdict(bool(right), self.words, f"{name} was {_story(right[:1] or series)}")
+        between = self.timing.when is When.BETWEEN
+        deciding = wrong if between else right  # the first of these decides; without any, the end does
+        decided_s = deciding[0][0] if deciding else self.timing.over_s
+        told = (wrong or right) if between else (right[:1] or series)
+        return Verdict(bool(deciding) is not between, self.words, f"{name} was {_story(told)}", decided_s)
 
 
 def _story(series: Sequence[tuple[float, Seen]]) -> str:

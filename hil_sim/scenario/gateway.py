@@ -31,9 +31,13 @@ class GatewayFailed(SimulatorError):
 
 
 class GatewayProcess:
-    """`gwrms gateway` for the robot of `config`; a context that ends it. What it says goes to `log`."""
+    """`gwrms gateway` for the robot of `config`; a context that ends it. What it says goes to `log`.
 
-    def __init__(self, config: Path, log: Path) -> None:
+    One that has `armed` the drives refuses its end as long as they are enabled: it is killed.
+    """
+
+    def __init__(self, config: Path, log: Path, *, armed: bool = False) -> None:
+        self._armed = armed
         self._log = log
         self._command = [sys.executable, "-P", "-m", "gateway.main", "gateway", str(config), "--port", "0"]
         self._process: subprocess.Popen[bytes] | None = None
@@ -57,12 +61,21 @@ class GatewayProcess:
     def __exit__(self, *_: object) -> None:
         if self._process is None:
             return
+        if self._armed:
+            self._process.kill()
         self._process.terminate()
         try:
             self._process.communicate(timeout=_END_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.communicate()
+
+    @property
+    def pid(self) -> int:
+        """Of the process that runs."""
+        if self._process is None:
+            raise RuntimeError("it is entered first")
+        return self._process.pid
 
     def _wait(self, process: "subprocess.Popen[bytes]") -> tuple[str, int]:
         said = b""

@@ -21,14 +21,18 @@ class Link(Protocol):
 
 
 class Observer:
-    """Looks ten times a simulated second; `observed` is all that was seen."""
+    """Looks ten times a simulated second; `observed` is all that was seen.
+
+    Where the robot has a guard, each look is also for its rules, and for whose stop is held.
+    """
 
     def __init__(self, robot: Exoskeleton, link: Link) -> None:
         self.observed: dict[Track, list[Moment]] = {track: [] for track in Track}
         self._robot = robot
         self._link = link
         self._enums: Mapping[str, Mapping[str, str]] = {}
-        self._answered = True
+        self._guarded = False
+        self._waiting = 0  # answers to the last look
         link.ask("robot.describe", {}, self._described)
         robot.clock.every(_PERIOD_NS, self._look)
 
@@ -51,19 +55,32 @@ class Observer:
 
     def _look(self) -> None:
         self.note(Track.TRUTH, truth(self._robot))
-        if self._answered:
-            self._answered = False
+        if not self._waiting:
+            self._waiting = 1 + self._guarded
             self._link.ask("component.snapshot", {}, self._snapshot)
+            if self._guarded:
+                self._link.ask("robot.describe", {}, self._rules)
 
     def _described(self, result: Result | None, refused: str) -> None:
         if result is None:
             raise GatewayFailed(f"robot.describe was refused: {refused}")
         self._enums = {one["name"]: one["enum"] for one in result["channels"] if "enum" in one}
+        self._guarded = bool(result["guard"]["rules"])
+
+    def _rules(self, result: Result | None, refused: str) -> None:
+        if result is None:
+            raise GatewayFailed(f"robot.describe was refused: {refused}")
+        self._waiting -= 1
+        rules = result["guard"]["rules"]
+        held = str(result["stop"]["reason"] or "") if result["stop"]["held"] else ""
+        self.note(Track.RULE, {one["name"]: str(one["state"]) for one in rules})
+        self.note(Track.REASON, {one["name"]: str(one["reason"] or "") for one in rules})
+        self.note(Track.STOP, {one["name"]: _stopped_by(one["name"], held) for one in rules})
 
     def _snapshot(self, result: Result | None, refused: str) -> None:
         if result is None:
             raise GatewayFailed(f"component.snapshot was refused: {refused}")
-        self._answered = True
+        self._waiting -= 1
         quality = result["quality"]
         self.note(Track.STATE, {name: str(one["state"]) for name, one in quality.items()})
         self.note(Track.PROBLEM, {name: str(one["problem"] or "") for name, one in quality.items()})
@@ -75,3 +92,8 @@ class Observer:
             return None
         words = self._enums.get(name)
         return float(value) if words is None else words.get(str(int(value)), str(value))
+
+
+def _stopped_by(rule: str, held: str) -> str:
+    """Why the robot is held stopped, where the stop's reason names this rule."""
+    return held if held.startswith(f"guard rule {rule}: ") else ""

@@ -1,23 +1,59 @@
 """A scenario's result as a table that a person reads."""
 
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from hil_sim.scenario.expectation import Result, Verdict
 from hil_sim.scenario.runner import Outcome
 from hil_sim.scenario.script import Script
 
+_MARKS = {Result.PASSED: "ok    ", Result.FAILED: "FAILED", Result.INCONCLUSIVE: "?     "}
 
-def text(script: Script, outcome: Outcome) -> str:
-    """Return a line for each expectation; what was seen stands below those that failed."""
-    lines = [script.title]
+
+def text(file: Path, script: Script, outcome: Outcome) -> str:
+    """Return a line for each expectation, and below it what was seen."""
+    lines = [f"{file}: {script.title}"]
     for verdict in outcome.verdicts:
-        lines.append(f"  {'ok    ' if verdict.ok else 'FAILED'}  {verdict.expected}")
+        lines.append(f"  {_MARKS[verdict.result]}  {verdict.expected}")
         lines.append(f"          {verdict.seen}")
-    failed = sum(not verdict.ok for verdict in outcome.verdicts)
-    lines.append(
-        f"{failed} of {len(outcome.verdicts)} expectations failed"
-        if failed
-        else f"all {len(outcome.verdicts)} expectations met"
-    )
+        if verdict.doubt:
+            lines.append(f"          inconclusive: {verdict.doubt}")
+    lines.append(_summary(outcome))
     if outcome.skipped_s:
         lines.append(
             f"This computer was too slow: {outcome.skipped_s:.1f} s were left out. Times may be off by that."
         )
     return "\n".join(lines) + "\n"
+
+
+def total(results: Iterable[Result]) -> str:
+    """Return the last line: how many scenarios, and what came of them."""
+    count = Counter(results)
+    said = [f"{count[result]} {result}" for result in Result if count[result]]
+    return f"{_counted(count.total(), 'scenario')}: {', '.join(said)}\n"
+
+
+def _summary(outcome: Outcome) -> str:
+    verdicts = outcome.verdicts
+    if outcome.problem:
+        return Result.NOT_RUN
+    wrong = [
+        f"{count} {word}"
+        for word, count in (
+            ("failed", _count(verdicts, Result.FAILED)),
+            ("inconclusive", _count(verdicts, Result.INCONCLUSIVE)),
+        )
+        if count
+    ]
+    if wrong:
+        return f"of {_counted(len(verdicts), 'expectation')} {', '.join(wrong)}"
+    return f"{_counted(len(verdicts), 'expectation')} met"
+
+
+def _count(verdicts: Sequence[Verdict], result: Result) -> int:
+    return sum(verdict.result is result for verdict in verdicts)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -2,33 +2,51 @@
 
 import time
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from hil_sim.clock import SECOND_NS
 from hil_sim.errors import SimulatorError
+from hil_sim.faults.fault import Target
+from hil_sim.faults.registry import FAULTS
 from hil_sim.operator import Operator
 from hil_sim.robot import SimulatedRobot
-from hil_sim.scenario.expectation import Verdict
+from hil_sim.scenario.expectation import Expectation, Observed, Result, Verdict
 from hil_sim.scenario.gateway import GatewayLink, GatewayProcess
+from hil_sim.scenario.lateness import Lateness
 from hil_sim.scenario.observer import Observer
 from hil_sim.scenario.script import Line, Script
 from hil_sim.scenario.table import ScenarioError
+from hil_sim.scenario.waiting import Waiting
 
+GATEWAY_LOG = "gateway.log"
 _LOOK_NS = SECOND_NS // 2  # how often to look whether everything is decided
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a scenario gave; `skipped_s` is simulated time that the computer was too slow for."""
+    """What a scenario gave; `skipped_s` is simulated time that the computer was too slow for.
 
-    verdicts: tuple[Verdict, ...]
-    skipped_s: float
+    `problem` says why it could not be run; then there are no verdicts.
+    """
+
+    verdicts: tuple[Verdict, ...] = ()
+    skipped_s: float = 0.0
+    seconds: float = 0.0  # that it took, in real time
+    problem: str = ""
 
     @property
-    def ok(self) -> bool:
-        return all(verdict.ok for verdict in self.verdicts)
+    def result(self) -> Result:
+        if self.problem:
+            return Result.NOT_RUN
+        found = {verdict.result for verdict in self.verdicts}
+        return next((one for one in (Result.FAILED, Result.INCONCLUSIVE) if one in found), Result.PASSED)
+
+    @property
+    def doubt(self) -> str:
+        """The first reason for which something is inconclusive; "" where nothing is."""
+        return next((verdict.doubt for verdict in self.verdicts if verdict.doubt), "")
 
 
 def schedule(lines: tuple[Line, ...], robot: SimulatedRobot) -> None:
@@ -54,10 +72,17 @@ def _obey(operator: Operator, line: Line) -> None:
 def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
     """Run a scenario in `folder` and judge it; the gateway lives in real time whatever `speed` is.
 
-    Raises:
-        SimulatorError: it could not be run.
-
+    What it could not be run for is the outcome's problem.
     """
+    began = time.monotonic()
+    try:
+        outcome = _run(script, folder, speed)
+    except SimulatorError as error:
+        outcome = Outcome(problem=str(error))
+    return replace(outcome, seconds=time.monotonic() - began)
+
+
+def _run(script: Script, folder: Path, speed: float | None) -> Outcome:
     robot = SimulatedRobot(
         folder,
         script.scenario,
@@ -67,14 +92,18 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
         sensors=script.sensors,
         person=script.subject,
         drives=script.drives,
+        guard=script.guard,
     )
     with ExitStack() as stack:
         robot.open()
         stack.callback(robot.close)
         schedule(tuple(line for line in script.lines if line.for_gateway is None), robot)
-        address = stack.enter_context(GatewayProcess(robot.config, folder / "gateway.log"))
+        armed = "heartbeat_ms" in (script.guard or {})
+        gateway = GatewayProcess(robot.config, folder / GATEWAY_LOG, armed=armed)
+        address = stack.enter_context(gateway)
         link = stack.enter_context(closing(GatewayLink(robot.loop, address)))
         observer = Observer(robot.exoskeleton, link)
+        lateness = _watch(robot, gateway)
         for line in script.lines:
             if line.for_gateway is not None:
                 ask = partial(observer.ask, line.for_gateway, line.request[line.for_gateway])
@@ -82,8 +111,32 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
         robot.exoskeleton.clock.every(_LOOK_NS, partial(_end_early, robot, script, observer))
         robot.run(script.seconds)
         skipped_s = robot.loop.skipped_ns / SECOND_NS
-    verdicts = tuple(expectation.judge(observer.observed) for expectation in script.expectations)
-    return Outcome(verdicts, skipped_s)
+    judged = tuple(_judge(one, script.lines, observer.observed, lateness) for one in script.expectations)
+    return Outcome(judged, skipped_s)
+
+
+def _watch(robot: SimulatedRobot, gateway: GatewayProcess) -> Lateness:
+    """Whether there is time for both; that a fault takes it from the gateway is what a scenario is for."""
+    waiting = Waiting(gateway.pid)
+
+    def waited_s() -> float:
+        found_s = waiting.take_s()
+        on_purpose = any(FAULTS[active.name].on is Target.HOST for active in robot.faults.active)
+        return 0.0 if on_purpose else found_s
+
+    return Lateness(robot.exoskeleton.clock, lambda: robot.loop.take_late_ns() / SECOND_NS, waited_s)
+
+
+def _judge(
+    expectation: Expectation, lines: tuple[Line, ...], observed: Observed, lateness: Lateness
+) -> Verdict:
+    """A failure is in doubt where time was lost since the last thing that happened before its window."""
+    verdict = expectation.judge(observed)
+    if verdict.ok:
+        return verdict
+    timing = expectation.timing
+    since_s = max((line.time_s for line in lines if line.time_s <= timing.begin_s), default=0.0)
+    return replace(verdict, doubt=lateness.doubt(timing, since_s, verdict.decided_s))
 
 
 def _end_early(robot: SimulatedRobot, script: Script, observer: Observer) -> None:

@@ -59,6 +59,7 @@ _CONDITIONS: Final[Mapping[str, Schema]] = {
     "min": _NUMBER,
     "max": _NUMBER,
     "missing": {"type": "boolean"},
+    "tripped": {"type": "boolean"},
 }
 
 
@@ -70,6 +71,7 @@ def schema() -> Schema:
         **_table(
             {
                 "title": _TEXT,
+                "guard": {"type": "object"},  # what stands in it belongs to who reads robot.toml
                 "robot": _table({key: _ROBOT[key] for key in ROBOT_KEYS}),
                 "at": {"type": "array", "items": {"anyOf": [_line(key) for key in _LINES]}},
                 "expect": {"type": "array", "items": {"anyOf": [_expected(key) for key in SUBJECTS]}},

@@ -1,7 +1,8 @@
-"""A scenario file: the robot, what happens to it and when, and what is expected (docs/how-to/bench.md).
+"""A scenario file: the robot, what happens to it and when, and what is expected (docs/how-to/scenarios.md).
 
-`[robot]` has scenario, seconds, seed, subject, imu, insole and drive; each `[[at]]` a time and one thing
-that happens; each `[[expect]]` what is looked at, what it must be, and when.
+`[robot]` has scenario, seconds, seed, subject, imu, insole and drive; `[guard]` is that of the robot's file,
+which the gateway judges; each `[[at]]` is a time and one thing that happens; each `[[expect]]` what is looked
+at, what it must be, and when.
 """
 
 import contextlib
@@ -11,17 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from hil_sim import operator, personality
+from hil_sim import operator, personality, robot_file
 from hil_sim.errors import SimulatorError
-from hil_sim.exoskeleton import JOINTS, Scenario
+from hil_sim.exoskeleton import JOINTS, Exoskeleton, Scenario
 from hil_sim.scenario import expect_table
-from hil_sim.scenario.expectation import Expectation, When
+from hil_sim.scenario.expectation import Expectation
 from hil_sim.scenario.table import Mistake, ScenarioError, Table, Unusable, meant
 from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
 T = TypeVar("T")
 
-TABLES = ("at", "expect", "robot", "title")
+TABLES = ("at", "expect", "guard", "robot", "title")
 ROBOT_KEYS = ("scenario", "seconds", "seed", "subject", "imu", "insole", "drive")
 _AFTER_S = 1.0  # how long a scenario goes on after the last time that it names
 # What a gateway is asked for: the line's key → method of the wire and the name of the parameter.
@@ -54,6 +55,7 @@ class Script:
     subject: int = 0
     sensors: SensorChoice = field(default_factory=SensorChoice)
     drives: Mapping[str, Path] = field(default_factory=dict)
+    guard: Mapping[str, Any] | None = None  # as robot.toml has it
     lines: tuple[Line, ...] = ()
     expectations: tuple[Expectation, ...] = ()
 
@@ -79,6 +81,13 @@ def examined(file: Path, values: Mapping[str, Any]) -> tuple[Script, list[Mistak
     return _Reading(file, mistakes).script(values), mistakes
 
 
+def robot_text(file: Path, values: Mapping[str, Any]) -> str:
+    """The robot's file as a run of this scenario would write it, but for the port of its bus."""
+    script, _ = examined(file, values)
+    robot = Exoskeleton(sensors=script.sensors, drives=script.drives)
+    return robot_file.text(file.parent.resolve(), robot_file.hub_bus(0), robot, script.guard)
+
+
 def findings(
     file: Path,
     tables: Mapping[str, Any],
@@ -100,12 +109,16 @@ class _Reading:
         """What can be made of it."""
         top = Table("", values, self._mistakes)
         self._check_tables(values)
-        robot = self._robot(values.get("robot", {}))
+        robot = self._table("robot", values)
         robot.only(ROBOT_KEYS)
+        guard = self._table("guard", values) if "guard" in values else None
+        rules = frozenset() if guard is None else frozenset(guard.table("rule"))
         lines = tuple(self._each(values, "at", self._line))
-        expected = tuple(self._each(values, "expect", expect_table.read))
+        expected = tuple(self._each(values, "expect", lambda table: expect_table.read(table, rules)))
         expectations = tuple(one for some in expected for one in some)
-        least_s = _AFTER_S + max([0.0, *(line.time_s for line in lines), *map(_known_by, expectations)])
+        least_s = _AFTER_S + max(
+            [0.0, *(line.time_s for line in lines), *(one.timing.over_s for one in expectations)]
+        )
         return Script(
             title=top.text("title", self._file.stem),
             scenario=Scenario(robot.choice("scenario", list(Scenario), Scenario.WALK)),
@@ -117,15 +130,17 @@ class _Reading:
                 robot.choice("insole", tuple(INSOLES), SensorChoice().insole),
             ),
             drives=self._drives(robot),
+            guard=None if guard is None else guard.values,
             lines=lines,
             expectations=expectations,
         )
 
-    def _robot(self, values: object) -> Table:
+    def _table(self, key: str, values: Mapping[str, Any]) -> Table:
+        """The table of that name; where it is none, one without anything."""
         try:
-            return Table("[robot]", values, self._mistakes)
+            return Table(f"[{key}]", values.get(key, {}), self._mistakes)
         except Unusable:
-            return Table("[robot]", {}, self._mistakes)
+            return Table(f"[{key}]", {}, self._mistakes)
 
     def _check_tables(self, values: Mapping[str, Any]) -> None:
         for key in values:
@@ -182,11 +197,6 @@ def _check_gateway_line(table: Table, key: str) -> None:
         table.text(key)
     elif not isinstance(table.values[key], dict) or not table.values[key]:
         table.complain(key, '{"gait.step_length" = 0.45} is what it looks like')
-
-
-def _known_by(expectation: Expectation) -> float:
-    timing = expectation.timing
-    return timing.begin_s if timing.when is When.AT else timing.end_s
 
 
 def _duration(robot: Table, least_s: float) -> float:

@@ -95,6 +95,13 @@ class Table:
             return default
         return value
 
+    def table(self, key: str) -> Mapping[str, Any]:
+        value = self.values.get(key, {})
+        if not isinstance(value, Mapping):
+            self.complain(key, f"{value!r} must be a table")
+            return {}
+        return value
+
     def choice(self, key: str, allowed: Collection[str], default: str) -> str:
         value = self.text(key, default)
         if value not in allowed:

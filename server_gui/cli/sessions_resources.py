@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from gateway.amounts import NONE, size
+from gateway.amounts import NONE, counted, size
 from gateway.cli.text import say, say_json, table
 from ml.store.sessions import Session
 from ml.store.tables import RESOURCES
@@ -12,6 +12,8 @@ from server_gui.core.processing.recorded_use import Looks, ProgramUse, looks, us
 from server_gui.core.processing.regression import Regression, SessionUse, regressions
 
 HEADER = ("PROCESS", "CPU", "MEMORY", "AT MOST", "GROWTH AN HOUR")
+RESOURCES_EPILOG = """A program that had no memory and no CPU in any look, as most threads of the kernel, is
+left out and counted; --all shows it, and --json always has it."""
 COMPARE_EPILOG = """Several sessions a side are separated by commas: with one alone, a version cannot be told
 from a day. A process is named if its median over the minutes is a tenth more, and at least 1 % of a core or
 2 MiB, if three quarters of the sessions after lie above three quarters of those before, and if chance is
@@ -27,17 +29,24 @@ exit status
 def resources(argv: list[str]) -> int:
     """Run `gwrms sessions resources`."""
     made = parser(
-        "sessions resources", "Resources that each program on the robot's computer used, and memory leaks."
+        "sessions resources",
+        "Resources that each program on the robot's computer used, and memory leaks.",
+        RESOURCES_EPILOG,
     )
     made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
+    made.add_argument("--all", action="store_true", help="also those that never used anything")
     add_url(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
     found = used(_looks(known, known.find(arguments.session)))
     if arguments.json:
         say_json(found)
-    else:
-        say(table(HEADER, map(_row, found), right=(1, 2, 3, 4)))
+        return 0
+    shown = [use for use in found if arguments.all or not use.idle]
+    say(table(HEADER, map(_row, shown), right=(1, 2, 3, 4)))
+    if len(shown) < len(found):
+        left_out = counted(len(found) - len(shown), "program")
+        say(f"{left_out} left out that never used anything, as most threads of the kernel: --all\n")
     return 0
 
 

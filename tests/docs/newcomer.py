@@ -34,6 +34,12 @@ esac
 exec @RUN@ "$@"
 """
 
+# pytest with our plugin, as where both are installed.
+_PYTEST: Final = """#!/bin/sh
+export PYTEST_DISABLE_PLUGIN_AUTOLOAD=1
+exec @PYTHON@ -m pytest -p hil_sim.pytest_plugin -p no:cacheprovider "$@"
+"""
+
 
 class Terminal:
     """A command that goes on; what it says is in a file."""
@@ -156,12 +162,16 @@ class Newcomer:
         folder = self.home / "bin"
         folder.mkdir()
         run = f"'{sys.executable}' -P -m gateway.main"
-        program = folder / "gwrms"
-        program.write_text(_GWRMS.replace("@RUN@", run).replace("@PORT@", str(self._port)), encoding="utf-8")
-        program.chmod(0o755)
+        _install(folder / "gwrms", _GWRMS.replace("@RUN@", run).replace("@PORT@", str(self._port)))
+        _install(folder / "pytest", _PYTEST.replace("@PYTHON@", f"'{sys.executable}'"))
         kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
         path = os.pathsep.join([str(folder), str(Path(sys.executable).parent), os.environ["PATH"]])
         return kept | {"HOME": str(self.home), "PATH": path, "COLUMNS": "200"}
+
+
+def _install(program: Path, text: str) -> None:
+    program.write_text(text, encoding="utf-8")
+    program.chmod(0o755)
 
 
 def _free_port() -> int:

@@ -4,9 +4,9 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from gateway.cli.check_scenario import schema as scenario
 from gateway.config.schema import schema as robot
 from gateway.tables.schema import Schema
-from hil_sim.scenario.schema import schema as scenario
 from server_gui.core.settings.schema import schema as server
 
 SCHEMAS: Final[Mapping[str, Callable[[], Schema]]] = {

@@ -24,6 +24,7 @@ class ProgramUse:
     memory_bytes: float
     most_bytes: float
     leak: Slope | None
+    idle: bool  # no look saw any memory or CPU of it
 
 
 def looks(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[float, Sequence[Mapping[str, Any]]]]:
@@ -47,7 +48,12 @@ def _program(name: str, kept: list[tuple[float, dict[str, float]]]) -> ProgramUs
     memory = [(time_s, sums["memory_bytes"]) for time_s, sums in kept]
     sizes = [size for _, size in memory]
     return ProgramUse(
-        name, statistics.median(cpu) if cpu else None, statistics.median(sizes), max(sizes), _leak(memory)
+        name,
+        statistics.median(cpu) if cpu else None,
+        statistics.median(sizes),
+        max(sizes),
+        _leak(memory),
+        idle=not any(cpu) and not any(sizes),
     )
 
 

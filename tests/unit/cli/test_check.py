@@ -58,6 +58,28 @@ def test_every_scenario_in_the_tree_is_well(file: Path) -> None:
     assert (check(file).kind, told(file)) == ("scenario", "")
 
 
+GUARDED = 'title = "x"\n[guard.rule.hot]\nwatch = "temperature"\nabove = 90.0\n'
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("", ""), ""),
+        (("above", "abvoe"), "mistake: [guard.rule.hot] abvoe: is not known: did you mean 'above'?"),
+        (('"temperature"', '"temprature"'), "mistake: [guard.rule.hot] watch: 'temprature' is not known"),
+        (("90.0", '90.0\non = ["left_kne"]'), "mistake: [guard.rule.hot] on: "),
+        (("[guard", "[guard]\nheartbeat_ms = 1\n[guard"), "mistake: [guard] heartbeat_ms: "),
+        (("[guard", "[guard]\nheartbeat_ms = 100\n[guard"), ""),
+    ],
+)
+def test_a_scenarios_guard_is_checked_as_the_gateway_will(
+    tmp_path: Path, change: tuple[str, str], says: str
+) -> None:
+    said = told(written(tmp_path, GUARDED.replace(*change, 1), "guarded.toml"))
+    assert said.startswith(says)
+    assert bool(said) is bool(says)
+
+
 def test_mistakes_end_with_1_and_warnings_only_where_it_is_strict(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

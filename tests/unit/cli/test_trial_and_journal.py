@@ -37,7 +37,10 @@ def test_a_trial_is_kept_by_a_line(
     assert [call["trial_s"] for call in robot.called("parameter.write")] == [30.0]
     assert len(robot.called("parameter.confirm")) == 1
     assert robot.parameters["gait.step_length"] == 0.42
-    assert "kept" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "kept" in said
+    assert "nobody else can write meanwhile" in said
+    assert len(robot.called("control.release")) == 1
 
 
 def test_a_trial_that_nobody_keeps_is_taken_back(

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from gateway.client import BadAddress, LinkSettings, RemoteError, Robot, Unreachable
+from gateway.client.client import LEASE_MARGIN_S, WRITE_TIMEOUT_S
 from tests.fake_robot import FakeRobot
 from tests.support.waiting import WAIT_S
 
@@ -38,6 +39,16 @@ def test_lease_is_given_back_after_a_refused_write(fake: FakeRobot) -> None:
         robot.write({"gait.step_length": 9.0})
     order = [name for name, _ in fake.calls if name.startswith(("control.", "parameter."))]
     assert order == ["control.acquire", "parameter.write", "control.release"]
+
+
+def test_a_trial_holds_the_lease_for_its_own_time_and_gives_it_back(fake: FakeRobot) -> None:
+    with Robot(fake.address, PATIENT) as robot:
+        with robot.trial({"gait.step_length": 0.42}, trial_s=6) as written:
+            *_, longest, held = [call["ttl_s"] for call in fake.called("control.acquire")]
+            robot.confirm(written.write)
+        assert (longest, held) == (6 + LEASE_MARGIN_S + WRITE_TIMEOUT_S, 6 + LEASE_MARGIN_S)
+        assert held < 12, "who asks meanwhile is told about the trial's own time"
+        assert len(fake.called("control.release")) == 1
 
 
 def test_watching_ends_its_stream_when_the_loop_is_left(fake: FakeRobot) -> None:

@@ -35,6 +35,8 @@ def recorded(folder: Path, url: str, *versions: str) -> list[str]:
                         ProcessUse(7, "logger", 1.0 + chance.random(), 20 * MIB + round(second / 60 * MIB)),
                         ProcessUse(8, "planner", 10.0 * float(version) + chance.random(), 50 * MIB),
                         ProcessUse(9, "planner", 1.0, 50 * MIB),
+                        ProcessUse(10, "kworker/0:1", 0.0, 0),
+                        ProcessUse(11, "idler", 0.0, MIB),
                     )
                     utc_ns = round((1_700_000_040 + second) * 1e9)
                     rows.append(records.resources("exo-01", names[-1], utc_ns, look(second, *processes)))
@@ -56,13 +58,25 @@ def ask(folder_url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_programs_are_listed_and_leaks_named(ask: Any, folder_url: str, tmp_path: Path) -> None:
     (name,) = recorded(tmp_path, folder_url, "1")
-    planner, logger = json.loads(ask("resources", name, "--json"))
+    planner, logger, *_ = json.loads(ask("resources", name, "--json"))
     assert (planner["name"], planner["memory_bytes"], planner["leak"]) == ("planner", 100 * MIB, None)
     assert planner["cpu_percent"] == pytest.approx(11.5, abs=0.2)
     assert logger["leak"]["value"] == pytest.approx(60 * MIB, rel=0.02)
     shown = ask("resources", name)
     assert "+60.0 MiB, leaks" in shown
     assert shown.count("leaks") == 1
+
+
+def test_what_never_used_anything_is_left_out_and_counted(ask: Any, folder_url: str, tmp_path: Path) -> None:
+    (name,) = recorded(tmp_path, folder_url, "1")
+    shown = ask("resources", name)
+    assert "kworker" not in shown
+    assert "1 program left out that never used anything" in shown
+    assert "idler" in shown, "memory is a use too"
+    everything = ask("resources", name, "--all")
+    assert "kworker" in everything
+    assert "left out" not in everything
+    assert "kworker/0:1" in [one["name"] for one in json.loads(ask("resources", name, "--json"))]
 
 
 def test_what_a_version_costs_more_is_named_and_ends_with_1(

@@ -1,17 +1,20 @@
-"""Scenario files: what they may say, how expectations are judged, and what a person reads of it."""
+"""Scenario files: what they may say, and how expectations are judged."""
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from hil_sim.clock import SECOND_NS
+from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Scenario
 from hil_sim.robot import SimulatedRobot
-from hil_sim.scenario import report
 from hil_sim.scenario.expectation import Expectation, Moment, Seen, Track, Verdict
-from hil_sim.scenario.runner import Outcome, schedule
-from hil_sim.scenario.script import Script, load
+from hil_sim.scenario.runner import schedule
+from hil_sim.scenario.script import Script, examined, load
 from hil_sim.scenario.table import ScenarioError
 
 FOLDER = Path(__file__).parents[3] / "scenarios"
@@ -69,7 +72,7 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
     ("text", "words"),
     [
         ("x", "one.toml: this is no TOML"),
-        ("colour = 1", r"one.toml: \[colour\]: is not known: allowed are at, expect, robot, title"),
+        ("colour = 1", r"one.toml: \[colour\]: is not known: allowed are at, expect, guard, robot, title"),
         ("robot = 1", r"one.toml: \[robot\]: this must be a table"),
         ("[robot]\nspeed = 1", r"\[robot\] speed: is not known: did you mean 'seed'"),
         ('[robot]\nscenario = "swim"', "scenario: 'swim' is not known: allowed are walk, stand"),
@@ -89,7 +92,10 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
         ('[[at]]\ntime_s = 1\nstop = "x"\nactivity = "sit"', "activity: is not known"),
         ("[[at]]\ntime_s = 1\nstop = 1", "stop: 1 must be a text"),
         ("[[at]]\ntime_s = 1\nset = {}", "is what it looks like"),
-        ('[[expect]]\nstate = "ok"\nat_s = 1', "exactly one of component, channel, truth, answer, not none"),
+        (
+            '[[expect]]\nstate = "ok"\nat_s = 1',
+            "exactly one of component, channel, truth, answer, rule, not none",
+        ),
         ('[[expect]]\ncomponent = "x"\nchannel = "y"\nat_s = 1', "not component and channel"),
         ('[[expect]]\ncomponent = "x"\nat_s = 1', "say what is expected of x with state, problem"),
         ('[[expect]]\ncomponent = "x"\nmin = 1\nat_s = 1', "min: is not known"),
@@ -101,6 +107,11 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
         ('[[expect]]\nchannel = "x"\nmin = "1"\nat_s = 1', "min: '1' must be a number"),
         ('[[expect]]\nchannel = "x"\nmissing = 1\nat_s = 1', "missing: 1 must be true or false"),
         ('[[expect]]\nchannel = "x"\nis = 1\nat_s = 1', "is: 1 must be a text"),
+        ('[[expect]]\nrule = "hot"\nstate = "ok"\nat_s = 1', "state: is not known: allowed are"),
+        ('[[expect]]\nrule = "hot"\nat_s = 1', "say what is expected of hot with tripped, reason, stop"),
+        ('[[expect]]\nrule = "hot"\ntripped = 1\nat_s = 1', "tripped: 1 must be true or false"),
+        ("guard = 1", r"\[guard\]: this must be a table"),
+        ("[guard]\nrule = 1", r"\[guard\] rule: 1 must be a table"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, words: str) -> None:
@@ -196,7 +207,7 @@ def test_a_glob_means_every_name_that_fits_and_the_wrong_one_is_told(tmp_path: P
 def test_a_name_that_nobody_has_is_a_failure(tmp_path: Path) -> None:
     one = expect(tmp_path, 'component = "left_elbow"\nstate = "ok"\nat_s = 1')
     assert judge(one, left_hip=[(1.0, "ok")]) == Verdict(
-        False, "left_elbow is 'ok' at 1 s", "there is no component left_elbow"
+        False, "left_elbow is 'ok' at 1 s", "there is no component left_elbow", 1.0
     )
 
 
@@ -217,19 +228,56 @@ def test_state_and_problem_of_one_line_are_two_expectations(tmp_path: Path) -> N
     assert [one.words for one in found] == ["x is 'ok' at 1 s", "problem of x is nothing at 1 s"]
 
 
-def test_the_report_tells_what_was_expected_and_what_was_seen() -> None:
-    verdicts = (Verdict(True, "a is 1", "a was 1"), Verdict(False, "b is 2", "b was 3"))
-    text = report.text(Script(title="Two things"), Outcome(verdicts, skipped_s=0.0))
-    assert text.splitlines() == [
-        "Two things",
-        "  ok      a is 1",
-        "          a was 1",
-        "  FAILED  b is 2",
-        "          b was 3",
-        "1 of 2 expectations failed",
-    ]
-    slow = report.text(Script(title="x"), Outcome(verdicts[:1], skipped_s=0.31))
-    assert "all 1 expectations met\nThis computer was too slow: 0.3 s were left out" in slow
+def test_a_rule_is_tripped_or_not_and_says_why_and_whether_it_has_stopped_the_robot(tmp_path: Path) -> None:
+    text = '[[expect]]\nrule = "hot"\ntripped = true\nreason = "left_hip"\nstop = ""\nwithin_s = [1, 4]'
+    tripped, reason, stop = script(tmp_path, text).expectations
+    assert [tripped.track, reason.track, stop.track] == [Track.RULE, Track.REASON, Track.STOP]
+    assert tripped.words == "guard rule hot is tripped once between 1 and 4 s"
+    verdict = judge(tripped, hot=[(1.0, "watching"), (2.0, "tripped"), (3.0, "cleared")])
+    assert (verdict.ok, verdict.seen, verdict.decided_s) == (True, "hot was 'tripped' at 2.00 s", 2.0)
+    assert not judge(tripped, hot=[(1.0, "blind"), (3.0, "cleared")]).ok
+    assert judge(reason, hot=[(2.0, "left_hip.temperature: 98 °C")]).ok
+    assert judge(tripped, cold=[(2.0, "tripped")]).seen == "there is no guard rule hot"
+
+
+def test_a_rule_that_has_not_tripped_may_be_blind(tmp_path: Path) -> None:
+    one = expect(tmp_path, 'rule = "hot"\ntripped = false\nbetween_s = [1, 4]')
+    assert judge(one, hot=[(1.0, "blind"), (3.0, "watching")]).ok
+    wrong = judge(one, hot=[(1.0, "blind"), (3.0, "tripped"), (4.0, "cleared")])
+    assert (wrong.ok, wrong.seen, wrong.decided_s) == (False, "hot was 'tripped' at 3.00 s", 3.0)
+
+
+def test_a_rule_that_the_guard_has_not_is_warned_of(tmp_path: Path) -> None:
+    expected = [{"rule": "hto", "tripped": True, "at_s": 1}]
+    rules = {"rule": {"hot": {"watch": "temperature", "above": 90}}}
+    (warning,) = examined(tmp_path / "x.toml", {"guard": rules, "expect": expected})[1]
+    assert (warning.severity, warning.key) == ("warning", "rule")
+    assert "did you mean 'hot'?" in warning.text
+    (warning,) = examined(tmp_path / "x.toml", {"expect": expected})[1]
+    assert warning.text == "the scenario has no [guard.rule.NAME]"
+
+
+def test_the_guard_stands_in_the_robots_file_and_a_heartbeat_has_a_node_id(tmp_path: Path) -> None:
+    guard = {"heartbeat_ms": 100, "rule": {"a b": {"watch": "emcy", "codes": ["0x23"], "actions": ["alarm"]}}}
+    config = written(tmp_path, guard)
+    assert (config["guard"], config["can"]["main"]["node_id"]) == (guard, 100)
+    plain = written(tmp_path / "plain", None)
+    assert ("guard" in plain, "node_id" in plain["can"]["main"]) == (False, False)
+
+
+def written(folder: Path, guard: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The robot's file of a robot with this guard."""
+    robot = SimulatedRobot(folder, virtual_channel=str(folder), guard=guard)
+    with closing(robot):
+        robot.open()
+        return tomllib.loads(robot.config.read_text(encoding="utf-8"))
+
+
+def test_a_guard_that_is_not_in_the_robots_file_which_is_there_is_refused(tmp_path: Path) -> None:
+    written(tmp_path, {"rule": {"hot": {"watch": "temperature", "above": 90}}})
+    written(tmp_path, {"rule": {"hot": {"watch": "temperature", "above": 90}}})
+    with pytest.raises(SimulatorError, match=r"robot\.toml is there already, and its \[guard\] is not"):
+        written(tmp_path, {"rule": {"hot": {"watch": "temperature", "above": 80}}})
 
 
 # -- what happens without a gateway

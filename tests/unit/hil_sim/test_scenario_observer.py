@@ -18,6 +18,7 @@ from hil_sim.scenario.observer import Observer
 
 DESCRIBED = {
     "channels": [{"name": "left_knee.state", "enum": {"8": "fault"}}, {"name": "left_knee.position"}],
+    "guard": {"rules": []},
 }
 SNAPSHOT = {
     "values": {"left_knee.state": 8.0, "left_knee.position": 0.25, "right_knee.position": None},
@@ -61,6 +62,32 @@ def test_values_come_in_words_where_there_are_some(robot: Exoskeleton) -> None:
     assert last(observer, Track.STATE) == {"left_knee": "fault", "trunk": "ok"}
     assert last(observer, Track.PROBLEM) == {"left_knee": "it is hot", "trunk": ""}
     assert last(observer, Track.TRUTH)["left_knee.nmt"] == "off"
+
+
+def rule(name: str, state: str, reason: str | None) -> dict[str, object]:
+    return {"name": name, "state": state, "reason": reason}
+
+
+def test_rules_are_seen_with_why_and_whose_stop_is_held(robot: Exoskeleton) -> None:
+    link = FakeLink()
+    rules = [rule("hot", "tripped", "left_hip: 98 °C"), rule("lost", "watching", None)]
+    stop = {"held": True, "reason": "guard rule hot: left_hip: 98 °C"}
+    link.answers["robot.describe"] = DESCRIBED | {"guard": {"rules": rules}, "stop": stop}
+    observer = Observer(robot, link)
+    robot.clock.run_until(robot.clock.now_ns + 100 * MILLISECOND_NS)
+    assert last(observer, Track.RULE) == {"hot": "tripped", "lost": "watching"}
+    assert last(observer, Track.REASON) == {"hot": "left_hip: 98 °C", "lost": ""}
+    assert last(observer, Track.STOP) == {"hot": "guard rule hot: left_hip: 98 °C", "lost": ""}
+    stop["held"] = False
+    robot.clock.run_until(robot.clock.now_ns + 100 * MILLISECOND_NS)
+    assert last(observer, Track.STOP) == {"hot": "", "lost": ""}
+
+
+def test_without_a_guard_nobody_asks_for_its_rules(robot: Exoskeleton) -> None:
+    link = FakeLink()
+    Observer(robot, link)
+    robot.clock.run_until(robot.clock.now_ns + 300 * MILLISECOND_NS)
+    assert [method for method, _ in link.asked].count("robot.describe") == 1
 
 
 def test_the_next_look_waits_for_the_answer_to_the_last(robot: Exoskeleton) -> None:
