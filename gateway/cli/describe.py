@@ -5,6 +5,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
+from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, budget, exact, say, say_json, table
 from gateway.wire.component import ChannelInfo
@@ -19,8 +20,9 @@ def main(argv: list[str]) -> int:
     """Run `gwrms describe`."""
     arguments = parser(
         "describe",
-        "What a robot is made of: its components and what is wrong with them, its channels and their units,\n"
-        "its parameters and their limits, and what each drive does on a stop.",
+        "What a robot is made of: its components and buses and what is wrong with them, since when and what\n"
+        "to check, its channels and their units, its parameters and their limits, and what each drive does\n"
+        "on a stop.",
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
         description = robot.describe()
@@ -38,6 +40,7 @@ def _chapters(robot: Description) -> Iterator[str]:
         ("COMPONENT", "KIND", "STATE", "PROBLEM"),
         [(part.name, part.kind, part.state, part.problem or "") for part in robot.components],
     )
+    yield from describe_buses.chapters(robot)
     yield _channels(robot.channels)
     if robot.parameters:
         yield table(
