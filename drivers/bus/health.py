@@ -13,7 +13,6 @@ from drivers.samples import Finding
 LOOK_S = 1.0
 FRAME_BITS, BYTE_BITS = 49.5, 8.6  # of an 11-bit data frame with its gap, and of a byte: average stuff bits
 BUSY, BUSY_NO_MORE = 80.0, 70.0  # % of its time
-BUSY_LOOKS = 2  # in a row
 ERROR_LOOKS, MANY_ERRORS = 10, 5  # so many error frames within so many looks are told
 
 _WIRE = "check termination, wiring and bitrate"
@@ -35,7 +34,6 @@ class BusHealth:
         self.frames_per_s: float | None = None
         self._bitrate = bitrate
         self._state, self._load, self._errors, self._lost = Noted(), Noted(), Noted(), Noted()
-        self._busy_looks = 0
         self._before: tuple[int, int, int, int] | None = None
         self._errors_before = 0
         self._recent_errors: deque[int] = deque(maxlen=ERROR_LOOKS)
@@ -54,7 +52,7 @@ class BusHealth:
         """The controller begins anew, as does what is measured."""
         self.state = BusState.ACTIVE
         self.load_percent = self.frames_per_s = self._before = None
-        self._busy_looks, self._errors_before = 0, self.error_frames
+        self._errors_before = self.error_frames
         self._recent_errors.clear()
         for noted in (self._state, self._load, self._errors, self._lost):
             noted.clear()
@@ -95,10 +93,9 @@ class BusHealth:
         if self._bitrate is None:
             return
         load = self.load_percent = 100 * bits_per_s / self._bitrate
-        self._busy_looks = self._busy_looks + 1 if load >= BUSY else 0
         if load < BUSY_NO_MORE:
             self._load.clear()
-        elif self._busy_looks >= BUSY_LOOKS or self._load.finding is not None:
+        elif load >= BUSY or self._load.finding is not None:
             self._load.note(
                 now_ns,
                 f"{min(load, 100.0):.0f} % of its time is taken",

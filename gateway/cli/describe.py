@@ -2,18 +2,22 @@
 
 import re
 import textwrap
+import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
 from gateway.cli.text import NONE, budget, exact, say, say_json, table
+from gateway.client.blocking import Robot
+from gateway.wire.bus import CLOSED
 from gateway.wire.component import ChannelInfo
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo
 from gateway.wire.stop import StopInfo
 
 PAGE = 100  # columns
+LOAD_S, LOOK_S = 2.0, 0.2  # how long a bus that has just been opened is given, and how often it is looked
 
 
 def main(argv: list[str]) -> int:
@@ -25,12 +29,23 @@ def main(argv: list[str]) -> int:
         "on a stop.",
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
-        description = robot.describe()
+        description = _measured(robot)
     if arguments.json:
         say_json(description)
     else:
         say("\n".join(_chapters(description)))
     return 0
+
+
+def _measured(robot: Robot) -> Description:
+    """Its description; where nobody had the buses open before, as soon as their load was measured."""
+    deadline_s = time.monotonic() + LOAD_S
+    while True:
+        description = robot.describe()
+        known = [bus.frames_per_s is not None or bus.state == CLOSED for bus in description.buses]
+        if all(known) or time.monotonic() > deadline_s:
+            return description
+        time.sleep(LOOK_S)
 
 
 def _chapters(robot: Description) -> Iterator[str]:

@@ -4,6 +4,8 @@ from msgspec import Struct
 
 from gateway.wire.finding import FindingInfo
 
+CLOSED = "closed"  # a bus's state that is not open
+
 
 class NodeInfo(Struct, frozen=True):
     """One CANopen node: how it answers, and what is missing of its PDOs; counters are since it is watched.

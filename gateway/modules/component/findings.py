@@ -10,11 +10,9 @@ from drivers.bus.life import NodeLife
 from drivers.bus.node import Node
 from drivers.component import Component
 from drivers.samples import Finding
-from gateway.wire.bus import BusInfo, NodeInfo
+from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
 from gateway.wire.component import EmcyInfo
 from gateway.wire.finding import FindingInfo
-
-CLOSED = "closed"
 
 
 def finding_infos(findings: Iterable[Finding]) -> list[FindingInfo]:
