@@ -14,7 +14,7 @@ from drivers.samples import Finding
 FROZEN_S = 0.5
 TARGET_MOVED = math.radians(3.0)  # what the target moves by while the position stays the same to the count
 MOVING = 0.1  # rad/s that the velocity says on average meanwhile
-VELOCITY_S = 2.0  # over so long
+VELOCITY_S = 1.0  # over so long
 
 JUMP = math.radians(1.5)  # beyond what the speed before and after, and a jerk in between, explain
 FASTEST = 10.0  # rad/s where the drive does not tell its velocity
@@ -95,7 +95,7 @@ class FrozenCheck(Noted):
         measured_s = (now.stamp_ns - self._moved_since_ns) / 1e9
         if now.stamp_ns - start.stamp_ns >= FROZEN_S * 1e9:
             self._judge(start.stamp_ns, measured_s)
-        if measured_s > VELOCITY_S:
+        if measured_s >= VELOCITY_S:
             self._restart_velocity(now.stamp_ns)
 
     def _judge(self, since_ns: int, measured_s: float) -> None:
@@ -108,7 +108,7 @@ class FrozenCheck(Noted):
                 f"its position stays the same to the count while its target moves by {moved:.0f}°",
                 check,
             )
-        elif measured_s >= FROZEN_S and abs(self._moved) >= MOVING * measured_s:
+        elif measured_s >= VELOCITY_S and abs(self._moved) >= MOVING * measured_s:
             speed = abs(self._moved) / measured_s
             self.note(
                 since_ns,
