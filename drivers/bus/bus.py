@@ -60,13 +60,12 @@ class CanBus:
         self._urgent = urgent
         self.problem: str | None = None  # why it is not open, in words
         self.health = BusHealth(settings.bitrate)
+        self.frames = 0  # that came; error frames are none of them
         self.opened = 0  # times
         self.failed_handlers = 0  # those of users' ticks are among them
         self.unclaimed: set[int] = set()  # identifiers that came and nobody asked for
         self.nodes: dict[int, BusUser] = {}  # one object a node id, whoever uses it
-        self._received = 0  # error frames are among them
         self._received_bytes = 0
-        self._errors = 0  # error frames, whatever they are about
         self._handlers: dict[int, FrameHandler] = {}
         self._subscribers: dict[int, tuple[FrameHandler, ...]] = {}
         self._users: tuple[BusUser, ...] = ()
@@ -90,11 +89,6 @@ class CanBus:
     def state(self) -> BusState:
         """As the controller's error frames say, where the interface has them."""
         return self.health.state
-
-    @property
-    def frames(self) -> int:
-        """Data frames that came since it was made."""
-        return self._received - self._errors
 
     @property
     def is_open(self) -> bool:
@@ -256,7 +250,7 @@ class CanBus:
         accepted: frozenset[int] | None = None
         while not self._stopping.is_set():
             frames = transport.receive(TICK_S)
-            self._received += len(frames)
+            self.frames += len(frames)
             for stamp_ns, can_id, data in frames:
                 self._received_bytes += len(data)
                 handler = handler_of(can_id)
@@ -301,7 +295,7 @@ class CanBus:
 
     def _unhandled(self, stamp_ns: int, can_id: int, data: bytes) -> None:
         if can_id & ERROR:
-            self._errors += 1
+            self.frames -= 1
             self.health.take_error(stamp_ns, can_id, data)
         elif len(self.unclaimed) < MAX_UNCLAIMED:
             self.unclaimed.add(can_id)

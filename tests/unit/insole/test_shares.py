@@ -1,4 +1,4 @@
-"""A share of bad frames is told from a threshold on, and no more below half of it; missing ones are no fault."""
+"""A share of bad frames is told from a threshold on; where some are missing, what comes is believed."""
 
 import pytest
 
