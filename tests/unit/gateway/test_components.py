@@ -123,10 +123,12 @@ def test_the_joints_of_both_legs_are_judged_against_each_other(tmp_path: Path) -
     assert joints["right_knee"]._watch.check.mirror is not None
 
 
-def test_what_was_found_is_told_with_its_beginning(client: Client, bench: Bench) -> None:
+def test_what_was_found_is_told_with_its_beginning(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     finding = Finding(7, "it hangs", "check its power")
     found = Quality(State.FAULT, 1.0, "it hangs (for 2 s): check its power", findings=(finding,))
-    bench.insole.quality = lambda _now_ns: found  # type: ignore[method-assign]
+    monkeypatch.setattr(bench.insole, "quality", lambda _now_ns: found)
     parts = {one["name"]: one for one in client.call("robot.describe")["components"]}
     assert parts["left_insole"]["findings"] == [
         {"since_ns": 7, "words": "it hangs", "check": "check its power"}
@@ -135,8 +137,10 @@ def test_what_was_found_is_told_with_its_beginning(client: Client, bench: Bench)
     assert "emcy" not in parts["left_knee"]
 
 
-def test_the_last_emergency_message_is_told_also_when_it_is_over(client: Client, bench: Bench) -> None:
-    bench.left.node.description = SimpleNamespace(vendor_id=None)  # type: ignore[attr-defined]
+def test_the_last_emergency_message_is_told_also_when_it_is_over(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench.left.node, "description", SimpleNamespace(vendor_id=None), raising=False)
     client.call("robot.describe")
     bench.left.node.life.on_emcy(5, bytes.fromhex("1186 21 0000000000"))
     emcy = {
