@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.joint.plausibility import GAIT_S, JUMP_SHOWN_S, LOADED_S, JointCheck, Motion
+from drivers.joint.mirror import GAIT_S
+from drivers.joint.plausibility import JUMP_SHOWN_S, LOADED_S, JointCheck, Motion
 from hil_sim.exoskeleton import Scenario
 from tests.unit.joint.watched import WatchedRobot
 
