@@ -11,7 +11,7 @@ class State(StrEnum):
     OK = "ok"
     STALE = "stale"  # silent for longer than stale_after_s: values are null
     LOST = "lost"  # silent for longer than lost_after_s, or not there at all
-    FAULT = "fault"  # it talks, and says that it is in fault
+    FAULT = "fault"  # it talks, and says that it is in fault, or what it says cannot be believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,19 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """What is not as it should be, in words: since when (monotonic clock), and what to check."""
+
+    since_ns: int
+    words: str
+    check: str
+
+    def text(self, now_ns: int) -> str:
+        """`it hangs (for 3 s): check its power`."""
+        return f"{self.words} (for {max(0, now_ns - self.since_ns) / 1e9:.0f} s): {self.check}"
+
+
+@dataclass(frozen=True, slots=True)
 class Quality:
     """What is known about a component now."""
 
@@ -48,3 +61,4 @@ class Quality:
     age_ms: float | None  # since its last sample; None before the first
     problem: str | None = None  # in words, with what to check
     counters: Mapping[str, int] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()  # of what `problem` says, that which has a beginning

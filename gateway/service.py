@@ -204,6 +204,7 @@ class Service:
             records=robot.records,
             budget=self._budget.info,
             version=__version__,
+            buses=robot.buses,
         )
 
     def _guard_info(self) -> GuardInfo:

@@ -38,6 +38,7 @@ interface = "socketcand"        # python-can's name of the interface; "socketcan
 channel = "{channel}"                 # the bus at the hub; "can0" or the like for a real one
 host = "{host}"              # the simulator's hub: it speaks only to this machine
 port = {port}                    # stays the same when the simulator starts again in this folder
+bitrate = 1000000               # bit/s: what the load of the bus is told by
 tcp_tune = true                 # send each frame at once
 """
 

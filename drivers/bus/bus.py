@@ -11,9 +11,11 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 
 from drivers.bus.frames import ERROR, FrameHandler, Transport
-from drivers.bus.interfaces.controller_state import BusState, bus_state
+from drivers.bus.health import BusHealth
+from drivers.bus.interfaces.controller_state import BusState
 from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.sender import Sender, always
@@ -26,13 +28,6 @@ TICK_S = 0.05  # how long the thread waits for a frame before it looks at the cl
 FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
 MAX_UNCLAIMED = 2048  # as many as there are 11-bit identifiers
-
-_WIRE = "check termination, wiring and bitrate"
-_STATE_WORDS = {
-    BusState.WARNING: f"the CAN controller counts many errors: {_WIRE}",
-    BusState.PASSIVE: f"the CAN controller is error passive: {_WIRE}",
-    BusState.OFF: f"the CAN controller is bus off, no frame can pass: {_WIRE}",
-}
 
 
 class BusUser:
@@ -64,12 +59,13 @@ class CanBus:
         self.role = role
         self._urgent = urgent
         self.problem: str | None = None  # why it is not open, in words
-        self.state = BusState.ACTIVE  # as the controller's error frames say, where the interface has them
-        self.frames = 0
+        self.health = BusHealth(settings.bitrate)
+        self.frames = 0  # that came; error frames are none of them
         self.opened = 0  # times
         self.failed_handlers = 0  # those of users' ticks are among them
         self.unclaimed: set[int] = set()  # identifiers that came and nobody asked for
         self.nodes: dict[int, BusUser] = {}  # one object a node id, whoever uses it
+        self._received_bytes = 0
         self._handlers: dict[int, FrameHandler] = {}
         self._subscribers: dict[int, tuple[FrameHandler, ...]] = {}
         self._users: tuple[BusUser, ...] = ()
@@ -87,7 +83,16 @@ class CanBus:
         """Why it is not open, or what its controller says about the wire; `None` when nothing is wrong."""
         transport = self._transport
         warning = None if transport is None else transport.warning
-        return self.problem or _STATE_WORDS.get(self.state) or warning
+        return self.problem or self.health.state_text or warning
+
+    @property
+    def state(self) -> BusState:
+        """As the controller's error frames say, where the interface has them."""
+        return self.health.state
+
+    @property
+    def is_open(self) -> bool:
+        return self._transport is not None
 
     @property
     def dropped(self) -> int:
@@ -207,7 +212,8 @@ class CanBus:
         """Hand out frames until told to stop; raises what ended it, `Unavailable` when the interface goes."""
         problem = "it was closed"
         with self._lock:
-            self._transport, self.problem, self.state = transport, None, BusState.ACTIVE
+            self._transport, self.problem = transport, None
+            self.health.opened()
             self.opened += 1
             users = self._users
         FastSwitching.begin()
@@ -246,9 +252,10 @@ class CanBus:
             frames = transport.receive(TICK_S)
             self.frames += len(frames)
             for stamp_ns, can_id, data in frames:
+                self._received_bytes += len(data)
                 handler = handler_of(can_id)
                 if handler is None:
-                    self._unhandled(can_id, data)
+                    self._unhandled(stamp_ns, can_id, data)
                     continue
                 try:
                     handler(stamp_ns, data)
@@ -258,7 +265,15 @@ class CanBus:
             if now_ns >= next_tick_ns:
                 next_tick_ns = now_ns + tick_ns
                 accepted = self._accept(transport, accepted)
+                self.health.look(now_ns, partial(self._counts, transport))
                 self._tick(now_ns)
+
+    def _counts(self, transport: Transport) -> tuple[int, int, int]:
+        """Frames and data bytes on the bus, and frames that were lost; as far as we know of them."""
+        carried = transport.carried()
+        if carried is None:
+            carried = self.frames + self.sent, self._received_bytes + self.sent_bytes
+        return (*carried, transport.dropped)
 
     def _tick(self, now_ns: int) -> None:
         for user in self._users:
@@ -278,9 +293,10 @@ class CanBus:
             transport.accept(wanted)
         return wanted
 
-    def _unhandled(self, can_id: int, data: bytes) -> None:
+    def _unhandled(self, stamp_ns: int, can_id: int, data: bytes) -> None:
         if can_id & ERROR:
-            self.state = bus_state(can_id, data) or self.state
+            self.frames -= 1
+            self.health.take_error(stamp_ns, can_id, data)
         elif len(self.unclaimed) < MAX_UNCLAIMED:
             self.unclaimed.add(can_id)
 

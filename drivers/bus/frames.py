@@ -47,6 +47,12 @@ class Transport(Protocol):
     def await_room(self, timeout_s: float) -> None:
         """Wait until it may take a frame again; while others send."""
 
+    def carried(self) -> tuple[int, int] | None:
+        """Frames and their data bytes that passed the bus, where the interface counts also those it keeps.
+
+        `None`: those that came and left are all that is known.
+        """
+
     def accept(self, can_ids: frozenset[int] | None) -> None:
         """Only these identifiers matter (`None`: all): the interface may keep the others to itself."""
 

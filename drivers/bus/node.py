@@ -12,6 +12,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, cast
 
+from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
@@ -22,6 +23,8 @@ from drivers.bus.settings import NodeTimes, Role
 from drivers.bus.stuck import why_silent
 from drivers.bus.values import size_of, unsigned
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
+from drivers.noted import found
+from drivers.samples import Finding
 from eds import Description
 
 T = TypeVar("T")
@@ -70,6 +73,7 @@ class Node(BusUser):
         self.description = description
         self.life = NodeLife(times.heartbeat_timeout_s)
         self.ready = False
+        self.arrivals: tuple[Arrivals, ...] = ()  # of the PDOs that its users follow
         self.boots_begun = 0  # attempts to read what is needed of it
         self._findings: tuple[str, ...] = ()
         self._stranger: str | None = _NOT_ASKED  # why it may not be the device that it should be
@@ -125,7 +129,30 @@ class Node(BusUser):
         distrust = self.distrust
         return self._findings if distrust in (None, _NOT_ASKED) else (*self._findings, distrust)
 
+    @property
+    def trouble(self) -> tuple[Finding, ...]:
+        """What is wrong with its answers and its PDOs, each since when, and what to check."""
+        if not self.ready:
+            return ()
+        return (*self.channel.round_trips.findings, *found(self.arrivals))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of those who live on it."""
+        return tuple(name for _, name in self._users)
+
     # What users ask.
+
+    def follow(self, arrivals: Arrivals) -> Callable[[], None]:
+        """Watch whether frames are missing; returns how to end it."""
+        arrivals.restart()
+        self.arrivals = (*self.arrivals, arrivals)
+
+        def end() -> None:
+            self.arrivals = tuple(known for known in self.arrivals if known is not arrivals)
+            arrivals.restart()
+
+        return end
 
     def attach(self, user: NodeUser, name: str) -> None:
         """Let `user` live here: the first one opens the bus."""
@@ -220,6 +247,7 @@ class Node(BusUser):
             "sdo_doubled": sdo.doubled,
             "sdo_resyncs": sdo.resyncs,
             "sdo_dropped": sdo.dropped,
+            "sdo_late": self.channel.round_trips.late,
             "bus_opened": self.bus.opened,
             "bus_dropped": self.bus.dropped,
         }
@@ -242,6 +270,8 @@ class Node(BusUser):
         if self.ready and self.channel.doubled and now_ns >= self._doubt_ns:
             self._doubt_ns = now_ns + round(DOUBT_S * 1e9)
             self.worker.submit(_ask_type)
+        for arrivals in self.arrivals:
+            arrivals.look(now_ns)
 
     def _ask_life(self, now_ns: int) -> None:
         """Node guarding: the answer is the node's state and counts as a heartbeat (CiA 301 §7.2.8)."""

@@ -8,7 +8,9 @@ from drivers.imu.frame import ImuFrame, moments
 from drivers.imu.settings import ImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.line import Line, Recognise, unrecognised
-from drivers.samples import Quality
+from drivers.noted import found
+from drivers.samples import Quality, State
+from drivers.shares import beside, missing_frames
 
 
 class Imu(TrunkImu):
@@ -24,6 +26,7 @@ class Imu(TrunkImu):
         imu_format = FORMATS[settings.format]
         super().__init__(name, settings, imu_format.conventions, settings.attitude, beside)
         self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.parser, recognise)
+        self._missing_share = missing_frames()
         self._clock_spec = imu_format.clock
         self._clock = imu_format.clock.make() if imu_format.clock else None
 
@@ -38,12 +41,15 @@ class Imu(TrunkImu):
 
     def quality(self, now_ns: int) -> Quality:
         counters = self.line.parser.counters.as_dict() | {"reconnects": self.line.reconnects}
-        return self._quality(now_ns, self.line.problem(now_ns), counters)
+        quality = self._quality(now_ns, self.line.problem(now_ns), counters)
+        return beside(quality, found([self._missing_share]), now_ns) if quality.state is State.OK else quality
 
     def received(self, frames: Sequence[ImuFrame], stamp_ns: int) -> None:
         """Frames of the line; called in the port's thread."""
         for moment in frames if len(frames) == 1 else moments(frames):
             self._received(moment, stamp_ns)
+        counters = self.line.parser.counters
+        self._missing_share.update(stamp_ns, counters.frames_missed, counters.frames + counters.frames_missed)
 
     def _received(self, frame: ImuFrame, stamp_ns: int) -> None:
         if frame.late:
@@ -58,4 +64,5 @@ class Imu(TrunkImu):
     def disconnected(self) -> None:
         """The port went away."""
         self._forget()
+        self._missing_share.restart()
         self._clock = self._clock_spec.make() if self._clock_spec else None

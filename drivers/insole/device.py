@@ -18,7 +18,9 @@ from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line, Recognise, unrecognised
+from drivers.noted import found
 from drivers.samples import Channel, Quality, State
+from drivers.shares import beside, missing_frames, saturated_frames
 
 USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}
@@ -67,18 +69,19 @@ class Insole:
         self.check = FootCheck(name, len(layout.cells))
         self._feet_check = FeetCheck(name)
         self._swap_check = SwapCheck()
+        self._missing_share, self._saturated_share = missing_frames(), saturated_frames()
         self._indices = tuple(range(len(self.channels)))
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._fault: str | None = None  # what the device's own frames say is wrong
         self._foreign = 0  # frames of the other foot since the last of ours
-        self._saturated = 0
+        self._taken = self._saturated = 0
         self._clock_spec = FORMATS[settings.format].clock
         self._clock = self._clock_spec.make()
 
     def start(self) -> None:
         self._freshness.reset()
         self.disconnected()
-        self._saturated = 0
+        self._taken = self._saturated = 0
         self.line.start(self)
 
     def stop(self) -> None:
@@ -94,17 +97,21 @@ class Insole:
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
         problem = self._fault or self.check.problem or self._feet_check.problem or self._swap_check.problem
-        if state is State.OK and problem is not None:
-            state = State.FAULT
-        elif state is not State.OK:
-            silence = self.line.problem(now_ns) or self._fault or self._wrong_foot()
-            problem = silence or silence_text(age_ms)
-        return Quality(state, age_ms, problem, self._counters())
+        if state is State.OK:
+            if problem is not None or self._saturated_share.finding is not None:
+                state = State.FAULT
+            findings = found((self._saturated_share, self._missing_share))
+            return beside(Quality(state, age_ms, problem, self._counters()), findings, now_ns)
+        silence = self.line.problem(now_ns) or self._fault or self._wrong_foot()
+        return Quality(state, age_ms, silence or silence_text(age_ms), self._counters())
 
     def received(self, frames: Sequence[InsoleFrame], stamp_ns: int) -> None:
         """Frames of the line; called in the port's thread."""
         for frame in frames:
             self._take(frame, stamp_ns)
+        self._saturated_share.update(stamp_ns, self._saturated, self._taken)
+        counters = self.line.parser.counters
+        self._missing_share.update(stamp_ns, counters.frames_missed, counters.frames + counters.frames_missed)
 
     def _take(self, frame: InsoleFrame, stamp_ns: int) -> None:
         if frame.late:
@@ -118,6 +125,7 @@ class Insole:
                 return
             stamp_ns = taken_ns
         self._foreign = 0
+        self._taken += 1
         self._fault = self._fault_in(frame)
         self._freshness.seen(stamp_ns)
         self._update(stamp_ns, self._pressures(frame))
@@ -131,6 +139,8 @@ class Insole:
         self.check.restart()
         self._feet_check.restart()
         self._swap_check.restart()
+        self._missing_share.restart()
+        self._saturated_share.restart()
 
     def _update(self, stamp_ns: int, pressures: tuple[float | None, ...]) -> None:
         load = load_of(pressures, self.layout, self.settings.force_threshold)

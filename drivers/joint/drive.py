@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import CanBus
 from drivers.bus.emcy import error_text
 from drivers.bus.frames import EXTENDED, FrameHandler
@@ -23,13 +24,15 @@ from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
 from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
-from drivers.joint.quantities import POSITION, STATUSWORD, channels, quantities
+from drivers.joint.quantities import POSITION, STATE, STATUSWORD, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
 from drivers.joint.remap import disable, free_tpdo, remap
+from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
+from drivers.joint.watching import JointWatch
 from drivers.latest import Latest
-from drivers.samples import Channel, Quality, State
+from drivers.samples import Channel, Finding, Quality, State
 from eds import Description
 
 _IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
@@ -53,6 +56,8 @@ class JointDrive(PowerDrive):
         self._description = description
         self._index = {channel.quantity: index for index, channel in enumerate(self.channels)}
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
+        self._watch = JointWatch(self.latest)
+        self._arrivals = Arrivals()
         self._plan: Plan | None = None
         self._started = False
         self._lock = threading.RLock()  # the plan and its undoing; values come from two threads
@@ -66,6 +71,7 @@ class JointDrive(PowerDrive):
             self._started = True
         self._freshness.reset()
         self.node.attach(self, self.name)
+        self.node.bus.hold(self._watch)
 
     def stop(self) -> None:
         """Let go of everything; what it does to the drive is nothing."""
@@ -73,22 +79,34 @@ class JointDrive(PowerDrive):
             if not self._started:
                 return
             self._started = False
+        self.node.bus.release(self._watch)
         self.node.detach(self)
         self.forget()
+
+    def compare_with(self, other: "JointDrive") -> None:
+        """Judge it against the same joint of the other leg too."""
+        self._watch.compare_with(other.latest)
 
     def quality(self, now_ns: int) -> Quality:
         """How far the joint's position can be trusted now, and what is wrong in words."""
         state, age_ms = self._freshness.state(now_ns)
         problem = self.node.problem(now_ns)
+        implausible: tuple[Finding, ...] = ()
         if not self.node.ready:
             state = State.LOST
-        elif state is State.OK and self._drive_state(now_ns) in _IN_FAULT:
-            state, problem = State.FAULT, self._fault_text(now_ns)
-        elif state is not State.OK:
+        elif state is State.OK:
+            implausible = self._watch.check.findings
+            if self._drive_state(now_ns) in _IN_FAULT:
+                state, problem = State.FAULT, self._fault_text(now_ns)
+            elif implausible:
+                state = State.FAULT
+        else:
             problem = problem or self._silence_text(age_ms)
+        findings = (*implausible, *self.node.trouble)
         notes = (*self.node.findings, *(self._plan.notes if self._plan is not None else ()))
-        words = "; ".join(text for text in (problem, *notes) if text)
-        return Quality(state, age_ms, words or None, self.counters())
+        texts = (problem, self._emcy_text(state, now_ns), *(one.text(now_ns) for one in findings), *notes)
+        words = "; ".join(text for text in texts if text)
+        return Quality(state, age_ms, words or None, self.counters(), findings)
 
     def counters(self) -> dict[str, int]:
         """Since the driver was made."""
@@ -114,6 +132,7 @@ class JointDrive(PowerDrive):
             self.forget()
             if self._started:
                 self.reading, self._plan, self._stop_rpdo = reading, plan, stop_rpdo
+                self._watch.check.loaded.rated = rated_torque(self.settings, reading.scaling)
                 self._install(plan)
 
     def forget(self) -> None:
@@ -122,6 +141,7 @@ class JointDrive(PowerDrive):
                 self._undo.pop()()
             self.reading = self._plan = self._stop_rpdo = None
             self.latest.clear()
+            self._watch.restart()
             self._freshness.disconnected()
 
     def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
@@ -146,6 +166,8 @@ class JointDrive(PowerDrive):
             handler = self._handler(tpdo, decoder)
             bus.subscribe(can_id, handler)
             self._undo.append(partial(bus.unsubscribe, can_id, handler))
+        if plan.position_from is not None and plan.position_from.cyclic:
+            self._undo.append(self.node.follow(self._arrivals))
         for hz, polled in (
             (self.settings.poll_hz, plan.polled_often),
             (self.settings.slow_poll_hz, plan.polled_seldom),
@@ -158,6 +180,7 @@ class JointDrive(PowerDrive):
         size, indices, values = tpdo.size, decoder.channels, decoder.values
         update, lock = self.latest.update, self._lock
         position = self._index[POSITION] in indices
+        arrived = self._arrivals.stamps.append
 
         def on_frame(stamp_ns: int, data: bytes) -> None:
             if len(data) < size:
@@ -168,6 +191,7 @@ class JointDrive(PowerDrive):
                 update(stamp_ns, indices, values(data))
                 if position:
                     self._freshness.seen(stamp_ns)
+                    arrived(stamp_ns)
 
         return on_frame
 
@@ -197,7 +221,7 @@ class JointDrive(PowerDrive):
         return None if index is None else self.latest.read(index, now_ns)[0]
 
     def _drive_state(self, now_ns: int) -> DriveState | None:
-        value = self._fresh("state", now_ns)
+        value = self._fresh(STATE, now_ns)
         return None if value is None else DriveState(int(value))
 
     def _fault_text(self, now_ns: int) -> str:
@@ -209,6 +233,14 @@ class JointDrive(PowerDrive):
         if code:
             return f"the drive is in fault: {error_text(int(code), vendor)}"
         return "the drive is in fault and does not say why (no EMCY was seen, 603Fh is empty)"
+
+    def _emcy_text(self, state: State, now_ns: int) -> str | None:
+        """What a drive reports that goes on all the same."""
+        emcy = self.node.life.active_emcy
+        if emcy is None or state is State.LOST or self._drive_state(now_ns) in _IN_FAULT:
+            return None
+        age_s = max(0, now_ns - emcy.stamp_ns) / 1e9
+        return f"it reports {emcy.text(self._description.vendor_id)} ({age_s:.0f} s ago)"
 
     def _silence_text(self, age_ms: float | None) -> str:
         since = "no position has come yet" if age_ms is None else f"no position for {age_ms / 1000:.1f} s"

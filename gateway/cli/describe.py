@@ -2,34 +2,51 @@
 
 import re
 import textwrap
+import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from gateway.amounts import NONE
+from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
 from gateway.cli.text import budget, exact, say, say_json, table
+from gateway.client.blocking import Robot
+from gateway.wire.bus import CLOSED
 from gateway.wire.component import ChannelInfo
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo
 from gateway.wire.stop import StopInfo
 
 PAGE = 100  # columns
+LOAD_S, LOOK_S = 2.0, 0.2  # how long a bus that has just been opened is given, and how often it is looked
 
 
 def main(argv: list[str]) -> int:
     """Run `gwrms describe`."""
     arguments = parser(
         "describe",
-        "What a robot is made of: its components and what is wrong with them, its channels and their units,\n"
-        "its parameters and their limits, and what each drive does on a stop.",
+        "What a robot is made of: its components and buses and what is wrong with them, since when and what\n"
+        "to check, its channels and their units, its parameters and their limits, and what each drive does\n"
+        "on a stop.",
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
-        description = robot.describe()
+        description = _measured(robot)
     if arguments.json:
         say_json(description)
     else:
         say("\n".join(_chapters(description)))
     return 0
+
+
+def _measured(robot: Robot) -> Description:
+    """Its description; where nobody had the buses open before, as soon as their load was measured."""
+    deadline_s = time.monotonic() + LOAD_S
+    while True:
+        description = robot.describe()
+        known = [bus.frames_per_s is not None or bus.state == CLOSED for bus in description.buses]
+        if all(known) or time.monotonic() > deadline_s:
+            return description
+        time.sleep(LOOK_S)
 
 
 def _chapters(robot: Description) -> Iterator[str]:
@@ -39,6 +56,7 @@ def _chapters(robot: Description) -> Iterator[str]:
         ("COMPONENT", "KIND", "STATE", "PROBLEM"),
         [(part.name, part.kind, part.state, part.problem or "") for part in robot.components],
     )
+    yield from describe_buses.chapters(robot)
     yield _channels(robot.channels)
     if robot.parameters:
         yield table(

@@ -77,7 +77,7 @@ complete -c gwrms -n '_shtab_gwrms_using check' -l strict -d 'exit status 1 for 
 complete -c gwrms -n '_shtab_gwrms_using check' -l json -d 'one JSON object a file and line'
 complete -c gwrms -n '_shtab_gwrms_using check' -l schema -xka "robot server scenario" -d 'print the JSON Schema of such files, for editors, instead'
 complete -c gwrms -n '_shtab_gwrms_using check; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file to check'
-complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a describe -d 'What a robot is made of: its components and what is wrong with them, its channels and their units,'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a describe -d 'What a robot is made of: its components and buses and what is wrong with them, since when and what'
 complete -c gwrms -n '_shtab_gwrms_using describe' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using describe' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using describe' -l json -d 'one JSON object a line, for machines'

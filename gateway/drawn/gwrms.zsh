@@ -19,7 +19,7 @@ _shtab_gwrms_commands() {
     completion:'Print what completes commands, options and files in a shell.'
     cost:'What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.'
     demo:'A simulated exoskeleton, its gateway and a live view, with one command.'
-    describe:'What a robot is made of: its components and what is wrong with them, its channels and their units,'
+    describe:'What a robot is made of: its components and buses and what is wrong with them, since when and what'
     docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
     enable:'Enable drives, one confirmed transition at a time.'

@@ -2,6 +2,7 @@
 
 from msgspec import UNSET, Struct, UnsetType
 
+from gateway.wire.finding import FindingInfo
 from gateway.wire.method import Globs, Method, Params
 
 QualityInfo = dict[str, str | int | float | None]  # state, age_ms, problem, and the component's own counters
@@ -17,6 +18,15 @@ class LayoutInfo(Struct, frozen=True):
     cells: list[tuple[float, float, float]]
 
 
+class EmcyInfo(Struct, frozen=True):
+    """The last emergency message (EMCY) of a component's device."""
+
+    stamp_ns: int
+    code: int
+    words: str  # code, meaning, and the error register's bits
+    active: bool  # not taken back
+
+
 class ComponentInfo(Struct, frozen=True):
     """One component of `robot.describe`; `problem` says in words what is wrong."""
 
@@ -26,6 +36,8 @@ class ComponentInfo(Struct, frozen=True):
     problem: str | None = None
     device: dict[str, str | int] | UnsetType = UNSET  # what its EDS says, where it is on which bus
     layout: LayoutInfo | UnsetType = UNSET  # of an insole
+    findings: list[FindingInfo] | UnsetType = UNSET  # of what `problem` says, that which has a beginning
+    emcy: EmcyInfo | UnsetType = UNSET
 
 
 class ChannelInfo(Struct, frozen=True):

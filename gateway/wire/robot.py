@@ -4,6 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.control import RecordsInfo
 from gateway.wire.cost import BudgetInfo
@@ -86,6 +87,7 @@ class Description(Struct, frozen=True):
     records: RecordsInfo | None = None
     budget: BudgetInfo | None = None
     version: str | None = None  # as in `hello`
+    buses: list[BusInfo] = []
 
 
 HELLO = Method("hello", HelloParams, Hello)

@@ -171,6 +171,9 @@ class Transport:
         if self._wire.full() and not self._wire.gone:
             self._room.wait(round(timeout_s * 1e9))
 
+    def carried(self) -> tuple[int, int] | None:
+        return None
+
     def accept(self, can_ids: frozenset[int] | None) -> None:
         self._accepted = can_ids
 

@@ -18,7 +18,6 @@ import pytest
 
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import ERROR
-from drivers.bus.interfaces.controller_state import bus_state
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.config import RobotConfig, load
@@ -76,7 +75,7 @@ class DirectBus(CanBus):
             handler(self._now_ns(), frame.data)
 
     def _error(self, error_class: int) -> None:
-        self.state = bus_state(ERROR | error_class, b"") or self.state
+        self.health.take_error(self._now_ns(), ERROR | error_class, b"")
 
     def _look(self) -> None:
         self._tick(self._now_ns())

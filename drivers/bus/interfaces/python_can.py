@@ -69,6 +69,9 @@ class PythonCanTransport:
     def await_room(self, timeout_s: float) -> None:
         """It always takes a frame, or fails."""
 
+    def carried(self) -> tuple[int, int] | None:
+        return None
+
     def accept(self, can_ids: frozenset[int] | None) -> None:
         """Most interfaces filter in Python, which costs more than it saves."""
 

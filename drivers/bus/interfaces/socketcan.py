@@ -9,6 +9,7 @@ import socket
 import struct
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 from drivers.bus.frames import EXTENDED, REMOTE, Frame
 from drivers.bus.interfaces.link_report import blocking_problem, missing_link, warning
@@ -21,7 +22,8 @@ _FILTER = struct.Struct("=II")
 _TIME = struct.Struct("@ll")
 _SO_TIMESTAMPNS, _SO_RXQ_OVFL = 35, 40  # <asm-generic/socket.h>; Python has no names for them
 _CAN_RAW_ERR_FILTER = 2  # <linux/can/raw.h>
-_ERRORS = 0x004 | 0x040 | 0x100  # controller state, bus off, restarted (<linux/can/error.h>)
+_ERRORS = 0x1FF  # every class, such as a controller's state or a violation on the wire (<linux/can/error.h>)
+_STATISTICS = Path("/sys/class/net")
 _ANCILLARY_BYTES = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)
 _MAX_FILTERS = 512
 RECEIVE_BUFFER = 4 * 1024 * 1024  # the kernel gives what net.core.rmem_max allows
@@ -33,13 +35,16 @@ class SocketCanTransport:
 
     blocks = False
 
-    def __init__(self, sock: socket.socket, where: str, warning: str | None = None) -> None:
-        """`sock` is bound already; see `open_socketcan`."""
+    def __init__(
+        self, sock: socket.socket, where: str, warning: str | None = None, statistics: Path | None = None
+    ) -> None:
+        """`sock` is bound already, `statistics` the kernel's folder for it; see `open_socketcan`."""
         self.dropped = 0  # by the kernel, because we were too slow
         self.warning = warning
         self.full = f"{where} does not send: does anybody on the bus acknowledge?"
         self._socket = sock
         self._where = where
+        self._statistics = statistics
         self._timeout_s: float | None = None
         self._queue_full = False
         self._room = select.poll()
@@ -82,6 +87,19 @@ class SocketCanTransport:
         if self._queue_full:  # the interface's, which the socket knows nothing of
             time.sleep(QUEUE_LOOK_S)
 
+    def carried(self) -> tuple[int, int] | None:
+        """As the kernel counts for the interface, whatever its filters keep from us."""
+        if self._statistics is None:
+            return None
+        try:
+            rx, tx, rx_bytes, tx_bytes = (
+                int((self._statistics / name).read_text(encoding="ascii"))
+                for name in ("rx_packets", "tx_packets", "rx_bytes", "tx_bytes")
+            )
+        except (OSError, ValueError):
+            return None
+        return rx + tx, rx_bytes + tx_bytes
+
     def accept(self, can_ids: frozenset[int] | None) -> None:
         """Let the kernel pass only these identifiers, and error frames."""
         filters = (
@@ -119,7 +137,10 @@ def open_socketcan(settings: CanSettings) -> SocketCanTransport:
         if problem is not None:
             raise Unavailable(problem)
         return SocketCanTransport(
-            _bound_socket(name), f"interface {name}", warning(name, link, settings.bitrate)
+            _bound_socket(name),
+            f"interface {name}",
+            warning(name, link, settings.bitrate),
+            _STATISTICS / name / "statistics",
         )
     except OSError as error:
         raise Unavailable(

@@ -9,7 +9,7 @@ import socket
 import time
 from collections.abc import Sequence
 
-from drivers.bus.frames import EXTENDED, REMOTE, Frame
+from drivers.bus.frames import ERROR, EXTENDED, REMOTE, Frame
 from drivers.errors import Unavailable
 
 CONNECT_TIMEOUT_S = 1.0
@@ -41,8 +41,13 @@ class SocketcandParser:
 
 
 def frame_of(message: str, stamp_ns: int) -> Frame | None:
-    """A frame out of ` frame 181 1234.5 0102 `; `None` for other or damaged messages."""
+    """A frame out of ` frame 181 1234.5 0102 `; `None` for other or damaged messages.
+
+    ` error 088 1234.5 ` is an error frame, of which the protocol tells no more than its class.
+    """
     words = message.split()
+    if len(words) == 3 and words[0] == "error":
+        return _error_frame(words[1], stamp_ns)
     if len(words) < 3 or words[0] != "frame":
         return None
     try:
@@ -54,6 +59,14 @@ def frame_of(message: str, stamp_ns: int) -> Frame | None:
     if len(data) > 8 or not 0 <= can_id <= (0x7FF if is_standard else 0x1FFF_FFFF):
         return None
     return stamp_ns, can_id if is_standard else can_id | EXTENDED, data
+
+
+def _error_frame(error_class: str, stamp_ns: int) -> Frame | None:
+    try:
+        found = int(error_class, 16)
+    except ValueError:
+        return None
+    return (stamp_ns, found & (ERROR - 1) | ERROR, b"") if found > 0 else None
 
 
 def send_message(can_id: int, data: bytes) -> str:
@@ -128,6 +141,9 @@ class SocketcandTransport:
 
     def await_room(self, timeout_s: float) -> None:
         self._room.poll(timeout_s * 1000)
+
+    def carried(self) -> tuple[int, int] | None:
+        return None
 
     def accept(self, can_ids: frozenset[int] | None) -> None:
         """The protocol's raw mode has no filters."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from drivers.bus.sdo.doubles import Doubles
 from drivers.bus.sdo.outstanding import Outstanding
+from drivers.bus.sdo.round_trips import RoundTrips
 
 # Responses that wait. Of a flood the first are kept, in their order: what answers a request comes before what
 # is sent behind it without being asked. What comes beyond is lost, which is as if it never came: its request
@@ -30,10 +31,11 @@ class SdoCounters:
 class Answers:
     """Put in by the bus's thread, fetched by that of the transfers."""
 
-    def __init__(self, outstanding: Outstanding, counters: SdoCounters) -> None:
+    def __init__(self, outstanding: Outstanding, counters: SdoCounters, round_trips: RoundTrips) -> None:
         self._outstanding = outstanding
         self._counters = counters
-        self._inbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._round_trips = round_trips
+        self._inbox: queue.SimpleQueue[tuple[int, bytes] | None] = queue.SimpleQueue()
         self._doubles = Doubles()
 
     @property
@@ -50,12 +52,12 @@ class Answers:
         """They were another life's."""
         self._doubles = Doubles()
 
-    def put(self, response: bytes) -> None:
+    def put(self, stamp_ns: int, response: bytes) -> None:
         """A response has come."""
         if self._inbox.qsize() >= INBOX:
             self._counters.dropped += 1
         else:
-            self._inbox.put(response)
+            self._inbox.put((stamp_ns, response))
 
     def wake(self) -> None:
         """Let `fetch` return, as it does anyway where something waits for it."""
@@ -72,10 +74,13 @@ class Answers:
         """Wait for the next one and assign it; raises `queue.Empty` at the deadline."""
         self._assign(self._inbox.get(timeout=max(0.0, deadline - time.monotonic())))
 
-    def _assign(self, response: bytes | None) -> None:
-        if response is None:
+    def _assign(self, received: tuple[int, bytes] | None) -> None:
+        if received is None:
             return
-        if self._outstanding.settle(response) is not None:
+        stamp_ns, response = received
+        request = self._outstanding.settle(response)
+        if request is not None:
+            self._round_trips.answered(request.sent_ns, stamp_ns, given_up=request.given_up)
             self._doubles.answered(response)
             return
         self._counters.stale += 1

@@ -16,6 +16,7 @@ from drivers.bus.sdo import protocol
 from drivers.bus.sdo.aborts import abort_text
 from drivers.bus.sdo.answers import Answers, SdoCounters
 from drivers.bus.sdo.outstanding import Outstanding, Request
+from drivers.bus.sdo.round_trips import RoundTrips
 from drivers.bus.sdo.transfer import Transfer, nothing, read, write
 from drivers.bus.sender import StillLeaving
 from drivers.bus.written import Written
@@ -75,7 +76,8 @@ class SdoChannel:
         self._in_flight: tuple[int, int] | None = None  # the object that a transfer is about
         self._ahead: Request | None = None  # went out before the job that waits for its answer
         self._outstanding = Outstanding()
-        self._answers = Answers(self._outstanding, self.counters)
+        self.round_trips = RoundTrips(timeout_s)
+        self._answers = Answers(self._outstanding, self.counters, self.round_trips)
         self._unassigned = 0  # failed attempts to bring it in sync, in a row
         self._written = Written()
         self._urgent = False
@@ -105,10 +107,10 @@ class SdoChannel:
 
     # What comes, and who is first.
 
-    def on_response(self, _stamp_ns: int, data: bytes) -> None:
+    def on_response(self, stamp_ns: int, data: bytes) -> None:
         """A frame with the identifier of this channel's responses; called in the bus's thread."""
         if len(data) == 8:
-            self._answers.put(data)
+            self._answers.put(stamp_ns, data)
 
     def interrupt(self, ahead: bytes | None = None) -> None:
         """End the transfer in flight, refuse further ones until `resume`, and send a request `ahead`.
@@ -157,6 +159,7 @@ class SdoChannel:
         self._written.forget()
         self._answers.forget_doubles()
         self._unassigned = 0
+        self.round_trips.restart()
 
     def pause(self, seconds: float) -> None:
         """Wait between two transfers of a job, as long as nothing more urgent wants the channel."""
@@ -241,7 +244,7 @@ class SdoChannel:
                 self._abort(transfer, protocol.GENERAL_ERROR)
             raise
         except queue.Empty as error:
-            self.counters.timeouts += 1
+            self._count_timeout()
             self._abort(transfer, protocol.TIMED_OUT)
             raise DeviceTimeout(f"{transfer.what}: no answer within {transfer.timeout_s:g} s") from error
         else:
@@ -308,7 +311,7 @@ class SdoChannel:
                 self._answers.fetch(deadline)
                 self._check_interrupted()
         except queue.Empty as error:
-            self.counters.timeouts += 1
+            self._count_timeout()
             self._unassigned += self._outstanding.heard
             raise DeviceTimeout(
                 f"{transfer.what}: not asked, because an answer could be a late one to an earlier request; "
@@ -319,6 +322,10 @@ class SdoChannel:
             request.given_up = True
         if request.answer is not None and not protocol.concludes(request.answer, request.frame):
             self._abort(probe, protocol.GENERAL_ERROR)  # its data is of no interest
+
+    def _count_timeout(self) -> None:
+        self.counters.timeouts += 1
+        self.round_trips.unanswered(time.monotonic_ns())
 
     # What goes out.
 

@@ -6,6 +6,7 @@ that was sent before that one is answered any more.
 """
 
 import threading
+import time
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import chain
@@ -24,6 +25,7 @@ class Request:
 
     about: bytes
     frame: bytes
+    sent_ns: int = 0  # when it was handed to the bus
     answer: bytes | None = None
     given_up: bool = False  # nobody waits for the answer any more
 
@@ -47,7 +49,7 @@ class Outstanding:
 
     def add(self, about: bytes, frame: bytes) -> Request:
         """A request that is sent now."""
-        request = Request(about, frame)
+        request = Request(about, frame, time.monotonic_ns())
         with self._lock:
             self._requests.append(request)
             if len(self._requests) > MOST:

@@ -17,6 +17,7 @@ from drivers.errors import DriverError
 from drivers.imu.build import build_imu
 from drivers.insole.build import build_insole, join_insoles
 from drivers.joint.drive import JointDrive
+from drivers.joint.pairs import join_joints
 from drivers.joint.settings import JointSettings
 from drivers.site import Site
 from gateway.config.robot import RobotConfig
@@ -85,7 +86,9 @@ def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) ->
         robot.absent[name] = (kind, f"internal error, {type(error).__name__}: {error}; report it")
 
 
-def _on_can(make: Callable[..., Component]) -> Builder:
+def _on_can(
+    make: Callable[..., Component], join: Callable[[Mapping[str, Component]], None] | None = None
+) -> Builder:
     """The builder of what a vendor's EDS describes."""
 
     def build(name: str, settings: JointSettings | DeviceSettings, site: Site) -> Component:
@@ -95,11 +98,11 @@ def _on_can(make: Callable[..., Component]) -> Builder:
         site.descriptions[name] = description
         return make(name, settings, site.buses[settings.bus], description)
 
-    return Builder(build)
+    return Builder(build, join)
 
 
 BUILDERS: Mapping[Kind, Builder] = {
-    Kind.JOINT: _on_can(JointDrive),
+    Kind.JOINT: _on_can(JointDrive, join_joints),
     Kind.DEVICE: _on_can(CanDevice),
     Kind.INSOLE: Builder(build_insole, join_insoles),
     Kind.IMU: Builder(build_imu),

@@ -16,8 +16,10 @@ from drivers.latest import Latest, Listener
 from drivers.samples import Channel, State
 from gateway.handlers import Handlers, on
 from gateway.modules.component.assembly import Robot, assemble, facts
+from gateway.modules.component.findings import bus_infos, emcy_info, finding_infos
 from gateway.process.futures import done, then
 from gateway.streaming.sources import Selection, Source, channel_info, check_globs, narrow, whole
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import (
     COMPONENT_SNAPSHOT,
     ChannelInfo,
@@ -142,17 +144,33 @@ class ComponentModule:
     def components(self) -> list[ComponentInfo]:
         """Every component of the file, there or not."""
         now_ns = time.monotonic_ns()
-        found = []
-        kinds = {name: one.kind for name, one in self.robot.components.items()}
-        kinds |= {name: kind for name, (kind, _why) in self.robot.absent.items()}
-        for name, kind in kinds.items():
-            quality = self.quality(name, now_ns)
-            description = self.robot.descriptions.get(name)
-            device = UNSET if description is None else dict(facts(self._context.config, name, description))
-            problem = None if quality["problem"] is None else str(quality["problem"])
-            layout = _layout(self.robot.components.get(name))
-            found.append(ComponentInfo(name, kind.value, str(quality["state"]), problem, device, layout))
-        return found
+        there = [self._info(name, component, now_ns) for name, component in self.robot.components.items()]
+        return there + [self._absent_info(name) for name in self.robot.absent]
+
+    def _info(self, name: str, component: Component, now_ns: int) -> ComponentInfo:
+        quality = component.quality(now_ns)
+        return ComponentInfo(
+            name,
+            component.kind.value,
+            quality.state.value,
+            quality.problem,
+            self._device(name),
+            _layout(component),
+            finding_infos(quality.findings) or UNSET,
+            emcy_info(component),
+        )
+
+    def _absent_info(self, name: str) -> ComponentInfo:
+        kind, why = self.robot.absent[name]
+        return ComponentInfo(name, kind.value, State.LOST.value, why, self._device(name))
+
+    def _device(self, name: str) -> dict[str, str | int] | UnsetType:
+        description = self.robot.descriptions.get(name)
+        return UNSET if description is None else dict(facts(self._context.config, name, description))
+
+    def buses(self) -> list[BusInfo]:
+        """Every CAN bus of the file."""
+        return bus_infos(self.robot.buses, time.monotonic_ns())
 
     def channels(self) -> list[ChannelInfo]:
         channels = [one.channels for one in self.robot.components.values()]
@@ -205,7 +223,7 @@ def _has_values(selection: Selection) -> bool:
     return all(latest.read(index, now_ns)[1] is not None for index in selection.indices)
 
 
-def _layout(component: Component | None) -> LayoutInfo | UnsetType:
+def _layout(component: Component) -> LayoutInfo | UnsetType:
     """Where the cells are, of a component that has some."""
     layout = getattr(component, "layout", None)
     return UNSET if layout is None else LayoutInfo(layout.name, list(layout.cells))

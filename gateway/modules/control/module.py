@@ -16,6 +16,7 @@ from gateway.modules.stop.stop_control import StopControl
 from gateway.process.futures import then
 from gateway.records.journal import Journal, Share
 from gateway.records.records import Records
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.control import (
     CONTROL_ACQUIRE,
@@ -77,6 +78,7 @@ class Described:
     stop: StopInfo
     trials: list[TrialInfo]
     records: RecordsInfo
+    buses: list[BusInfo]
 
 
 class ControlModule:
@@ -142,6 +144,7 @@ class ControlModule:
             stop=self._stop.info(self.armed),
             trials=self._tuning.trials.infos(),
             records=self._records.info,
+            buses=self._component.buses(),
         )
 
     def keep_awake(self, why: str, on: bool) -> None:

@@ -5,6 +5,7 @@ import contextlib
 from drivers.bus.sdo import protocol
 from drivers.bus.sdo.answers import INBOX, Answers, SdoCounters
 from drivers.bus.sdo.outstanding import Outstanding
+from drivers.bus.sdo.round_trips import RoundTrips
 
 TOKENS = (
     b"\x43\x41\x60\0",
@@ -41,12 +42,12 @@ def _play(steps: protocol.Upload | protocol.Download, responses: list[bytes]) ->
 def _assign(responses: list[bytes]) -> None:
     """What is asked for by one of these is settled at most once; the rest is counted."""
     counters, outstanding = SdoCounters(), Outstanding()
-    answers = Answers(outstanding, counters)
+    answers = Answers(outstanding, counters, RoundTrips(0.5))
     asked = [
         outstanding.add(protocol.multiplexer(0x6041, 0), next(protocol.upload(0x6041, 0))) for _ in range(3)
     ]
-    for response in responses:
-        answers.put(response)
+    for stamp_ns, response in enumerate(responses):
+        answers.put(stamp_ns, response)
     answers.fetch_waiting()
     settled = sum(request.answer is not None for request in asked)
     assert settled + counters.stale <= min(INBOX, len(responses))

@@ -62,6 +62,9 @@ class NarrowTransport:
             self.awaited = True
             self._changed.wait_for(lambda: self.room or self.closed, timeout_s)
 
+    def carried(self) -> tuple[int, int] | None:
+        return None
+
     def accept(self, can_ids: frozenset[int] | None) -> None:
         pass
 

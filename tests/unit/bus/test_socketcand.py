@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.bus.frames import EXTENDED, REMOTE, Frame
+from drivers.bus.frames import ERROR, EXTENDED, REMOTE, Frame
 from drivers.bus.interfaces.socketcand import (
     MAX_PENDING,
     SocketcandParser,
@@ -34,7 +34,7 @@ def test_messages_survive_every_split(split: int) -> None:
     assert frames == [
         (7, 0x181, bytes.fromhex("0102030405060708")),
         (7, 0x1FFFFFFF | EXTENDED, b"\xaa"),
-        None,
+        (7, 0x004 | ERROR, b""),
         (7, 0x702, b"\x05"),
     ]
 
@@ -52,6 +52,9 @@ def test_messages_survive_every_split(split: int) -> None:
         " frame 20000000 1.0 01",
         " frame 181 1.0 0",
         " frame 181 1.0 010203040506070809",
+        " error unknown command ",
+        " error -88 1.0 ",
+        " error 088 ",
     ],
 )
 def test_a_damaged_message_is_no_frame(message: str) -> None:

@@ -14,6 +14,7 @@ from drivers.bus.sdo import protocol
 from drivers.bus.sdo.answers import INBOX, Answers, SdoCounters
 from drivers.bus.sdo.channel import OUT_OF_SYNC, SdoChannel
 from drivers.bus.sdo.outstanding import Outstanding
+from drivers.bus.sdo.round_trips import RoundTrips
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, Unavailable
 from tests.support.examples import examples
 from tests.unit.bus.direct import Direct
@@ -360,17 +361,17 @@ def test_of_a_flood_that_nobody_fetches_the_first_are_kept() -> None:
     counters = SdoCounters()
     outstanding = Outstanding()
     asked = outstanding.add(protocol.multiplexer(0x6041, 0), next(protocol.upload(0x6041, 0)))
-    answers = Answers(outstanding, counters)
-    answers.put(b"\x4b\x41\x60\0" + bytes(4))
+    answers = Answers(outstanding, counters, RoundTrips(0.5))
+    answers.put(0, b"\x4b\x41\x60\0" + bytes(4))
     for _ in range(10_000):
-        answers.put(b"\x4b\x41\x60\0\1\0\0\0")
+        answers.put(0, b"\x4b\x41\x60\0\1\0\0\0")
     answers.fetch_waiting()
     assert asked.answer == b"\x4b\x41\x60\0" + bytes(4)
     assert (counters.stale, counters.dropped) == (INBOX - 1, 10_001 - INBOX)
 
 
 def test_waking_who_does_not_fetch_leaves_one_thing_to_fetch() -> None:
-    answers = Answers(Outstanding(), SdoCounters())
+    answers = Answers(Outstanding(), SdoCounters(), RoundTrips(0.5))
     for _ in range(10_000):
         answers.wake()
     answers.fetch(deadline=0.0)

@@ -5,10 +5,14 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from drivers.component import Kind
+from drivers.samples import Finding, Quality, State
+from gateway.modules.component.assembly import assemble
 from tests.support.waiting import until
 from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving
 
@@ -111,6 +115,44 @@ def test_a_component_that_is_lost_says_why(client: Client, bench: Bench) -> None
     gait = next(one for one in described["components"] if one["name"] == "gait")
     assert (gait["kind"], gait["state"]) == ("device", "lost")
     assert gait["problem"] == "no frame at all from node 16: check its power"
+
+
+def test_the_joints_of_both_legs_are_judged_against_each_other(tmp_path: Path) -> None:
+    joints: Any = assemble(config(tmp_path)).components
+    assert joints["left_knee"]._watch.check.mirror is not None
+    assert joints["right_knee"]._watch.check.mirror is not None
+
+
+def test_what_was_found_is_told_with_its_beginning(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finding = Finding(7, "it hangs", "check its power")
+    found = Quality(State.FAULT, 1.0, "it hangs (for 2 s): check its power", findings=(finding,))
+    monkeypatch.setattr(bench.insole, "quality", lambda _now_ns: found)
+    parts = {one["name"]: one for one in client.call("robot.describe")["components"]}
+    assert parts["left_insole"]["findings"] == [
+        {"since_ns": 7, "words": "it hangs", "check": "check its power"}
+    ]
+    assert "findings" not in parts["left_knee"]
+    assert "emcy" not in parts["left_knee"]
+
+
+def test_the_last_emergency_message_is_told_also_when_it_is_over(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench.left.node, "description", SimpleNamespace(vendor_id=None), raising=False)
+    client.call("robot.describe")
+    bench.left.node.life.on_emcy(5, bytes.fromhex("1186 21 0000000000"))
+    emcy = {
+        "stamp_ns": 5,
+        "code": 0x8611,
+        "words": "0x8611 following error too large (register: generic, profile)",
+    }
+    (knee,) = (one for one in client.call("robot.describe")["components"] if one["name"] == "left_knee")
+    assert knee["emcy"] == {**emcy, "active": True}
+    bench.left.node.life.on_emcy(6, bytes(8))
+    (knee,) = (one for one in client.call("robot.describe")["components"] if one["name"] == "left_knee")
+    assert knee["emcy"] == {**emcy, "active": False}
 
 
 def test_describe_tells_all_a_client_needs(client: Client) -> None:

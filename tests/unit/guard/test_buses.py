@@ -185,7 +185,7 @@ def test_a_bus_that_goes_trips_at_once_and_is_well_when_it_is_heard_again(
 def test_a_controller_that_hardly_takes_part_trips_heard_or_not(
     bench: Bench, life: BusWatcher, state: BusState, reasons: list[str]
 ) -> None:
-    bench.buses["main"].state = state
+    bench.buses["main"].health.state = state
     life.tick(S)
     assert [one.reason for one in bench.changes] == reasons
 

@@ -191,6 +191,7 @@ CASES: dict[str, tuple[Callable[[], Seeded], str]] = {
         lambda: Seeded(cells=cell(3, loose(random.Random(1)))),
         "cell 3 jumps",
     ),
+    "insole saturated": (lambda: Seeded(left=InsoleFaults(saturated=True)), "cell at the end of its range"),
     "insole ten times too high": (lambda: Seeded(cells=times(10.0)), "scale is off"),
     "insole ten times too low": (lambda: Seeded(cells=times(0.1)), "scale is off"),
     "sign of the tilt": (lambda: Seeded(motion=backwards), "tilt and gravity disagree"),

@@ -1,0 +1,57 @@
+"""Judges a joint at the bus's tick, by the newest values: nothing extra is read, and no frame costs more."""
+
+from collections.abc import Callable, Iterable
+
+from drivers.bus.bus import BusUser
+from drivers.joint.cia402 import DriveState
+from drivers.joint.plausibility import JointCheck, Motion
+from drivers.joint.quantities import POSITION, STATE
+from drivers.latest import Latest
+from drivers.samples import Channel
+
+
+class JointWatch(BusUser):
+    """Feeds `check`, about 20 times a second as long as the bus is open."""
+
+    def __init__(self, latest: Latest) -> None:
+        self.check = JointCheck(latest.component)
+        self._latest = latest
+        self._index = _index(latest.channels)
+        self._other: Callable[[int], float | None] = lambda _now_ns: None
+
+    def compare_with(self, other: Latest) -> None:
+        """Judge it against the same joint of the other leg."""
+        position = _index(other.channels)[POSITION]
+        self.check.compare_with(other.component)
+        self._other = lambda now_ns: other.read(position, now_ns)[0]
+
+    def restart(self) -> None:
+        """What was seen before is of another life of the drive."""
+        self.check.restart()
+
+    def bus_closed(self) -> None:
+        self.restart()
+
+    def tick(self, now_ns: int) -> None:
+        position, stamp_ns = self._latest.read(self._index[POSITION], now_ns)
+        if position is None or stamp_ns is None:
+            return
+        mode = self._newest("modes_display", now_ns)
+        now = Motion(
+            stamp_ns,
+            position,
+            self._newest("velocity", now_ns),
+            self._newest("torque", now_ns),
+            self._newest("following_error", now_ns),
+            None if mode is None else int(mode),
+            self._newest(STATE, now_ns) == DriveState.OPERATION_ENABLED,
+        )
+        self.check.update(now, lambda: self._other(now_ns))
+
+    def _newest(self, quantity: str, now_ns: int) -> float | None:
+        index = self._index.get(quantity)
+        return None if index is None else self._latest.read(index, now_ns)[0]
+
+
+def _index(channels: Iterable[Channel]) -> dict[str, int]:
+    return {channel.quantity: index for index, channel in enumerate(channels)}

@@ -1,0 +1,26 @@
+"""Findings that come and go: each keeps its beginning as long as it lasts."""
+
+from collections.abc import Iterable
+
+from drivers.samples import Finding
+
+
+class Noted:
+    """One thing that can be wrong; `finding` is `None` while it is not. One thread writes, any reads."""
+
+    def __init__(self) -> None:
+        self.finding: Finding | None = None
+
+    def note(self, now_ns: int, words: str, check: str) -> None:
+        """It is wrong, or still wrong; the words may change meanwhile."""
+        since_ns = now_ns if self.finding is None else self.finding.since_ns
+        self.finding = Finding(since_ns, words, check)
+
+    def clear(self) -> None:
+        """It is not wrong any more."""
+        self.finding = None
+
+
+def found(noted: Iterable[Noted]) -> tuple[Finding, ...]:
+    """What is wrong now."""
+    return tuple(finding for one in noted if (finding := one.finding) is not None)

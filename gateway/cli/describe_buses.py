@@ -1,0 +1,78 @@
+"""The part of `gwrms describe` that tells of buses, emergency messages, and what was found."""
+
+from collections.abc import Iterator
+
+from gateway.amounts import NONE, percent
+from gateway.cli.text import table
+from gateway.wire.bus import BusInfo, NodeInfo
+from gateway.wire.component import ComponentInfo
+from gateway.wire.finding import FindingInfo
+from gateway.wire.robot import Description
+
+
+def chapters(robot: Description) -> Iterator[str]:
+    """Tables of what there is; none of what there is not."""
+    if robot.buses:
+        yield table(
+            ("BUS", "STATE", "LOAD", "FRAMES/S", "ERROR FRAMES", "BUS OFF", "LOST", "PROBLEM"),
+            [_bus(bus) for bus in robot.buses],
+            right=range(2, 7),
+        )
+        yield table(
+            ("NODE", "COMPONENTS", "SDO p50", "SDO max", "SENT", "UNANSWERED", "LATE", "PDOs MISSING"),
+            [_node(bus, node) for bus in robot.buses for node in bus.nodes],
+            right=range(2, 8),
+        )
+    now_ns = robot.clock.monotonic_ns
+    emcys = [row for part in robot.components for row in _emcy(part, now_ns)]
+    if emcys:
+        yield table(("COMPONENT", "LAST EMCY", "AGE", ""), emcys, right=(2,))
+    found = [(where, _age(now_ns - one.since_ns), one.words, one.check) for where, one in _findings(robot)]
+    if found:
+        yield table(("FOUND AT", "FOR", "WHAT", "CHECK"), found, right=(1,))
+
+
+def _bus(bus: BusInfo) -> tuple[str, ...]:
+    frames = NONE if bus.frames_per_s is None else f"{bus.frames_per_s:.0f}"
+    counted = (bus.error_frames, bus.bus_offs, bus.dropped)
+    return (bus.name, bus.state, percent(bus.load_percent), frames, *map(str, counted), bus.problem or "")
+
+
+def _node(bus: BusInfo, node: NodeInfo) -> tuple[str, ...]:
+    return (
+        f"{bus.name} {node.node_id}",
+        ", ".join(node.components),
+        _ms(node.sdo_p50_ms),
+        _ms(node.sdo_max_ms),
+        str(node.sdo_transfers),
+        str(node.sdo_timeouts),
+        str(node.sdo_late),
+        percent(node.pdos_missing_percent),
+    )
+
+
+def _emcy(part: ComponentInfo, now_ns: int) -> Iterator[tuple[str, ...]]:
+    if part.emcy:
+        ended = "" if part.emcy.active else "taken back"
+        yield part.name, part.emcy.words, _age(now_ns - part.emcy.stamp_ns), ended
+
+
+def _findings(robot: Description) -> Iterator[tuple[str, FindingInfo]]:
+    """Each once: what is wrong with a node is told of it, and not again of each component on it."""
+    told: set[FindingInfo] = set()
+    for bus in robot.buses:
+        yield from ((bus.name, one) for one in bus.findings)
+        for node in bus.nodes:
+            names = ", ".join(node.components)
+            yield from ((f"{bus.name} node {node.node_id} ({names})", one) for one in node.findings)
+            told.update(node.findings)
+    for part in robot.components:
+        yield from ((part.name, one) for one in part.findings or () if one not in told)
+
+
+def _age(age_ns: int) -> str:
+    return f"{max(0, age_ns) / 1e9:.0f} s"
+
+
+def _ms(milliseconds: float | None) -> str:
+    return NONE if milliseconds is None else f"{milliseconds:.1f} ms"

@@ -1,0 +1,44 @@
+"""CAN buses of `robot.describe`, as far as the gateway sees them anyway while it has them open."""
+
+from msgspec import Struct
+
+from gateway.wire.finding import FindingInfo
+
+CLOSED = "closed"  # a bus's state that is not open
+
+
+class NodeInfo(Struct, frozen=True):
+    """One CANopen node: how it answers, and what is missing of its PDOs; counters are since it is watched.
+
+    Round trips are of the last minute. `late` answers came when nobody waited for them any more.
+    """
+
+    node_id: int
+    components: list[str]  # that live on it
+    sdo_p50_ms: float | None
+    sdo_max_ms: float | None
+    sdo_transfers: int
+    sdo_timeouts: int
+    sdo_late: int
+    pdos_missing_percent: float | None  # of those that bring the position at a steady pace; None: not known
+    findings: list[FindingInfo] = []
+
+
+class BusInfo(Struct, frozen=True):
+    """One bus. Load and frames are of the last second; the counters are since the gateway watches it.
+
+    Where an interface filters for us and does not count, only the frames that came and left are known.
+    """
+
+    name: str
+    state: str  # of our CAN controller: error active, error warning, error passive, bus off; closed
+    bitrate: int | None
+    load_percent: float | None  # None: not known yet, or the file tells no bitrate
+    frames_per_s: float | None
+    error_frames: int
+    bus_offs: int
+    opened: int  # times
+    dropped: int  # frames that were lost on their way to us since it opened
+    nodes: list[NodeInfo]
+    problem: str | None = None  # why it is not open, or what its controller or its link says
+    findings: list[FindingInfo] = []
