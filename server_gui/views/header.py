@@ -151,12 +151,14 @@ def _robot(station: Station) -> Words:
 def _drives(station: Station) -> Words:
     mark = drives_mark(station.robot)
     joints = station.robot.names("joint")
+    if not station.is_live:
+        return mark, mark.word.capitalize(), f"–/{len(joints)} enabled · CiA 402"
     enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
     return mark, mark.word.capitalize(), f"{enabled}/{len(joints)} enabled · CiA 402"
 
 
 def _status(station: Station) -> Words:
-    if station.robot.is_stale():
+    if not station.is_live:
         return Mark("ring", "old"), "Status not known", "no live data"
     line = status(station)
     if line is not None:
@@ -183,6 +185,11 @@ def _link(station: Station) -> Words:
 
 def _warnings(station: Station) -> Words:
     bad = station.robot.not_ok()
+    if not station.is_live or not station.robot.parts:
+        before = (
+            f"before: {'; '.join(f'{part.name} {part.state}' for part in bad)}" if bad else "no live data"
+        )
+        return Mark("ring", "old"), "Warnings not known", before
     if not bad:
         return Mark("disc", "good"), "No warnings", "every component is ok"
     said = "; ".join(f"{part.name} {part.state}: {part.problem or 'no reason known'}" for part in bad)

@@ -3,8 +3,16 @@
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
-from PySide6.QtCore import QByteArray, QSettings, Signal
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtCore import QByteArray, QSettings, QSize, QTimer, Signal
+from PySide6.QtGui import (
+    QAction,
+    QActionGroup,
+    QCloseEvent,
+    QKeySequence,
+    QResizeEvent,
+    QShortcut,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -50,6 +58,9 @@ CHOICES: Final = (
 )  # quantities with more than one unit worth choosing
 
 
+USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
+
+
 class View(Protocol):
     """What a tab holds."""
 
@@ -74,8 +85,9 @@ class MainWindow(QMainWindow):
         self.kept = settings
         desk.pins.take(settings.value("pinned"))
         self._frame = 0
+        self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
-        self.resize(1680, 1000)
+        self.resize(USUAL.boundedTo(self.screen().availableSize()))
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
@@ -137,7 +149,8 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.kept.setValue("geometry", self.saveGeometry())
-        self.kept.setValue("state", self._panels.state)
+        if self._is_arranged:
+            self.kept.setValue("state", self._panels.state)
         self.kept.setValue("look", self._theme.look.value)
         self.kept.setValue("scale", round(self._theme.scale * 100))
         self.kept.setValue("units", dict(self._desk.shown.units.by_si))
@@ -148,6 +161,11 @@ class MainWindow(QMainWindow):
     def reset_layout(self) -> None:
         """Everything where it was at first."""
         self._panels.reset(self.docks)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if not self._is_arranged:
+            QTimer.singleShot(0, self, self._arrange)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -188,6 +206,8 @@ class MainWindow(QMainWindow):
 
     def _fit(self, *, scaled: bool = False) -> None:
         """Do with the room that there is."""
+        if not self._is_arranged:
+            return
         is_narrow = not self._panels.has_room
         if is_narrow != self._panels.is_narrow:
             for part in (self.header, self.parameters):
@@ -245,11 +265,24 @@ class MainWindow(QMainWindow):
         return choose
 
     def _restore(self) -> None:
-        geometry, state = self.kept.value("geometry"), self.kept.value("state")
+        geometry = self.kept.value("geometry")
         if isinstance(geometry, QByteArray):
             self.restoreGeometry(geometry)
+        if not self.isMaximized():
+            self._arrange()
+
+    def _arrange(self) -> None:
+        """Lay the panels out as they were kept; in a window that will be maximised once it is.
+
+        Of what is restored before, Qt keeps a second copy until then, and crashes in that when the panels are
+        arranged anew (QMainWindowLayout::restoreState, Qt 6.11).
+        """
+        self._is_arranged = True
+        state = self.kept.value("state")
         if isinstance(state, QByteArray):
             self._panels.restore(state)
+        if self.isVisible():
+            self._fit(scaled=True)
 
 
 def _within(panel: QWidget) -> bool:

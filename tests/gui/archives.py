@@ -19,7 +19,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from server_gui.views.cloud.panel import Cloud
-from server_gui.views.main_window import MainWindow
+from server_gui.views.main_window import USUAL, MainWindow
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
@@ -81,6 +81,7 @@ def full_window(
     """The window with recordings and cloud."""
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     made = MainWindow(bench.desk, theme, kept, archive)
+    made.resize(USUAL)
     made.resize(1480, 900)
     made.show()
     yield made

@@ -13,7 +13,7 @@ from PySide6.QtCore import QEventLoop, QSettings, QtMsgType, qInstallMessageHand
 from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.desk import Desk
-from server_gui.views.main_window import MainWindow
+from server_gui.views.main_window import USUAL, MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
     archive,
@@ -81,6 +81,7 @@ def window(qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path) -> Iter
     """The main window on that desk, shown."""
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     made = MainWindow(bench.desk, theme, kept)
+    made.resize(USUAL)  # the screen of no display is small
     made.show()
     bench.draw(made)
     yield made

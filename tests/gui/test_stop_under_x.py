@@ -16,6 +16,7 @@ from tests.fake_robot import FakeRobot
 from tests.support.waiting import WAIT_S, until
 
 PROGRAM = Path(__file__).with_name("busy_window.py")
+KEPT = Path(__file__).parents[1] / "data" / "window" / "maximised.conf"
 
 pytestmark = [
     pytest.mark.skipif(
@@ -56,10 +57,10 @@ class Shown:
 
 
 @contextmanager
-def x_server() -> Iterator[str]:
+def x_server(screen: str = "1400x900x24") -> Iterator[str]:
     read, write = os.pipe()
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1400x900x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp"],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
@@ -128,3 +129,31 @@ def test_a_value_is_edited_reviewed_and_written_with_mouse_and_keys(shown: Shown
     until(lambda: len(shown.robot.called("parameter.write")) == 1, "wrote it")
     assert shown.robot.called("parameter.write")[0]["changes"] == {"gait.step_length": 0.43}
     assert shown.robot.parameters["gait.step_length"] == 0.43
+
+
+@pytest.mark.parametrize("scale", [100, 125, 200])
+def test_a_window_that_was_maximised_opens_again_at_any_size_of_text(tmp_path: Path, scale: int) -> None:
+    """Kept on a screen of 1366 × 768, where the panels do not fit: that was a segmentation fault."""
+    kept = tmp_path / "gwrms" / "gui.conf"
+    kept.parent.mkdir()
+    shutil.copy(KEPT, kept)
+    opened = (
+        "from server_gui.app import run; from server_gui.core.settings.server_file import ServerSettings;"
+        f"raise SystemExit(run(ServerSettings(), scale={scale / 100}, seconds=2.0))"
+    )
+    with x_server("1366x768x24") as display:
+        environment = {
+            **os.environ,
+            "DISPLAY": display,
+            "QT_QPA_PLATFORM": "xcb",
+            "XDG_CONFIG_HOME": str(tmp_path),
+        }
+        ended = subprocess.run(
+            [sys.executable, "-c", opened],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=WAIT_S,
+            check=False,
+        )
+    assert ended.returncode == 0, ended.stderr

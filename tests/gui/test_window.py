@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.main_window import MainWindow
+from server_gui.views.main_window import USUAL, MainWindow
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
@@ -94,6 +94,7 @@ def test_the_layout_is_kept_and_can_be_reset(window: MainWindow, bench: Bench, t
     events.hide()
     window.close()
     again = MainWindow(bench.desk, theme, window.kept)
+    again.resize(USUAL)
     again.show()
     assert again.docks[2].isHidden()
     again.reset_layout()

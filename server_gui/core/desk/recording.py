@@ -163,13 +163,15 @@ class Recording:
         problems += (*report.uploader.lost, *report.uploader.ahead)
         facts = [
             f"Recording{who}",
-            f"{rows:.0f} rows/s",
+            f"{rows:.0f} rows/s" if rows else "nothing comes",
             *_queue(report),
             f"{size(report.disk_free_bytes)} free",
         ]
         detail = [*problems, f"spool {report.spool}", f"store {report.store}", self.why]
         return Said(
-            Tone.WARNING if problems else Tone.GOOD, " · ".join(facts), "\n".join(filter(None, detail))
+            Tone.WARNING if problems or not rows else Tone.GOOD,
+            " · ".join(facts),
+            "\n".join(filter(None, detail)),
         )
 
     def _reported(self, keeper: Keeper, report: CollectorReport) -> None:

@@ -101,6 +101,11 @@ class Station:
         """Whether there is a link now."""
         return self.robot.link.state is ConnectionState.CONNECTED
 
+    @property
+    def is_live(self) -> bool:
+        """Whether what is known of the robot is how it is now."""
+        return self.is_linked and not self.robot.is_stale()
+
     def tell(self, kind: NewsKind, text: str) -> None:
         """Note something about this robot."""
         self.news.add(kind, self.title, text)

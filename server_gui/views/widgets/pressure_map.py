@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.core.desk.soles import Cell
@@ -49,6 +49,7 @@ class PressureMap(QWidget):
         self._image.setColorTable(colour_table())
         self._trail: collections.deque[Cell | None] = collections.deque(maxlen=TRAIL)
         self._live = False
+        self.missing: tuple[int, ...] = ()  # cells without a value
         self._path = outline(self._sign)
         self._template_key: tuple[object, ...] = ()
         self._template_made = QPixmap()
@@ -69,7 +70,8 @@ class PressureMap(QWidget):
 
     def show_pressures(self, pressures: Sequence[float | None], cop: Cell | None, *, live: bool) -> None:
         """Draw these pressures (Pa, cell after cell) and the centre of pressure (m)."""
-        self._pressures = np.array([value or 0.0 for value in pressures], np.float32)
+        self.missing = tuple(place for place, value in enumerate(pressures) if value is None)
+        self._pressures = np.array([0.0 if value is None else value for value in pressures], np.float32)
         self._live = live
         self._trail.append(None if cop is None else (cop[0] / self._size, cop[1] / self._size))
         if self._weights is not None and self._weights.shape[1] == len(self._pressures):
@@ -92,12 +94,28 @@ class PressureMap(QWidget):
             painter.setOpacity(1.0 if self._live else 0.35)
             painter.drawImage(QRectF(-WIDTH_M / 2, BEHIND_M - LENGTH_M, WIDTH_M, LENGTH_M), self._image)
             painter.setOpacity(1.0)
+        if self.is_missing:  # under the template, which leaves only the sole free
+            painter.fillRect(
+                QRectF(-WIDTH_M / 2, BEHIND_M - LENGTH_M, WIDTH_M, LENGTH_M), self._theme.colour("card")
+            )
         painter.resetTransform()
+        if self.is_missing:
+            painter.fillRect(self.rect(), self._hatch())
         painter.drawPixmap(0, 0, self._template())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._to_metres(painter)
+        if self._cells is not None and not self.is_missing:
+            self._draw_missing(painter, self._cells)
         self._draw_trail(painter, 4.0 / scale)
         painter.end()
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether no cell has a value: that is not a foot without load."""
+        return len(self.missing) == len(self._pressures)
+
+    def _hatch(self) -> QBrush:
+        return QBrush(self._theme.colour("old"), Qt.BrushStyle.BDiagPattern)
 
     def _to_metres(self, painter: QPainter) -> float:
         """From now on x is to the right and y down in m, the heel at the origin; pixels a metre."""
@@ -139,6 +157,11 @@ class PressureMap(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(self._theme.colour(self._side if self._live else "old"))
         for number, pressure in enumerate(self._pressures):
+            if number in self.missing:
+                painter.fillRect(
+                    QRectF(-WIDTH_M / 2, -height * (number + 1), WIDTH_M, height * 0.8), self._hatch()
+                )
+                continue
             width = min(float(pressure) / FULL_PA, 1.0) * WIDTH_M
             painter.drawRect(QRectF(-WIDTH_M / 2, -height * (number + 1), width, height * 0.8))
 
@@ -147,6 +170,21 @@ class PressureMap(QWidget):
         painter.setBrush(QColor(255, 255, 255, 110))
         for x, y in cells:
             painter.drawEllipse(QPointF(-y, -x), radius, radius)
+
+    def _draw_missing(self, painter: QPainter, cells: tuple[Cell, ...]) -> None:
+        """Hatch the cells that have no value."""
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._theme.colour("card"))
+        for place in self.missing[: len(cells)]:
+            if place < len(cells):
+                y, x = cells[place][0], cells[place][1]
+                painter.drawEllipse(QPointF(-x, -y), SPREAD_M / 2, SPREAD_M / 2)
+                painter.setPen(self._cosmetic("old", 1.4))
+                painter.drawLine(
+                    QPointF(-x - SPREAD_M / 3, -y + SPREAD_M / 3),
+                    QPointF(-x + SPREAD_M / 3, -y - SPREAD_M / 3),
+                )
+                painter.setPen(Qt.PenStyle.NoPen)
 
     def _draw_trail(self, painter: QPainter, radius: float) -> None:
         newest = self._trail[-1] if self._trail else None
