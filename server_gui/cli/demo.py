@@ -11,8 +11,9 @@ from server_gui.qt_needs import NoWindow, check
 EPILOG = """Where there is a display, the view is the window (gwrms gui --help); else it is in the terminal.
 
 keys in the terminal
-  s            STOP: quick stop on every drive (software, not safety-rated)
-  ↑ ↓          choose a gait parameter
+  s, space     STOP: quick stop on every drive (software, not safety-rated)
+  r r          end a held stop, pressed twice: every drive is switched off, none is enabled
+  ↑ ↓          choose a parameter
   ← →          lower or raise it; the lease is held only while it is written
   q            end the view, the gateway and the simulator
 

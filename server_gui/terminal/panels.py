@@ -270,17 +270,18 @@ def footer(station: Station, controls: Controls, where: str) -> RenderableType:
     """Return the keys, and the last thing that was said."""
     keys = Text.assemble(
         (" s ", "bold white on red"),
-        " STOP   ",
+        " STOP ",
+        ("(software, not safety-rated)", DIM),  # first of all, so that no narrow terminal cuts it off
+        "  ",
         ("↑↓", "bold"),
-        " choose   ",
+        " choose  ",
         ("←→", "bold"),
-        " lower, raise   ",
+        " change  ",
         ("r r", "bold"),
-        " reset   ",
+        " reset  ",
         ("q", "bold"),
         " quit",
     )
-    keys.append("  software stop, not safety-rated", style=DIM)
     news = _news(station, controls, where)
     for text in (keys, news):
         text.no_wrap, text.overflow = True, "ellipsis"

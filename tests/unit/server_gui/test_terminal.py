@@ -81,6 +81,13 @@ def screen(station: Station, controls: Controls | None = None, size: tuple[int, 
     return console.export_text()
 
 
+@pytest.mark.parametrize("size", [(80, 24), (118, 27)])
+def test_every_key_and_what_its_stop_is_not_are_in_sight(size: tuple[int, int]) -> None:
+    (line,) = (line for line in screen(a_station(), size=size).splitlines() if "STOP" in line)
+    assert "s  STOP (software, not safety-rated)" in line
+    assert line.rstrip().endswith("q quit")
+
+
 # --- keys
 
 
