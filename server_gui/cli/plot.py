@@ -137,6 +137,15 @@ class Curves:
         return [title, *(f"{at:>{LABEL}} {line}" for at, line in zip(scale, curve, strict=True))]
 
 
+def fitted(lines: list[str], rows: int) -> list[str]:
+    """Return as many whole curves as so many rows have room for, and how many they have none for."""
+    if len(lines) <= rows:
+        return lines
+    curves, room = (len(lines) - 1) // (ROWS + 1), (rows - 1) // (ROWS + 1)
+    last = f"{lines[-1]}; {curves - room} of {curves} channels need a taller terminal"
+    return [*lines[: room * (ROWS + 1)], last]
+
+
 class _Screen:
     """A terminal that is drawn anew some times a second, in its place."""
 
@@ -149,7 +158,7 @@ class _Screen:
             return
         self._next_s = time.monotonic() + FRAME_S
         columns, rows = shutil.get_terminal_size()
-        lines = [line[: columns - 1] for line in curves.lines(columns)][: rows - 1]
+        lines = [line[: columns - 1] for line in fitted(curves.lines(columns), rows - 1)]
         up = f"\x1b[{self._lines}F" if self._lines else ""  # ECMA-48, CPL and ED
         sys.stdout.write(f"{up}\x1b[J")
         say("\n".join(lines) + "\n")
@@ -168,7 +177,7 @@ def _has_window() -> bool:
 def _parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="gwrms plot",
-        description="Channels over time, live.",
+        description="Channels over time, live, until Ctrl-C.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

@@ -9,7 +9,7 @@ from gateway.main import main
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
-from server_gui.cli.plot import Curves
+from server_gui.cli.plot import ROWS, Curves, fitted
 from server_gui.terminal.braille import BLANK, draw, extent
 from tests.fake_robot import FakeRobot
 
@@ -126,6 +126,15 @@ def test_another_boot_has_another_clock_and_begins_anew() -> None:
     lines = curves.lines(40)
     assert lines[1].split()[0] == "1.001"
     assert any(ord(letter) > 0x2800 for letter in "".join(lines))
+
+
+def test_curves_that_a_terminal_has_no_room_for_are_counted() -> None:
+    lines = [f"line {number}" for number in range(12 * (ROWS + 1) + 1)]
+    shown = fitted(lines, 23)
+    assert shown[:-1] == lines[: 3 * (ROWS + 1)]
+    assert shown[-1] == f"{lines[-1]}; 9 of 12 channels need a taller terminal"
+    assert fitted(lines, 1) == [f"{lines[-1]}; 12 of 12 channels need a taller terminal"]
+    assert fitted(lines, len(lines)) == lines
 
 
 def test_a_channel_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
