@@ -71,6 +71,9 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
 def widened(asked: Iterable[str], description: Description) -> list[str]:
     """A component's name alone means all that it has: `left_knee` is `left_knee.*`."""
     components = {each.name for each in description.components}
+    components |= {
+        each.component for each in description.channels
+    }  # the computer is none of the robot's parts
     return [f"{name}.*" if name in components else name for name in asked]
 
 

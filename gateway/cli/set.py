@@ -13,7 +13,8 @@ from gateway.units import unit_named
 from gateway.wire.robot import Description
 
 EPILOG = """All changes happen or none: they are checked first, written, read back from the devices, and
-taken back if one fails. Somebody else may be the one writer; then nothing is changed and it is said.
+taken back if one fails. Where somebody else has control nothing is changed, and that
+is said.
 
 With --trial they are taken back by the robot itself after that time, and at once when this command ends in
 any way, its terminal, computer or network included. Enter keeps them.
@@ -32,7 +33,7 @@ class UnknownUnit(ClientError):
     """A value is no number that there can be, or in a unit that its parameter cannot be in."""
 
 
-_CHANGE: Final = re.compile(r"([^=]+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) ?([^\d\s.].*)?")
+_CHANGE: Final = re.compile(r"([^=]+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) ?([^\d\s.,].*)?")
 
 
 @dataclass(frozen=True, slots=True)

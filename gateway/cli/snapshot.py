@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import msgspec
 
 from gateway.amounts import NONE, age, percent, size
-from gateway.cli.connect import channel_names, check_names, connect, parser, widened
+from gateway.cli.connect import UnknownName, channel_names, check_names, connect, parser, widened
 from gateway.cli.text import exact, measured, say, say_json, table
 from gateway.client import Robot
 from gateway.wire.component import QualityInfo, Snapshot
@@ -35,7 +35,9 @@ def main(argv: list[str]) -> int:
 def _parse(argv: list[str]) -> argparse.Namespace:
     made = parser("snapshot", "One look at a robot: what it has now, asked once.", EPILOG)
     made.add_argument("module", choices=("resource", "component", "status"), help="what to look at")
-    made.add_argument("channels", metavar="GLOB", nargs="*", help="component: only these channels")
+    made.add_argument(
+        "channels", metavar="GLOB", nargs="*", default=[], help="component: only these channels"
+    )
     group = made.add_argument_group("resource")
     group.add_argument("--sort", choices=("cpu", "memory", "name", "pid"), default="cpu", help="default: cpu")
     order = group.add_mutually_exclusive_group()
@@ -143,6 +145,11 @@ def _values(robot: Robot, arguments: argparse.Namespace) -> int:
     description = robot.describe()
     names = [name for name in channel_names(description) if not name.startswith("resource.")]
     channels = widened(arguments.channels, description)
+    for glob in channels:
+        if glob.startswith("resource."):
+            raise UnknownName(
+                f"{glob} is the computer's own: ask gwrms snapshot resource, or gwrms watch {glob!r}"
+            )
     check_names("channel", channels, names)
     snapshot = robot.components(*channels) if arguments.module == "component" else robot.status()
     if arguments.json:

@@ -160,6 +160,7 @@ def test_parameter_that_no_device_answers_for_fails(
         (("set", "gait.step_lenght=0.4"), "did you mean gait.step_length"),
         (("watch", "left_nee.position"), "did you mean left_knee.position"),
         (("snapshot", "component", "left_nee.position"), "did you mean left_knee.position"),
+        (("snapshot", "component", "resource"), "ask gwrms snapshot resource"),
         (("set", "gait.step_length=9"), "above 0.6 m"),
     ],
 )
@@ -179,6 +180,7 @@ def test_refusal_is_a_sentence_and_changes_nothing(
     [
         (("get", "gait"), "gait.step_length"),
         (("watch", "left_knee", "--count", "1", "--rate", "50"), "left_knee.position [rad]"),
+        (("watch", "resource", "--count", "1", "--rate", "50"), "resource.cpu_percent [%]"),
         (("snapshot", "component", "left_knee"), "left_knee.position"),
     ],
 )
@@ -230,6 +232,7 @@ def test_lease_of_another_is_said_in_the_robots_words(
     [
         ("set", "gait.step_length"),
         ("set", "gait.step_length=nan"),
+        ("set", "gait.step_length=0,42"),
         ("set", "gait.step_length=0.4", "gait.step_length=0.5"),
         ("set",),
         ("watch",),
@@ -246,6 +249,12 @@ def test_wrong_usage_is_2(arguments: tuple[str, ...], capsys: pytest.CaptureFixt
         main(list(arguments))
     assert ended.value.code == 2
     assert "usage: gwrms" in capsys.readouterr().err
+
+
+def test_what_may_be_left_out_is_not_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["snapshot"])
+    assert capsys.readouterr().err.endswith("the following arguments are required: module\n")
 
 
 @pytest.mark.parametrize("command", ["describe", "stop"])
