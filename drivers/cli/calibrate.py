@@ -21,7 +21,7 @@ from drivers.imu import zero
 from drivers.imu.build import build_imu
 from drivers.imu.device import Imu
 from drivers.imu.formats import FORMATS as IMU_FORMATS
-from drivers.imu.settings import ImuSettings, kind_of
+from drivers.imu.settings import Axes, ImuSettings, kind_of
 from drivers.imu.trunk import TrunkImu
 from drivers.insole import fit as fitting
 from drivers.insole.calibration import CellCalibration, loaded_counts
@@ -34,7 +34,13 @@ from drivers.site import Site
 
 STANDARD_GRAVITY = 9.80665
 AVERAGE_S = 2.0
-USAGE = "usage: gwrms calibrate insole|imu PORT --write FILE …  (each explains itself with --help)\n"
+USAGE = """usage: gwrms calibrate COMMAND PORT --write FILE …
+
+  insole   its cells' pressure, by the unloaded insole and known weights
+  imu      the present posture as upright
+
+gwrms calibrate COMMAND --help says more.
+"""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -80,11 +86,29 @@ def _imu_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespac
         "--format", choices=tuple(IMU_FORMATS), default="witmotion", help="default: %(default)s"
     )
     parser.add_argument("--baud", type=int, default=115200, help="default: %(default)s")
-    parser.add_argument("--axes", nargs=3, help="as in [imu.NAME]")
+    # One argument: three would be taken for options where an axis points the other way.
     parser.add_argument(
-        "--mounting", nargs=3, type=float, default=(0.0, 0.0, 0.0), help="as in [imu.NAME], rad"
+        "--axes", type=_axes, metavar="'X Y Z'", help="as in [imu.NAME], such as 'y -x z'; in quotes"
+    )
+    parser.add_argument(
+        "--mounting",
+        nargs=3,
+        type=float,
+        default=(0.0, 0.0, 0.0),
+        metavar=("ROLL", "PITCH", "YAW"),
+        help="as in [imu.NAME], rad",
     )
     return _imu
+
+
+def _axes(text: str) -> tuple[str, ...]:
+    try:
+        axes: tuple[str, ...] = msgspec.convert(text.split(), Axes)
+    except msgspec.ValidationError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not three of x, y, z, -x, -y, -z, such as 'y -x z'"
+        ) from error
+    return axes
 
 
 class _Average:

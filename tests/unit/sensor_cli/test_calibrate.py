@@ -132,6 +132,22 @@ def test_zero_of_an_imu_is_written(
     assert zero.load(file)[0] < 1.0
 
 
+def test_axes_that_point_the_other_way_can_be_given(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(monkeypatch, "y")
+    argv = ["imu", str(terminal.path), "--axes", "-x -y z", "--write", str(tmp_path / "trunk.zero.toml")]
+    with Talking(terminal, witmotion(0x53, 0, round(6 / 180 * 32768), 0, 0) * 10):
+        assert calibrate.main(argv) == 0
+    assert "6.0°" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("axes", ["x y", "x y w", "x,y,z", ""])
+def test_axes_that_are_none_are_wrong_usage(axes: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert calibrate.main(["imu", "/dev/none", "--axes", axes, "--write", "x.toml"]) == 2
+    assert "is not three of x, y, z, -x, -y, -z, such as 'y -x z'" in capsys.readouterr().err
+
+
 def test_zero_of_an_imu_in_the_robots_file_needs_nothing_said_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
