@@ -86,7 +86,7 @@ class Line(Generic[F]):
         spoken = self._recognise(self._unread_tail)
         why = f"wrong baud rate or wrong format (gwrms sensor {self.path} finds out)"
         if spoken is not None and spoken != self.format_name:
-            why = f"another device is there, it speaks {spoken}"
+            why = f"another device is there, which speaks {spoken}"
         return (
             f"{self._unread} bytes came from {self.path} at {self._port.baudrate} baud "
             f"and no {self.format_name} frame among them: {why}"

@@ -150,7 +150,7 @@ def obstacle(path: str) -> str | None:
     except OSError as error:
         return _explain(path, 0, error)
     if not stat.S_ISCHR(kind):
-        return f"{path} is no serial port: correct the port's path{_ports_here()}"
+        return _no_port(path)
     if not os.access(path, os.R_OK | os.W_OK):
         return _explain(path, 0, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
     return None
@@ -169,7 +169,13 @@ def _explain(path: str, baudrate: int, error: Exception) -> str:
         return f"{path} is in use by another program: close it (lsof {path} names it)"
     if isinstance(error, ValueError):
         return f"{path} cannot run at {baudrate} baud: {error}"
+    if not Path(path).is_char_device():
+        return _no_port(path)
     return f"{path} cannot be opened as a serial port: {error}"
+
+
+def _no_port(path: str) -> str:
+    return f"{path} is no serial port: correct the port's path{_ports_here()}"
 
 
 def _ports_here() -> str:

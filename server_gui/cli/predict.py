@@ -123,7 +123,7 @@ def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: ar
             if arguments.json or not sys.stdout.isatty():  # the picture says it itself
                 linked(live)
     if not predicted:
-        warn("predict", "nothing was predicted")
+        warn("predict", "nothing was predicted: a model takes some seconds of the channels that it knows")
     return 0 if predicted else 1
 
 

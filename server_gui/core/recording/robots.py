@@ -105,7 +105,7 @@ class Robots:
         self.known(robot).describe({channel.name: channel.unit for channel in description.channels})
         found: list[Record] = []
         if description.robot != robot:
-            problem = f"{robot} in the server's file calls itself {description.robot}"
+            problem = f"{robot} calls itself {description.robot} in its own file"
             found += self._tell(robot, problem, EventKind.NAME, now)
         self._names[robot] = description.robot
         for other in self._others_called(description.robot, robot):

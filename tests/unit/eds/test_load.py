@@ -338,6 +338,15 @@ def test_a_file_is_found_beside_the_robots_file(tmp_path: Path) -> None:
         eds.locate("none.eds", tmp_path / "robot.toml")
 
 
+@pytest.mark.parametrize(
+    ("name", "meant"), [("my_drvie.eds", "my_drive.eds"), ("joint_drvie.eds", "joint_drive.eds")]
+)
+def test_a_file_that_was_likely_meant_is_named(tmp_path: Path, name: str, meant: str) -> None:
+    (tmp_path / "my_drive.eds").write_text("x")
+    with pytest.raises(eds.EdsError, match=f"did you mean '{meant}'"):
+        eds.locate(name, tmp_path / "robot.toml")
+
+
 def test_no_entry_of_an_array_is_invented(tmp_path: Path) -> None:
     body = "[2000]\nParameterName=List\nObjectType=8\n"
     body += variable("2000sub0", DataType="5") + variable("2000sub1") + variable("2001")

@@ -44,7 +44,7 @@ def test_another_device_on_a_port_is_named_by_its_format(
     try:
         until(lambda: "is being opened" not in problem(), "the port to open")
         send_until(
-            terminal, sent, lambda: f"another device is there, it speaks {spoken}" in problem(), "its name"
+            terminal, sent, lambda: f"another device is there, which speaks {spoken}" in problem(), "its name"
         )
     finally:
         component.stop()

@@ -178,7 +178,7 @@ def test_file_that_is_no_port_is_named(tmp_path: Path) -> None:
     try:
         until(lambda: port.problem is not None, "a problem")
         assert port.problem is not None
-        assert "cannot be opened as a serial port" in port.problem
+        assert "is no serial port: correct the port's path" in port.problem
     finally:
         port.stop()
 

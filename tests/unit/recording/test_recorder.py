@@ -106,7 +106,7 @@ def test_a_name_that_differs_or_repeats_is_an_event(spool: Spool) -> None:
         recorder.describe("left", description("exo"))
         recorder.describe("exo", description("exo"))
     assert [event["text"] for event in events(spool, "name")] == [
-        "left in the server's file calls itself exo",
+        "left calls itself exo in its own file",
         "exo and left both call themselves exo",
     ]
 
@@ -116,7 +116,7 @@ def test_a_name_that_a_robot_has_given_up_is_free(spool: Spool) -> None:
         for robot, name in (("exo-01", "exo-02"), ("exo-01", "exo-01"), ("exo-02", "exo-02")):
             recorder.describe(robot, description(name))
     assert [event["text"] for event in events(spool, "name")] == [
-        "exo-01 in the server's file calls itself exo-02"
+        "exo-01 calls itself exo-02 in its own file"
     ]
 
 
