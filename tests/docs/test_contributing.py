@@ -1,4 +1,4 @@
-"""The twenty changes of CONTRIBUTING belong to folders and files that there are."""
+"""The changes of CONTRIBUTING belong to folders and files that there are."""
 
 import re
 from pathlib import Path
@@ -8,8 +8,10 @@ TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 TABLE = TEXT.partition("## Where a change belongs")[2].partition("\n## ")[0]
 
 
-def test_there_are_twenty() -> None:
-    assert [int(number) for number in re.findall(r"^\| (\d+)\. ", TABLE, re.MULTILINE)] == list(range(1, 21))
+def test_they_are_numbered_without_a_gap() -> None:
+    numbers = [int(number) for number in re.findall(r"^\| (\d+)\. ", TABLE, re.MULTILINE)]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert len(numbers) >= 22
 
 
 def test_every_place_is_there() -> None:
