@@ -11,8 +11,8 @@ from gateway.wire.cost import BusCost, ClientCost, GatewayCost, StreamCost
 
 SECONDS = 2.0
 
-EPILOG = """CPU is of one core. A client's part is what the gateway works for its requests and streams; what
-clients share, such as the encoding of a stream that both asked for, is parted among them, and
+EPILOG = """CPU is of one core. A client's part is the gateway's work for its requests and streams; what
+clients share, such as the encoding of a stream that both asked for, is divided among them, and
 reading the devices belongs to nobody alone.
 
 examples:

@@ -19,7 +19,13 @@ and its older pieces (journal.jsonl.NUMBER) beside it."""
 _SHOWN_APART = ("n", "utc_ns", "monotonic_ns", "boot_id", "who", "what", "previous", "hash")
 
 
-USAGE = "usage: gwrms journal tail [-n N] | gwrms journal verify PATH     (--help after either says more)\n"
+USAGE = """usage: gwrms journal COMMAND …
+
+  tail [-n N]    the robot's newest entries: who did what, when, and what came of it
+  verify PATH    whether every entry of a journal's file is there and unaltered
+
+gwrms journal COMMAND --help says more.
+"""
 
 
 def main(argv: list[str]) -> int:

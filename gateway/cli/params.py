@@ -20,11 +20,14 @@ from gateway.wire.limits import LINE_LIMIT
 from gateway.wire.parameter import PARAMETER_WRITE, ParameterValue, ParameterWriteParams
 
 USAGE = """\
-usage: gwrms params save FILE [GLOB ...]
-       gwrms params compare FILE
-       gwrms params apply FILE
+usage: gwrms params COMMAND FILE …
+
+  save FILE [GLOB ...]   what the devices hold now, into a file
+  compare FILE           what the file says beside what the robot holds
+  apply FILE             bring the robot to what the file says, all or none; asks before
+
 A .toml file holds parameters of a whole robot, a .dcf file (CiA 306) all of one device.
---help after any of them says more.
+gwrms params COMMAND --help says more.
 """
 
 SAVE_EPILOG = """A .toml file holds what can be changed, by name, in the units of the robot's file.

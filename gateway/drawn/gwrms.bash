@@ -303,7 +303,6 @@ _shtab_gwrms_calibrate_insole___help_nargs=0
 _shtab_gwrms_calibrate_insole___power_nargs=0
 _shtab_gwrms_calibrate_imu__h_nargs=0
 _shtab_gwrms_calibrate_imu___help_nargs=0
-_shtab_gwrms_calibrate_imu___axes_nargs=3
 _shtab_gwrms_calibrate_imu___mounting_nargs=3
 _shtab_gwrms_calibrate_pos_0_nargs=A...
 _shtab_gwrms_calibrate__h_nargs=0

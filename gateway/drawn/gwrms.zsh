@@ -32,7 +32,7 @@ _shtab_gwrms_commands() {
     label:'What robot and wearer did in a recorded session.'
     models:'learned models: look at, promote, roll back, export'
     params:'parameters as files: save, compare, apply'
-    plot:'Channels over time, live.'
+    plot:'Channels over time, live, until Ctrl-C.'
     predict:'What robot and wearer are doing, and how far to believe that.'
     query:'SQL over the store'"'"'s tables.'
     reset:'End a held stop: every drive switched off, none enabled.'
@@ -71,7 +71,7 @@ _shtab_gwrms_cloud_commands() {
     retain:'Remove rows that are older than so many days.'
     upload:'What waits in the spool, now; or a whole store.'
     vacuum:'Delete files that no newer version needs.'
-    verify:'Check every file of every table, and that every row of every batch which this computer'"'"'s spool has sent is there once and as it was sent.'
+    verify:'Check every file of every table, and that each row which this computer'"'"'s spool has sent is there once,'
   )
   _describe 'gwrms cloud commands' _commands
 }
@@ -172,8 +172,8 @@ _shtab_gwrms_calibrate_imu_options=(
   "--write[where the result goes]:FILE:_files"
   "--format[default\: witmotion]:format:(bno08x-rvc microstrain vectornav witmotion xsens)"
   "--baud[default\: 115200]:baud:"
-  "--axes[as in \[imu.NAME\]]:axes:"
-  "--mounting[as in \[imu.NAME\], rad]:mounting:"
+  "--axes[as in \[imu.NAME\], such as \'y -x z\'\; in quotes]:'X Y Z':"
+  "--mounting[as in \[imu.NAME\], rad]:('ROLL', 'PITCH', 'YAW'):"
   ":PORT:"
 )
 
@@ -782,8 +782,8 @@ _shtab_gwrms_sessions_export_options=(
   "--out[where to\; replaced if it is there]:FILE:_files"
   "--format[default\: what FILE ends with]:format:(csv parquet mcap)"
   "*--channels[these only\; repeat for more (default\: all)]:GLOB:"
-  "--from[not what was before\; a time (UTC), or seconds since the session\'s first sample]:TIME:"
-  "--to[only what was before\; likewise]:TIME:"
+  "--from[nothing before it\; a time (UTC), or seconds since the session\'s first sample]:TIME:"
+  "--to[nothing from it on\; likewise]:TIME:"
   ":its name, or how that alone begins:"
 )
 
@@ -808,8 +808,8 @@ _shtab_gwrms_sessions_ls_options=(
   "--config[the server\'s file, which names the store]:FILE:_files"
   "--json[for machines]"
   "--robot[of these robots]:GLOB:"
-  "--from[not what was before\; as ISO 8601 writes it, UTC]:TIME:"
-  "--to[only what was before\; likewise]:TIME:"
+  "--from[nothing before it\; as ISO 8601 writes it, UTC]:TIME:"
+  "--to[nothing from it on\; likewise]:TIME:"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
 )
 

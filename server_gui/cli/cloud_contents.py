@@ -18,8 +18,8 @@ from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.settings.server_file import SettingsError
 
 VERIFY: Final = (
-    "Check every file of every table, and that every row of every batch which this computer's spool has "
-    "sent is there once and as it was sent."
+    "Check every file of every table, and that each row which this computer's spool has sent is there once,\n"
+    "as it was sent."
 )
 VERIFY_EPILOG: Final = """Exit status 0: whole. 1: not whole, and each line names what is missing, doubled
 or altered. 2: it could not look: no store there, or not reached. What was sent is known from the spool's

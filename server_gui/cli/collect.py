@@ -39,7 +39,7 @@ LABELLED = ("robot", "task", "model", "labelled", "right", "wrong", "not said")
 EPILOG = """What comes from a robot is safe in the spool on this computer first, and goes to the store a batch
 at a time; nothing is decimated, and what is missing is recorded as an event. Robots are followed each by
 itself: one that is off is tried again until it is there. End it with Ctrl-C or SIGTERM: sessions are ended,
-and what waits is uploaded as far as 20 s go.
+and what waits is uploaded, for 20 s at most.
 
 the server's file (without --config: ~/.config/gwrms/server.toml, if it is there)
   [robots]

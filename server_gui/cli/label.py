@@ -30,7 +30,7 @@ table. Of one author two activities at one time contradict each other and are re
 
 examples
   gwrms label 20261121T1530 walk --from 10 --to 70
-  gwrms label 20261121T1530 --wearer P03           # whose models must not be judged by himself
+  gwrms label 20261121T1530 --wearer P03           # so that no model is judged by whom it learned from
   gwrms label 20261121T1530 --regression           # a test that every model must pass
   gwrms label 20261121T1530 --file labels.csv      # with the columns from,to,label
   gwrms label 20261121T1530 --gait-events          # heel strikes and toe offs, as the sensors show them

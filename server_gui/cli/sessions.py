@@ -36,10 +36,19 @@ from server_gui.core.cloud.tabular import write_csv, write_parquet
 
 FORMATS: Final = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
 HEADER: Final = ("SESSION", "ROBOT", "BEGAN (UTC)", "LENGTH", "ROWS", "SIZE", "", "OPERATOR", "NOTES")
-USAGE = (
-    "usage: gwrms sessions ls | show SESSION | export SESSION --out FILE | resources SESSION |\n"
-    "       compare BEFORE[,…] AFTER[,…] | gait SESSION    (--help after each says more)\n"
-)
+USAGE: Final = """usage: gwrms sessions COMMAND …
+
+  ls                     every recording: robot, when, how long, who recorded it and why
+  show SESSION           what is known of it, its channels, and what happened in it
+  gait SESSION           cadence, step times, symmetry, ranges of motion
+  export SESSION --out FILE
+                         as CSV, Parquet or MCAP, whole or a part
+  resources SESSION      what each program on the robot's computer used; memory leaks
+  compare BEFORE[,…] AFTER[,…]
+                         which programs take more than in earlier ones
+
+A session's name may be cut off where it is unique. gwrms sessions COMMAND --help says more.
+"""
 
 
 def main(argv: list[str]) -> int:
@@ -253,7 +262,5 @@ def _add_session(made: argparse.ArgumentParser) -> None:
 
 
 def _add_times(made: argparse.ArgumentParser, kind: Callable[[str], datetime | float], meaning: str) -> None:
-    made.add_argument(
-        "--from", dest="begin", type=kind, metavar="TIME", help=f"not what was before; {meaning}"
-    )
-    made.add_argument("--to", dest="end", type=kind, metavar="TIME", help="only what was before; likewise")
+    made.add_argument("--from", dest="begin", type=kind, metavar="TIME", help=f"nothing before it; {meaning}")
+    made.add_argument("--to", dest="end", type=kind, metavar="TIME", help="nothing from it on; likewise")

@@ -387,4 +387,4 @@ def test_an_unknown_command_is_wrong_usage(
     arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["params", *arguments]) == 2
-    assert "usage: gwrms params save FILE" in capsys.readouterr().err
+    assert "usage: gwrms params COMMAND FILE" in capsys.readouterr().err

@@ -68,7 +68,7 @@ def _ended(_params: object) -> object:
 
 def test_a_journal_command_that_is_none_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["journal", "tial"]) == 2
-    assert "gwrms journal tail" in capsys.readouterr().err
+    assert "usage: gwrms journal COMMAND" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "301", "nan", "soon"])
