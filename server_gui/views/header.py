@@ -149,10 +149,10 @@ def _robot(station: Station) -> Words:
 
 
 def _drives(station: Station) -> Words:
-    mark = drives_mark(station.robot)
     joints = station.robot.names("joint")
     if not station.is_live:
-        return mark, mark.word.capitalize(), f"–/{len(joints)} enabled · CiA 402"
+        return Mark("ring", "old"), "Drives not known now", f"–/{len(joints)} enabled · CiA 402"
+    mark = drives_mark(station.robot)
     enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
     return mark, mark.word.capitalize(), f"{enabled}/{len(joints)} enabled · CiA 402"
 
