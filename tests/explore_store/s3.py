@@ -97,7 +97,9 @@ class S3:
     def listed(self, prefix: str) -> list[str]:
         self._requests += 1
         hidden = {key for key, until in self._hidden.items() if until >= self._requests}
-        return sorted(key for key in self.objects if key.startswith(prefix) and key not in hidden)
+        found = [key for key in self.objects if key.startswith(prefix)]
+        self.failed += any(key in hidden for key in found)  # whoever asks now sees what is not so
+        return sorted(key for key in found if key not in hidden)
 
 
 def _handler(service: S3) -> type[http.server.BaseHTTPRequestHandler]:
