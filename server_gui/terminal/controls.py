@@ -130,4 +130,7 @@ def neighbour(value: float, by: int, info: ParameterInfo) -> float | None:
     if abs(places - on_grid) > 1e-6:
         on_grid = math.floor(places) + (by < 0)
     # Ten digits: 0.42, not 0.42000000000000004.
-    return min(max(float(f"{(on_grid + by) * step:.10g}"), info.min), info.max)
+    target = float(f"{(on_grid + by) * step:.10g}")
+    if info.max_step:  # a value that is all but on the grid would go a little further than it may
+        target = min(max(target, value - info.max_step), value + info.max_step)
+    return min(max(target, info.min), info.max)

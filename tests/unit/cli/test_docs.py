@@ -37,7 +37,7 @@ def test_no_message_points_at_a_file_that_only_a_working_copy_has() -> None:
 
 def test_every_page_that_a_message_names_is_there() -> None:
     wanted = {name for _, text in said() for found in NAMED.findall(text) for name in found if name}
-    assert {"bench", "predict", "wire-a-joint", "wire-a-sensor"} <= wanted
+    assert {"scenarios", "predict", "wire-a-joint", "wire-a-sensor"} <= wanted
     assert [name for name in wanted if pages.find(name) is None] == []
 
 

@@ -231,6 +231,7 @@ def test_whatever_a_robot_says_of_a_parameter_its_neighbour_is_within_its_limits
     assert target is None or low <= target <= high
 
 
+@example(low=-1.192092896e-07, span=20.0, share=0.0, by=1, largest=1.0)
 @given(
     low=st.floats(-1000, 1000),
     span=st.floats(0.01, 1000),
