@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
@@ -39,7 +40,9 @@ FULL = Alarm(AlarmKind.DISK_FULL, "recording has stopped: the disk of /spool is 
 AWAY = "the store s3://lab/exo cannot be reached: Connection refused"
 
 
-def report(alarms: tuple[Alarm, ...] = (), problem: str | None = None, waiting: int = 0) -> CollectorReport:
+def report(
+    alarms: tuple[Alarm, ...] = (), problem: str | None = None, waiting: int = 0, rows_per_s: float = 50.0
+) -> CollectorReport:
     return CollectorReport(
         version="1.0",
         pid=77,
@@ -48,7 +51,7 @@ def report(alarms: tuple[Alarm, ...] = (), problem: str | None = None, waiting: 
         store="s3://lab/exo",
         upload=Upload.ALWAYS,
         disk_free_bytes=31 << 30,
-        robots={"exo-01": LinkStatistics(Address.parse(ADDRESS)).report("")},
+        robots={"exo-01": replace(LinkStatistics(Address.parse(ADDRESS)).report(""), rows_per_s=rows_per_s)},
         recorder=RecorderState(12, 3, 0, 0.01, alarms),
         uploader=UploaderState(2, waiting, 5 << 20, 0.5, problem),
     )
@@ -93,8 +96,15 @@ def test_all_is_well() -> None:
     recording, news = looked(FakeKeeper(report()))
     said = recording.said(ADDRESS)
     assert said.tone is Tone.GOOD
-    assert said.text == "Recording · 0 rows/s · spool 5.0 MiB · all uploaded · 31.00 GiB free"
+    assert said.text == "Recording · 50 rows/s · spool 5.0 MiB · all uploaded · 31.00 GiB free"
     assert not news.items
+
+
+def test_a_recording_to_which_nothing_comes_is_not_all_well() -> None:
+    recording, _ = looked(FakeKeeper(report(rows_per_s=0.0)))
+    said = recording.said(ADDRESS)
+    assert said.tone is Tone.WARNING
+    assert said.text.startswith("Recording · nothing comes · ")
 
 
 def test_a_disk_that_is_full_is_said_with_what_to_do_and_once_in_the_news() -> None:

@@ -125,7 +125,7 @@ def test_a_gateway_that_does_not_start_is_told_with_its_last_words(tmp_path: Pat
     ("arguments", "words"),
     [
         ([], "usage: gwrms sim run"),
-        (["none.toml"], "none.toml: cannot be read: No such file or directory"),
+        (["none.toml"], "none.toml: there is no such file, and no scenario of this name ships"),
         (["x.toml", "--speed", "0"], "0 is no speed"),
     ],
 )

@@ -1,6 +1,6 @@
 """What a CAN server sends: messages between brackets, and frames in them."""
 
-from drivers.bus.frames import EXTENDED
+from drivers.bus.frames import ERROR, EXTENDED
 from drivers.bus.interfaces.socketcand import MAX_PENDING, SocketcandParser, frame_of, send_message
 
 TOKENS = (
@@ -32,6 +32,10 @@ def fuzz(data: bytes) -> None:
 def _check(stamp_ns: int, can_id: int, data: bytes) -> None:
     assert stamp_ns == 7
     assert len(data) <= 8
+    if can_id & ERROR:  # which comes, and is never sent
+        assert 0 < can_id < 2 * ERROR
+        assert not data
+        return
     assert 0 <= can_id <= 0x7FF or (can_id & EXTENDED and 0 <= can_id - EXTENDED <= 0x1FFF_FFFF)
     (sent,) = SocketcandParser().feed(send_message(can_id, data))
     _, identifier, _, *raw = sent.split()

@@ -13,7 +13,9 @@ from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
 from hil_sim.scenario.script import load
 
-BENCH = (Path(__file__).parents[3] / "docs" / "how-to" / "bench.md").read_text(encoding="utf-8")
+HOW_TO = Path(__file__).parents[3] / "docs" / "how-to"
+SCENARIOS = (HOW_TO / "scenarios.md").read_text(encoding="utf-8")
+BENCH = (HOW_TO / "bench.md").read_text(encoding="utf-8")
 TESTED = {
     name
     for file in Path(__file__).parent.glob("test_fault_*.py")
@@ -59,11 +61,13 @@ def test_the_bench_chapter_names_no_fault_and_no_command_that_is_none() -> None:
     assert {"sim", "sim-fault", "gateway"} <= commands <= set(COMMANDS)
 
 
-def test_the_bench_chapters_scenario_can_be_read(tmp_path: Path) -> None:
-    (text,) = re.findall(r"```toml[^\n]*\n(.*?)```", BENCH, re.DOTALL)
-    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    script = load(tmp_path / "mine.toml")
-    assert f"\n{script.title}\n  ok      {script.expectations[0].words}\n" in BENCH
+def test_the_scenarios_of_their_page_can_be_read(tmp_path: Path) -> None:
+    found = re.findall(r"```toml title=\"(\w+\.toml)\"\n(.*?)```", SCENARIOS, re.DOTALL)
+    assert found
+    for name, text in found:
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        script = load(tmp_path / name)
+        assert f"\n{name}: {script.title}\n  ok      {script.expectations[0].words}\n" in SCENARIOS
 
 
 def test_there_are_at_least_thirty() -> None:
