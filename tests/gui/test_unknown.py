@@ -51,7 +51,12 @@ def test_a_sole_that_is_lost_is_hatched_and_one_without_load_is_not(theme: Theme
     foot.resize(120, 240)
     foot.set_cells(cells_of(16, right=False))
     pictures: dict[str, QImage] = {}
-    for name, pressures in {"empty": [0.0] * 16, "lost": [None] * 16, "one": [None, *[0.0] * 15]}.items():
+    given: dict[str, list[float | None]] = {
+        "empty": [0.0] * 16,
+        "lost": [None] * 16,
+        "one": [None, *[0.0] * 15],
+    }
+    for name, pressures in given.items():
         foot.show_pressures(pressures, None, live=True)
         pictures[name] = foot.grab().toImage()
     assert not foot.is_missing
