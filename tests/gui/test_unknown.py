@@ -11,7 +11,15 @@ from server_gui.core.desk.soles import cells_of
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.header import _WORDS
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.pressure_map import PressureMap
+from server_gui.views.widgets.pressure_map import (
+    BEHIND_M,
+    COLUMNS,
+    LENGTH_M,
+    ROWS,
+    STEPS,
+    WIDTH_M,
+    PressureMap,
+)
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import described, looked, walking
 
@@ -59,8 +67,40 @@ def test_a_sole_that_is_lost_is_hatched_and_one_without_load_is_not(theme: Theme
     for name, pressures in given.items():
         foot.show_pressures(pressures, None, live=True)
         pictures[name] = foot.grab().toImage()
-    assert not foot.is_missing
     assert foot.missing == (0,)
+    (x, y), *_ = cells_of(16, right=False) or ()
+    assert _drawn(foot, x, y) == STEPS  # which is transparent
+    assert _drawn(foot, 0.2, -0.01) < STEPS
     assert pictures["lost"] != pictures["empty"]
     assert pictures["one"] != pictures["empty"]
+    foot.show_pressures([None, *[200_000.0] * 15], None, live=True)
+    full = foot._image.copy()
+    foot.show_pressures([200_000.0] * 16, None, live=True)
+    assert _least(full) >= _least(foot._image)  # a cell without a value takes nothing from its neighbours
     destroy(foot)
+
+
+def test_cells_without_a_place_are_bars_and_a_lost_one_is_none(theme: Theme) -> None:
+    foot = PressureMap(theme, "left")
+    foot.resize(120, 240)
+    foot.set_cells(None)
+    given: list[list[float | None]] = [[0.0, 9e4], [None, 9e4], [None, None]]
+    pictures = []
+    for pressures in given:
+        foot.show_pressures(pressures, None, live=True)
+        pictures.append(foot.grab().toImage())
+    assert pictures[0] != pictures[1] != pictures[2] != pictures[0]
+    destroy(foot)
+
+
+def _drawn(foot: PressureMap, x: float, y: float) -> int:
+    """The place in the table of colours at x forward and y to the left, in m."""
+    down = (LENGTH_M - BEHIND_M - x) / LENGTH_M * ROWS
+    across = (WIDTH_M / 2 - y) / WIDTH_M * COLUMNS
+    return foot._image.pixelIndex(int(across), int(down))
+
+
+def _least(image: QImage) -> int:
+    """The lowest place that is drawn above the heel's middle, where there are cells all around."""
+    middle = [image.pixelIndex(COLUMNS // 2, row) for row in range(ROWS // 3, ROWS - ROWS // 10)]
+    return min(place for place in middle if place < STEPS)

@@ -21,6 +21,7 @@ FARTHEST_M, WIDEST_M = 0.250, 0.044  # from heel and middle, where cells of this
 COLUMNS, ROWS = 40, 104  # pixels of the picture
 SPREAD_M: Final = 0.017  # of one cell
 TRAIL: Final = 18
+HALF: Final = 0.5  # of what a pixel shows, that must be known
 STEPS: Final = 255  # colours of the scale; the last place of the table is transparent
 
 # The left foot from above (x forward, y left, mm): heel, outer side, toes, inner side.
@@ -75,11 +76,17 @@ class PressureMap(QWidget):
         self._live = live
         self._trail.append(None if cop is None else (cop[0] / self._size, cop[1] / self._size))
         if self._weights is not None and self._weights.shape[1] == len(self._pressures):
-            self._fill(self._weights @ self._pressures)
+            self._fill(self._weights)
         self.update()
 
-    def _fill(self, field: Weights) -> None:
+    def _fill(self, shares: Weights) -> None:
+        """By the cells that have a value; where most is that of cells without one, nothing is drawn."""
+        field, known = shares @ self._pressures, np.ones(len(shares), np.float32)
+        if self.missing:
+            known -= shares[:, list(self.missing)].sum(axis=1) / (shares.sum(axis=1) + 1e-9)
+            field /= np.maximum(known, HALF)
         indices = np.clip(field * (STEPS / FULL_PA), 0, STEPS - 1).astype(np.uint8)
+        indices[known < HALF] = STEPS
         view = np.frombuffer(self._image.bits(), np.uint8).reshape(ROWS, self._image.bytesPerLine())
         view[:, :COLUMNS] = indices.reshape(ROWS, COLUMNS)
 
@@ -87,6 +94,8 @@ class PressureMap(QWidget):
         painter = QPainter(self)
         painter.fillRect(self.rect(), self._theme.colour("card"))
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        if self.missing:
+            painter.fillRect(self.rect(), self._hatch())
         scale = self._to_metres(painter)
         if self._weights is None:
             self._draw_bars(painter)
@@ -94,25 +103,12 @@ class PressureMap(QWidget):
             painter.setOpacity(1.0 if self._live else 0.35)
             painter.drawImage(QRectF(-WIDTH_M / 2, BEHIND_M - LENGTH_M, WIDTH_M, LENGTH_M), self._image)
             painter.setOpacity(1.0)
-        if self.is_missing:  # under the template, which leaves only the sole free
-            painter.fillRect(
-                QRectF(-WIDTH_M / 2, BEHIND_M - LENGTH_M, WIDTH_M, LENGTH_M), self._theme.colour("card")
-            )
         painter.resetTransform()
-        if self.is_missing:
-            painter.fillRect(self.rect(), self._hatch())
         painter.drawPixmap(0, 0, self._template())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._to_metres(painter)
-        if self._cells is not None and not self.is_missing:
-            self._draw_missing(painter, self._cells)
         self._draw_trail(painter, 4.0 / scale)
         painter.end()
-
-    @property
-    def is_missing(self) -> bool:
-        """Whether no cell has a value: that is not a foot without load."""
-        return len(self.missing) == len(self._pressures)
 
     def _hatch(self) -> QBrush:
         return QBrush(self._theme.colour("old"), Qt.BrushStyle.BDiagPattern)
@@ -157,11 +153,9 @@ class PressureMap(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(self._theme.colour(self._side if self._live else "old"))
         for number, pressure in enumerate(self._pressures):
-            if number in self.missing:
-                painter.fillRect(
-                    QRectF(-WIDTH_M / 2, -height * (number + 1), WIDTH_M, height * 0.8), self._hatch()
-                )
-                continue
+            if number not in self.missing:  # there the hatching stays
+                row = QRectF(-WIDTH_M / 2, -height * (number + 1), WIDTH_M, height)
+                painter.fillRect(row, self._theme.colour("card"))
             width = min(float(pressure) / FULL_PA, 1.0) * WIDTH_M
             painter.drawRect(QRectF(-WIDTH_M / 2, -height * (number + 1), width, height * 0.8))
 
@@ -170,21 +164,6 @@ class PressureMap(QWidget):
         painter.setBrush(QColor(255, 255, 255, 110))
         for x, y in cells:
             painter.drawEllipse(QPointF(-y, -x), radius, radius)
-
-    def _draw_missing(self, painter: QPainter, cells: tuple[Cell, ...]) -> None:
-        """Hatch the cells that have no value."""
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self._theme.colour("card"))
-        for place in self.missing[: len(cells)]:
-            if place < len(cells):
-                y, x = cells[place][0], cells[place][1]
-                painter.drawEllipse(QPointF(-x, -y), SPREAD_M / 2, SPREAD_M / 2)
-                painter.setPen(self._cosmetic("old", 1.4))
-                painter.drawLine(
-                    QPointF(-x - SPREAD_M / 3, -y + SPREAD_M / 3),
-                    QPointF(-x + SPREAD_M / 3, -y - SPREAD_M / 3),
-                )
-                painter.setPen(Qt.PenStyle.NoPen)
 
     def _draw_trail(self, painter: QPainter, radius: float) -> None:
         newest = self._trail[-1] if self._trail else None
@@ -228,7 +207,7 @@ def weights(cells: Sequence[Cell]) -> Weights:
 def colour_table() -> list[int]:
     """Viridis as Qt's 32-bit colours: even in print, and for those who do not tell red from green."""
     colours = VIRIDIS.getLookupTable(nPts=STEPS)
-    return [QColor(*(int(part) for part in colour[:3])).rgb() for colour in colours]
+    return [*(QColor(*(int(part) for part in colour[:3])).rgb() for colour in colours), 0]
 
 
 def outline(sign: float) -> QPainterPath:
