@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import msgspec
 
+from gateway.cli.arguments import seconds
 from gateway.cli.text import say, say_json, warn
 from gateway.client import Address, ConnectionState
 from ml.registry.card import age_days
@@ -244,7 +245,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME|[NAME=]HOST:PORT",
         help="live: a robot of the server's file, or where one is; repeat for more",
     )
-    made.add_argument("--seconds", type=float, metavar="N", help="live: end after so long")
+    made.add_argument("--seconds", type=seconds, metavar="N", help="live: end after so long")
     made.add_argument(
         "--session",
         action="append",
