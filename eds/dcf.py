@@ -15,6 +15,7 @@ from eds.datatypes import DATA_TYPES, DataType
 from eds.description import Description, EdsError
 from eds.ini import IniText, read_ini, section_key
 from eds.numbers import parse_integer, parse_relative
+from eds.values import in_type
 
 Key = tuple[int, int]  # index, sub-index
 Number = int | float
@@ -255,11 +256,7 @@ def _number(known: DataType, text: str, node_id: int) -> Number | None:
     text = {"true": "1", "false": "0"}.get(text.lower(), text)
     relative = parse_relative(text)
     number = parse_integer(text) if relative is None else relative + node_id
-    bits = known.bits or 0
-    if number is not None and known.kind == "signed" and 1 << bits - 1 <= number < 1 << bits:
-        number -= 1 << bits  # files write -1 as 0xFFFFFFFF
-    low = -(1 << bits - 1) if known.kind == "signed" else 0
-    return number if number is not None and low <= number < low + (1 << bits) else None
+    return None if number is None else in_type(number, known)
 
 
 def _real(text: str) -> float | None:

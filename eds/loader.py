@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import canopen
-from canopen.objectdictionary import ODArray, ODRecord, ODVariable
+from canopen.objectdictionary import ODVariable
 
 from eds.datatypes import DATA_TYPES
 from eds.description import Description, EdsError
@@ -24,9 +24,11 @@ MAX_BYTES = 8 * 1024 * 1024
 # change it. No file is ever unpickled.
 KEPT = 4
 
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 NODE_ID = "$NODEID"  # what a repaired value is relative to
 # Base identifiers of the predefined connection set that carry a node id (CiA 301 §7.3.3).
 _CONNECTION_SET = frozenset(range(0x080, 0x600, 0x080)) | {0x600, 0x700}
+_OTHERS_DATA = frozenset((0x180, 0x280, 0x380, 0x480))  # of TPDOs
 _COB_ID_VALID_BITS = 0x1FFF_FFFF
 
 
@@ -82,10 +84,18 @@ def read_text(path: Path) -> str:
         raise EdsError(f"{path}: cannot be read: {error.strerror}") from error
     if len(data) > MAX_BYTES:
         raise EdsError(f"{path}: is larger than {MAX_BYTES // 2**20} MiB; this is no EDS or DCF file")
+    if data[:2] in _UTF_16:
+        return data.decode("utf-16", errors="replace")
     try:
-        return data.decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace")
+        text = data.decode("cp1252", errors="replace")
+    if text.lstrip().startswith("<?xml"):
+        raise EdsError(
+            f"{path}: is XML, so likely an XDD or XDC file (CiA 311), which cannot be read; "
+            "take the EDS or DCF from the vendor, or export one with the vendor's tool"
+        )
+    return text
 
 
 @functools.lru_cache(KEPT)
@@ -132,7 +142,8 @@ def _readdress(ini: IniText, sections: Sections, owner: _Owner) -> None:
         for key in ("DefaultValue", "ParameterValue"):
             cob_id = parse_integer(keys.get(key, "")) if _is_cob_id(name) else None
             if cob_id is not None:
-                keys[key] = _readdressed(ini, f"[{name}] {key}", cob_id, owner)
+                listens = _is_rpdo(name) and cob_id & 0x780 in _OTHERS_DATA
+                keys[key] = str(cob_id) if listens else _readdressed(ini, f"[{name}] {key}", cob_id, owner)
 
 
 def _is_cob_id(section: str) -> bool:
@@ -145,6 +156,10 @@ def _is_cob_id(section: str) -> bool:
     number = int(index, 16)
     is_pdo = 0x1400 <= number < 0x1600 or 0x1800 <= number < 0x1A00
     return 0x1200 <= number < 0x1280 or (is_pdo and subindex == "1")
+
+
+def _is_rpdo(section: str) -> bool:
+    return 0x1400 <= int(section[:4], 16) < 0x1600
 
 
 def _readdressed(ini: IniText, where: str, cob_id: int, owner: _Owner) -> str:
@@ -175,29 +190,18 @@ def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDict
         if "LowLimit" not in keys and "HighLimit" not in keys:
             continue
         low = high = None
-        for variable in _described(dictionary, sections, name):
+        variable = _described(dictionary, name)
+        if variable is not None:
             variable.min = low = _limit(variable, keys.get("LowLimit"))
             variable.max = high = _limit(variable, keys.get("HighLimit"))
         if low is not None and high is not None and low > high:
             ini.warn(f"[{name}]", f"LowLimit {low} is above HighLimit {high}; no value is allowed")
 
 
-def _described(dictionary: canopen.ObjectDictionary, sections: Sections, section: str) -> list[ODVariable]:
-    """What a section like [1018] or [1018sub1] describes; of a compact array (CiA 306) its entries.
-
-    Those that have a section of their own are described there.
-    """
+def _described(dictionary: canopen.ObjectDictionary, section: str) -> ODVariable | None:
+    """What a section like [1018sub1] or [6064] describes."""
     index, _, subindex = section.partition("sub")
-    found = dictionary.get(int(index, 16))
-    if not subindex and isinstance(found, ODArray | ODRecord):
-        data_type = int(sections[section]["DataType"], 16)
-        return [
-            one
-            for number, one in found.subindices.items()
-            if number and one.data_type == data_type and f"{section}sub{number:X}" not in sections
-        ]
-    variable = dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
-    return [] if variable is None else [variable]
+    return dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
 
 
 def _limit(variable: ODVariable, text: str | None) -> int | None:
@@ -207,10 +211,7 @@ def _limit(variable: ODVariable, text: str | None) -> int | None:
     if data_type.kind == "real":
         # The importer's annotation knows integers only; what it stores has no type.
         return float(text)  # type: ignore[return-value]
-    number = parse_integer(text)
-    if number is not None and data_type.kind == "signed" and number >= 1 << (data_type.bits or 64) - 1:
-        number -= 1 << (data_type.bits or 64)  # files write -1 as 0xFFFFFFFF
-    return number
+    return parse_integer(text)
 
 
 def _identity(

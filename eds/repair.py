@@ -4,16 +4,19 @@ The result holds only sections and keys that the importer reads, each in its can
 value it can parse. Every repair that could change a meaning is a finding.
 """
 
-import math
 import re
-from collections.abc import Callable
 
+from eds import compact
 from eds.datatypes import DATA_TYPE_BY_NAME, DATA_TYPES, DOMAIN, OBJECT_TYPE_BY_NAME, ObjectType
 from eds.ini import IniText, Sections
-from eds.numbers import parse_integer, parse_relative
+from eds.numbers import parse_integer
+from eds.values import canonical
 
 _OBJECT = re.compile(r"[0-9a-f]{4}")
 _SUBOBJECT = re.compile(r"([0-9a-f]{4})sub(?:0x)?([0-9a-f]{1,2})")
+_LIKE_AN_OBJECT = re.compile(r"[0-9a-f]{4}")
+_READ = re.compile(rf"{_OBJECT.pattern}(?:objectlinks)?|{_SUBOBJECT.pattern}")
+_MODULES = re.compile(r"m\d+(?:fixed|subext)[0-9a-f]")
 
 _DEVICE_TEXT = ("VendorName", "ProductName", "OrderCode")
 _DEVICE_NUMBERS = (
@@ -28,6 +31,8 @@ _COMMISSIONING = ("devicecomissioning", "devicecommissioning")
 
 def repair(ini: IniText) -> tuple[Sections, int | None]:
     """Sections in canonical spelling, and the node id that the file was made for (`None` for an EDS)."""
+    compact.write_out(ini)
+    compact.give_values(ini)
     repaired: Sections = {"DeviceInfo": _device_info(ini), "DummyUsage": _dummy_usage(ini)}
     file_node_id, commissioning = _commissioning(ini)
     if commissioning:
@@ -35,9 +40,8 @@ def repair(ini: IniText) -> tuple[Sections, int | None]:
     tree = _object_tree(ini)
     for index, subindices in sorted(tree.items()):
         repaired |= _object(ini, index, sorted(subindices))
-    for index in tree:
-        repaired |= _compact_names(ini, index)
     _check_lists(ini, tree)
+    _check_sections(ini)
     return repaired, file_node_id
 
 
@@ -106,20 +110,23 @@ def _object(ini: IniText, index: str, subindices: list[int]) -> Sections:
     source = ini.sections.get(index, {})
     where = f"[{index.upper()}]"
     object_type = _object_type(ini, where, source, bool(subindices))
-    canonical = index.upper()
-    compact = parse_integer(source.get("compactsubobj", "")) or 0
-    if object_type in (ObjectType.ARRAY, ObjectType.RECORD) and not compact:
-        name = _name(ini, where, source, canonical)
-        repaired = {canonical: {"ParameterName": name, "ObjectType": str(int(object_type))}}
+    section = index.upper()
+    if object_type in (ObjectType.ARRAY, ObjectType.RECORD):
+        repaired = {
+            section: {
+                "ParameterName": _name(ini, where, source, section),
+                "ObjectType": str(int(object_type)),
+            }
+        }
+        if not subindices:
+            ini.warn(
+                where, f"is an {object_type.name} without sub-objects; nothing of it can be read or written"
+            )
     else:
-        if compact:
-            object_type = ObjectType.ARRAY
-        repaired = {canonical: _variable(ini, where, source, canonical, object_type)}
-        if compact:
-            repaired[canonical]["CompactSubObj"] = str(compact)
+        repaired = {section: _variable(ini, where, source, section, object_type)}
     for subindex in subindices:
         sub_where, sub_source = _sub_section(ini, index, subindex)
-        sub_name = f"{canonical}sub{subindex:X}"
+        sub_name = f"{section}sub{subindex:X}"
         repaired[sub_name] = _variable(ini, sub_where, sub_source, sub_name, ObjectType.VAR, subindex)
     return repaired
 
@@ -141,40 +148,38 @@ def _object_type(ini: IniText, where: str, source: dict[str, str], has_subobject
     return object_type
 
 
-def _name(ini: IniText, where: str, source: dict[str, str], canonical: str) -> str:
+def _name(ini: IniText, where: str, source: dict[str, str], section: str) -> str:
     name = source.get("parametername", "")
     if not name:
-        ini.note(f"{where} ParameterName", f"is missing; called {canonical!r}")
-    return name or canonical
+        ini.note(f"{where} ParameterName", f"is missing; called {section!r}")
+    return name or section
 
 
 def _variable(
     ini: IniText,
     where: str,
     source: dict[str, str],
-    canonical: str,
+    section: str,
     object_type: ObjectType,
     subindex: int = 0,
 ) -> dict[str, str]:
     """The keys of one variable, every one in a spelling that the importer takes."""
-    is_count = subindex == 0 and "sub" in canonical
+    is_count = subindex == 0 and "sub" in section
     data_type = _data_type(ini, where, source, object_type, is_count)
     variable = {
-        "ParameterName": _name(ini, where, source, canonical),
+        "ParameterName": _name(ini, where, source, section),
         "ObjectType": str(int(object_type if object_type is not ObjectType.RECORD else ObjectType.VAR)),
         "DataType": f"0x{data_type:04X}",
         "AccessType": _access_type(ini, where, source),
         "PDOMapping": str(int(bool(parse_integer(source.get("pdomapping", "0"))))),
     }
     for key in ("LowLimit", "HighLimit", "DefaultValue", "ParameterValue"):
-        value = _VALUES[DATA_TYPES[data_type].kind](source.get(key.lower(), ""))
+        text = source.get(key.lower(), "")
+        value, fault = canonical(text, DATA_TYPES[data_type])
         if value is not None:
             variable[key] = value
-        elif source.get(key.lower()):
-            ini.warn(
-                f"{where} {key}",
-                f"{source[key.lower()]!r} is no clear {DATA_TYPES[data_type].name}; left out",
-            )
+        if fault:
+            ini.warn(f"{where} {key}", fault)
     for key in ("Factor", "Unit", "Description", "StorageLocation"):
         if source.get(key.lower()):
             variable[key] = source[key.lower()]
@@ -207,54 +212,6 @@ def _access_type(ini: IniText, where: str, source: dict[str, str]) -> str:
     return "ro"
 
 
-def _integer_text(text: str) -> str | None:
-    relative = parse_relative(text)
-    if relative is not None:
-        return f"$NODEID+0x{relative:X}"
-    number = parse_integer(text)
-    return None if number is None else str(number)
-
-
-def _bytes_text(text: str) -> str | None:
-    digits = re.sub(r"\s|0[xX]", "", text)
-    return digits if re.fullmatch(r"(?:[0-9A-Fa-f]{2})*", digits) and digits else None
-
-
-def _boolean_text(text: str) -> str | None:
-    words = {"true": "1", "false": "0"}
-    return words.get(text.lower()) or _integer_text(text)
-
-
-def _real_text(text: str) -> str | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return None if math.isnan(number) else repr(number)
-
-
-_VALUES: dict[str, Callable[[str], str | None]] = {
-    "boolean": _boolean_text,
-    "signed": _integer_text,
-    "unsigned": _integer_text,
-    "real": _real_text,
-    "text": lambda text: text or None,
-    "bytes": _bytes_text,
-}
-
-
-def _compact_names(ini: IniText, index: str) -> Sections:
-    """Names of a compact array's entries; CiA 306 lets those out that have no name of their own."""
-    source = ini.sections.get(f"{index}name", {})
-    parent = ini.sections.get(index, {})
-    count = parse_integer(parent.get("compactsubobj", "")) or 0
-    names = {
-        str(entry): source.get(str(entry), f"{parent.get('parametername', index)}{entry}")
-        for entry in range(1, min(count, 254) + 1)
-    }
-    return {f"{index.upper()}Name": {"NrOfEntries": str(len(names)), **names}} if names else {}
-
-
 def _check_lists(ini: IniText, tree: dict[str, set[int]]) -> None:
     for name in _LISTS:
         listed = (value for key, value in ini.sections.get(name, {}).items() if key.isdigit())
@@ -262,3 +219,12 @@ def _check_lists(ini: IniText, tree: dict[str, set[int]]) -> None:
         absent = [f"0x{index:04X}" for index in indices if index is not None and f"{index:04x}" not in tree]
         if absent:
             ini.note(f"[{name}]", f"lists objects without a section: {', '.join(absent)}")
+
+
+def _check_sections(ini: IniText) -> None:
+    """Tell of sections that look like objects, and of modules' objects: nobody reads them."""
+    for name in ini.sections:
+        if _MODULES.match(name):
+            ini.warn(f"[{name}]", "describes an object of a plug-in module, which is not read")
+        elif _LIKE_AN_OBJECT.match(name) and not _READ.fullmatch(name):
+            ini.warn(f"[{name}]", "is no object like [2100] and no sub-object like [2100sub2]; left out")

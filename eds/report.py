@@ -14,6 +14,7 @@ JOINT_OBJECTS = ((0x6041, "statusword"), (0x6064, "position actual value"))
 # Communication and mapping parameters (CiA 301 §7.5.2): name, first communication, first mapping object.
 _PDOS = (("TPDO", 0x1800, 0x1A00), ("RPDO", 0x1400, 0x1600))
 _NOT_VALID = 0x8000_0000
+MAX_MAPPED = 64  # CiA 301 §7.5.2.36
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +34,11 @@ class ObjectRow:
 
 @dataclass(frozen=True, slots=True)
 class PdoRow:
-    """One PDO as the file's defaults, or a DCF's values, have it."""
+    """One PDO as the file's defaults, or a DCF's values, have it; what it does not say is `None`."""
 
     name: str
     cob_id: int | None
-    enabled: bool
+    enabled: bool | None
     transmission_type: int | None
     mapped: tuple[tuple[int, int, int], ...]  # index, sub-index, bits
 
@@ -66,12 +67,13 @@ def pdo_rows(description: Description) -> Iterator[PdoRow]:
             cob_id = _number(description, communication + number, 1)
             if not description.has(communication + number, 1):
                 continue
-            count = _number(description, mapping + number, 0) or 0
-            entries = (_number(description, mapping + number, sub) for sub in range(1, min(count, 64) + 1))
+            count = _number(description, mapping + number, 0)
+            last = MAX_MAPPED if count is None else min(count, MAX_MAPPED)  # a file may give entries alone
+            entries = (_number(description, mapping + number, sub) for sub in range(1, last + 1))
             yield PdoRow(
                 f"{kind}{number + 1}",
                 None if cob_id is None else cob_id & 0x1FFF_FFFF,
-                cob_id is not None and not cob_id & _NOT_VALID,
+                None if cob_id is None else not cob_id & _NOT_VALID,
                 _number(description, communication + number, 2),
                 tuple((entry >> 16, entry >> 8 & 0xFF, entry & 0xFF) for entry in entries if entry),
             )

@@ -82,7 +82,8 @@ def _differ(one: float, other: float) -> bool:
 
 def _check_encoder(settings: JointSettings, readings: Readings) -> str | None:
     device = _ratio(readings, "encoder_increments", "encoder_revolutions")
-    if device is None or not _differ(device, settings.counts_per_revolution):
+    # 1:1 is what drives hold that were never told of their encoder.
+    if device is None or device == 1 or not _differ(device, settings.counts_per_revolution):
         return None
     return (
         f"counts_per_revolution is {settings.counts_per_revolution:g}, but the drive's 608Fh says "

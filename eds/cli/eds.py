@@ -122,9 +122,10 @@ def _pdo_text(row: PdoRow, description: Description) -> str:
     for index, subindex, bits in row.mapped:
         variable = description.variable(index, subindex)
         names.append(f"{index:04X}:{subindex:02X} {variable.qualname if variable else '?'} ({bits} bits)")
-    state = "" if row.enabled else " disabled"
+    state = " disabled" if row.enabled is False else ""
     mapped = ", ".join(names) or "empty"
-    return f"    {row.name:<7}{_hex(row.cob_id):<12}type {row.transmission_type}{state}: {mapped}"
+    kind = "unknown" if row.transmission_type is None else row.transmission_type
+    return f"    {row.name:<6} {_hex(row.cob_id):<11} type {kind}{state}: {mapped}"
 
 
 def _object_text(row: ObjectRow) -> str:

@@ -81,7 +81,7 @@ class _Offer:
             entry[:2]
             for pdo in pdo_rows(description)
             for entry in pdo.mapped
-            if pdo.enabled and pdo.name.startswith("RPDO")
+            if pdo.enabled is not False and pdo.name.startswith("RPDO")
         }
 
     def parameters(self, *, common: bool) -> Iterator[Parameter]:

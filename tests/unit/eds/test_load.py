@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import eds
+from eds.report import pdo_rows
 
 HEAD = """\
 [FileInfo]
@@ -355,3 +356,127 @@ def test_no_entry_of_an_array_is_invented(tmp_path: Path) -> None:
     assert [subindex for subindex in range(6) if description.has(0x2000, subindex)] == [0, 1]
     assert [subindex for subindex in range(6) if description.has(0x2001, subindex)] == [0]
     assert [subindex for subindex in range(6) if description.has(0x2002, subindex)] == [0, 1, 2]
+
+
+MASTER = """\
+[1400]
+ParameterName=RPDO communication parameter
+ObjectType=0x09
+[1400sub1]
+ParameterName=COB-ID
+DataType=0x0007
+AccessType=rw
+DefaultValue=0x00000182
+[1600]
+ParameterName=RPDO mapping parameter
+ObjectType=0x09
+DataType=0x0007
+AccessType=rw
+CompactSubObj=2
+
+[1600Value]
+NrOfEntries=2
+1=0x20000020
+2=0x2001{bits}
+
+[1A01]
+ParameterName=TPDO mapping parameter
+ObjectType=0x09
+[1A01sub0]
+ParameterName=Count
+DataType=0x0005
+AccessType=rw
+[1A01sub1]
+ParameterName=First
+DataType=0x0007
+AccessType=rw
+DefaultValue=0x60410010
+[1801]
+ParameterName=TPDO
+ObjectType=9
+[1801sub1]
+ParameterName=COB-ID
+DataType=0x0007
+AccessType=rw
+"""
+
+
+def test_compactly_stored_values_are_the_entries_values(tmp_path: Path) -> None:
+    description = load(tmp_path, MASTER.replace("{bits}", "0120"))
+    found = [description.variable(0x1600, entry) for entry in range(3)]
+    assert [one and (one.default, one.value) for one in found] == [
+        (2, None), (None, 0x20000020), (None, 0x20010120),
+    ]  # fmt: skip
+    tpdo, rpdo = pdo_rows(description)
+    assert (rpdo.name, rpdo.cob_id, rpdo.enabled) == ("RPDO1", 0x182, True)
+    assert rpdo.mapped == ((0x2000, 0, 32), (0x2001, 1, 32))
+    assert (tpdo.cob_id, tpdo.enabled, tpdo.mapped) == (None, None, ((0x6041, 0, 16),))
+    assert description.findings == ()  # not that the RPDO listens to node 2 either
+
+
+def test_a_listed_value_without_its_sub_object_is_told(tmp_path: Path) -> None:
+    description = load(tmp_path, variable("2000") + "[2000Value]\nNrOfEntries=1\n9=4\n")
+    assert warnings(description) == ["[2000value] 9 '4' is for a sub-object that the file lacks; left out"]
+
+
+@pytest.mark.parametrize(
+    ("type_", "text", "value"),
+    [
+        ("0x0004", "0x80000001", -0x7FFFFFFF),
+        ("0x0002", "0xFD", -3),
+        ("0x0002", "253", -3),
+        ("0x10", "0xFFFFFF", -1),
+    ],
+)
+def test_a_signed_value_written_in_hexadecimal_is_negative(
+    tmp_path: Path, type_: str, text: str, value: int
+) -> None:
+    description = load(tmp_path, variable("2000", DataType=type_, DefaultValue=text, ParameterValue=text))
+    found = description.variable(0x2000)
+    assert found is not None
+    assert (found.default, found.value) == (value, value)
+    assert description.findings == ()
+
+
+def test_a_value_outside_its_type_is_left_out_and_told(tmp_path: Path) -> None:
+    description = load(tmp_path, variable("2000", DataType="5", DefaultValue="256"))
+    assert default(description, 0x2000) is None
+    assert warnings(description) == ["[2000] DefaultValue '256' is outside UNSIGNED8; left out"]
+
+
+@pytest.mark.parametrize("name", ["2100subindex2", "6064h", "2100sub"])
+def test_a_section_that_nobody_reads_is_told(tmp_path: Path, name: str) -> None:
+    (text,) = warnings(load(tmp_path, variable(name)))
+    assert text == f"[{name}] is no object like [2100] and no sub-object like [2100sub2]; left out"
+
+
+def test_objects_of_modules_and_links_are_no_objects(tmp_path: Path) -> None:
+    description = load(tmp_path, variable("M1SubExt6000") + "[1000ObjectLinks]\nObjectLinks=0\n")
+    assert warnings(description) == [
+        "[m1subext6000] describes an object of a plug-in module, which is not read"
+    ]
+
+
+def test_an_array_without_sub_objects_is_told(tmp_path: Path) -> None:
+    (text,) = warnings(load(tmp_path, variable("2000", ObjectType="8")))
+    assert text == "[2000] is an ARRAY without sub-objects; nothing of it can be read or written"
+
+
+def test_a_count_of_entries_that_is_none_is_told(tmp_path: Path) -> None:
+    texts = warnings(load(tmp_path, variable("2000", ObjectType="8", CompactSubObj="300")))
+    assert texts[0] == "[2000] CompactSubObj is '300', not 0 to 254; no entry is known"
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le"])
+def test_a_file_in_utf_16_is_read(tmp_path: Path, encoding: str) -> None:
+    text = HEAD + variable("2000", DefaultValue="4")
+    path = tmp_path / "drive.eds"
+    path.write_bytes((b"" if encoding == "utf-16" else b"\xff\xfe") + text.encode(encoding))
+    assert default(eds.load(path, 5), 0x2000) == 4
+
+
+def test_an_xdd_is_called_one(tmp_path: Path) -> None:
+    path = tmp_path / "drive.xdd"
+    path.write_text('<?xml version="1.0"?>\n<ISO15745ProfileContainer/>')
+    with pytest.raises(eds.EdsError, match=r"drive.xdd: is XML, so likely an XDD or XDC file \(CiA 311\)"):
+        eds.load(path, 5)

@@ -72,6 +72,7 @@ def test_a_contradiction_with_the_drive_is_told(
         ({}, {}),
         ({}, {"encoder_increments": 8192, "encoder_revolutions": 2}),
         ({}, {"encoder_increments": 4096, "encoder_revolutions": 0}),
+        ({}, {"encoder_increments": 1, "encoder_revolutions": 1}),
         ({}, {"gear_motor_revolutions": 100, "gear_shaft_revolutions": 1}),
         ({}, {"gear_motor_revolutions": 1, "gear_shaft_revolutions": 1}),  # a drive that knows no gear
         ({"rated_torque": 30}, {"rated_torque_mnm": 400}),  # a gear with losses
