@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Protocol, TypeVar, cast
 
 from drivers.bus.arrivals import Arrivals
@@ -17,6 +16,7 @@ from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
+from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import Interrupted, SdoChannel
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
@@ -50,20 +50,6 @@ def _ask_type(sdo: SdoChannel) -> None:
     sdo.upload(0x1000, 0, attempts=1)
 
 
-@dataclass(frozen=True, slots=True)
-class _Requests:
-    """The outlet of one node's SDO channel."""
-
-    bus: CanBus
-    can_id: int
-
-    def offer(self, data: bytes, wanted: Callable[[], bool]) -> Callable[[], bool]:
-        return self.bus.offer(self.can_id, data, wanted)
-
-    def send_urgent(self, data: bytes) -> bool:
-        return self.bus.send_urgent(self.can_id, data)
-
-
 class Node(BusUser):
     """A node id on a bus. Alive while at least one user is attached."""
 
@@ -93,7 +79,7 @@ class Node(BusUser):
         self._request_id, response_id = times.sdo_ids(node_id)
         self.channel = SdoChannel(
             f"node {node_id} on {bus.name}",
-            _Requests(bus, self._request_id),
+            Requests(bus, self._request_id),
             times.sdo_timeout_s,
             lambda: self.distrust,
         )

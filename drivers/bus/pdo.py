@@ -73,8 +73,11 @@ def _numbers(description: Description) -> Iterable[int]:
     return known or range(USUAL_TPDOS)
 
 
-def read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | None:
-    """The TPDO at 1800h + `number`; `None` where the device has none. Raises `DriverError`."""
+def read_tpdo(sdo: SdoChannel, description: Description | None, number: int) -> Tpdo | None:
+    """The TPDO at 1800h + `number`; `None` where the device has none. Raises `DriverError`.
+
+    Without a description the device itself says what it has.
+    """
     parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
     try:
         cob_id = unsigned(sdo.upload(parameter, 1))
@@ -94,8 +97,8 @@ def read_tpdo(sdo: SdoChannel, description: Description, number: int) -> Tpdo | 
     )
 
 
-def _event_timer_s(sdo: SdoChannel, description: Description, parameter: int) -> float:
-    if not description.has(parameter, 5):
+def _event_timer_s(sdo: SdoChannel, description: Description | None, parameter: int) -> float:
+    if description is not None and not description.has(parameter, 5):
         return 0
     try:
         return unsigned(sdo.upload(parameter, 5)[:2]) / 1000
