@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
+set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -202,6 +202,14 @@ complete -c gwrms -n '_shtab_gwrms_using eds' -l node-id -x -d 'node id for COB-
 complete -c gwrms -n '_shtab_gwrms_using eds' -l brief -d 'leave out the objects'
 complete -c gwrms -n '_shtab_gwrms_using eds' -l json -d 'one JSON object a file and line'
 complete -c gwrms -n '_shtab_gwrms_using eds; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'an .eds or .dcf file, or the name of one that ships'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a scan -d 'Says what is on a CAN bus and on serial ports. Listens; asks only with --active.'
+complete -c gwrms -n '_shtab_gwrms_using scan' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using scan' -l bitrate -x -d 'bit/s, for interfaces that are opened with one'
+complete -c gwrms -n '_shtab_gwrms_using scan' -l seconds -x -d 'how long to listen (default 3)'
+complete -c gwrms -n '_shtab_gwrms_using scan' -l active -d 'ask all 127 node ids what they are'
+complete -c gwrms -n '_shtab_gwrms_using scan' -l eds -xka "(__fish_complete_path (commandline -ct))" -d 'folder of EDS files'
+complete -c gwrms -n '_shtab_gwrms_using scan' -l serial -x -d 'a serial port'
+complete -c gwrms -n '_shtab_gwrms_using scan' -l json -d 'one JSON line a bus or port, for machines'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sensor -d 'Says what is on a serial port, how well it fits, and shows it live.'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -l baud -x -d 'try this baud rate only'

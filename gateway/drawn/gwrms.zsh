@@ -37,6 +37,7 @@ _shtab_gwrms_commands() {
     query:'SQL over the store'"'"'s tables.'
     reset:'End a held stop: every drive switched off, none enabled.'
     restore:'Give a device its defaults back (1011h).'
+    scan:'Says what is on a CAN bus and on serial ports. Listens; asks only with --active.'
     sensor:'Says what is on a serial port, how well it fits, and shows it live.'
     sessions:'recordings: list, look into, export as CSV, Parquet, MCAP'
     set:'Change parameters: all or none, limit-checked, read back.'
@@ -710,6 +711,20 @@ _shtab_gwrms_restore_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_restore_defaults_added=0
 
+_shtab_gwrms_scan_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
+  "--seconds[how long to listen (default 3)]:seconds:"
+  "--active[ask all 127 node ids what they are]"
+  "*--eds[folder of EDS files]:DIR:_files"
+  "*--serial[a serial port]:PORT:"
+  "--json[one JSON line a bus or port, for machines]"
+  "(*)::can0, INTERFACE\:CHANNEL of python-can, or a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_scan_defaults_added=0
+
 _shtab_gwrms_sensor_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--baud[try this baud rate only]:baud:"
@@ -1034,6 +1049,7 @@ _shtab_gwrms() {
         query) _arguments -C -s $_shtab_gwrms_query_options ;;
         reset) _arguments -C -s $_shtab_gwrms_reset_options ;;
         restore) _arguments -C -s $_shtab_gwrms_restore_options ;;
+        scan) _arguments -C -s $_shtab_gwrms_scan_options ;;
         sensor) _shtab_gwrms_sensor ;;
         sessions) _shtab_gwrms_sessions ;;
         set) _arguments -C -s $_shtab_gwrms_set_options ;;
