@@ -28,7 +28,7 @@ gateway starts without it. A warning is what can work and is likely not what was
 lacks: it may come yet. A gateway says the same of its file when it starts, and of ports, buses and devices'
 files in gwrms describe. Of what is no TOML only the first mistake is told.
 
-exit codes: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
+exit status: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
 
 examples
   gwrms check robot.toml

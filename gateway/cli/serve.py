@@ -46,7 +46,7 @@ while one is enabled: gwrms stop, then end it.
 Anybody who can connect can stop the robot and change its parameters: listen on
 127.0.0.1, or on a network of which you know every computer.
 
-exit codes: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
+exit status: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
 """
 
 

@@ -1,4 +1,4 @@
-"""`gwrms gateway` as a command: its manual, its exit codes, its errors."""
+"""`gwrms gateway` as a command: its manual, its exit status, its errors."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["gateway", "--help"]) == 0
     text = capsys.readouterr().out
     assert all(
-        part in text for part in ("CONFIG", "--host", "--port", "listening on HOST:PORT", "exit codes")
+        part in text for part in ("CONFIG", "--host", "--port", "listening on HOST:PORT", "exit status")
     )
 
 
