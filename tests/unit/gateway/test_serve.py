@@ -73,3 +73,17 @@ def test_what_is_likely_wrong_with_its_file_is_logged_at_its_start_and_not_each_
     assert [record.getMessage().partition(" lets ")[0] for record in caplog.records] == (
         [f"{file}: [gateway] host: '0.0.0.0'"] if tell else []
     )
+
+
+@pytest.mark.parametrize("tell", [True, False])
+def test_a_device_s_file_that_cannot_be_used_is_logged_at_its_start(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, tell: bool
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(ROBOT.replace('eds = "joint_drive.eds"', 'eds = "joint_drve.eds"', 1), encoding="utf-8")
+    robot = _robot(_parser().parse_args([str(file)]), tell=tell)
+    assert "left_knee" in robot.joint
+    said = [record.getMessage() for record in caplog.records]
+    about = [one for one in said if one.startswith(f"{file}: [joint.left_knee]")]
+    assert len(about) == int(tell)
+    assert all("there is no EDS file 'joint_drve.eds'" in one and "'joint_drive.eds'?" in one for one in about)
