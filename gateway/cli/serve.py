@@ -101,7 +101,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
-    """The robot of the file; what is likely wrong with it, or with files that it names, is logged on `tell`."""
+    """The robot of the file; what is likely wrong with it, or files that it names, is logged on `tell`."""
     robot, warnings = config.load_with_warnings(options.config)
     for one in (*warnings, *_beside(robot)) if tell else ():
         log.warning("%s: %s", options.config, one.words)
@@ -111,7 +111,7 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
 
 
 def _beside(robot: config.RobotConfig) -> list[Finding]:
-    """What `gwrms check` says of EDS files, layouts and calibrations: each costs a component, and only that."""
+    """What `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
     from gateway.surroundings import beside  # all that drivers need: not for a gateway that wakes for a stop
 
     found = list(beside(robot))

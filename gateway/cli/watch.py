@@ -30,7 +30,8 @@ MIN_WIDTH = 12
 
 EPILOG = """A missing or stale value is a dash (null with --json), never the old number. Time is the
 robot's, in seconds since the first line; --json and --csv have it as UTC too, by the robot's own clock, and
---csv is as gwrms sessions export writes it. Rows that were lost on the way are said on stderr. Ctrl-C ends it.
+--csv is as gwrms sessions export writes it. Rows that were lost on the way are said on stderr. Ctrl-C ends
+it.
 
 examples:
   gwrms watch left_knee.position --rate 50

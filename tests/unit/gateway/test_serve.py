@@ -86,4 +86,6 @@ def test_a_device_s_file_that_cannot_be_used_is_logged_at_its_start(
     said = [record.getMessage() for record in caplog.records]
     about = [one for one in said if one.startswith(f"{file}: [joint.left_knee]")]
     assert len(about) == int(tell)
-    assert all("there is no EDS file 'joint_drve.eds'" in one and "'joint_drive.eds'?" in one for one in about)
+    assert all(
+        "there is no EDS file 'joint_drve.eds'" in one and "'joint_drive.eds'?" in one for one in about
+    )
