@@ -12,8 +12,9 @@ class Noted:
         self.finding: Finding | None = None
 
     def note(self, now_ns: int, words: str, check: str) -> None:
-        """It is wrong, or still wrong; the words may change meanwhile."""
-        since_ns = now_ns if self.finding is None else self.finding.since_ns
+        """It is wrong, or still wrong; the words may change meanwhile. Another check is another finding."""
+        before = self.finding
+        since_ns = before.since_ns if before is not None and before.check == check else now_ns
         self.finding = Finding(since_ns, words, check)
 
     def clear(self) -> None:

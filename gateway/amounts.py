@@ -26,4 +26,5 @@ def age(seconds: float | None) -> str:
     """How old something is."""
     if seconds is None:
         return NONE
+    seconds = max(0.0, seconds)  # what came while it was asked for is new
     return f"{seconds * 1000:.0f} ms" if seconds < 10 else f"{seconds:.0f} s"

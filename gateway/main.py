@@ -1,6 +1,6 @@
 """The `gwrms` command: finds the subcommand and imports only what it needs.
 
-Exit codes: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr, with `--json`
+Exit status: 0 done, 1 the thing failed, 2 wrong usage. Errors are a sentence or two on stderr, with `--json`
 also an object on stdout; `--debug` shows the traceback.
 """
 
@@ -81,7 +81,7 @@ def usage() -> str:
 
 
 def find(name: str) -> Callable[[list[str]], int]:
-    """Import the function behind a command; it takes its arguments and returns the exit code."""
+    """Import the function behind a command; it takes its arguments and returns the exit status."""
     module_name, _, function_name = COMMANDS[name][0].partition(":")
     function: Callable[[list[str]], int] = getattr(importlib.import_module(module_name), function_name)
     return function
@@ -109,7 +109,7 @@ def _help_without(error: Exception, arguments: Sequence[str]) -> str | None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `gwrms` with `argv` (default: the process's own arguments) and return its exit code."""
+    """Run `gwrms` with `argv` (default: the process's own arguments) and return its exit status."""
     _replace_closed_streams()
     try:
         return _run(argv)
@@ -139,6 +139,14 @@ def _run(argv: Sequence[str] | None) -> int:
     if name == "--version":
         sys.stdout.write(f"gwrms {__version__}\n")
         return 0
+    if "--json" not in rest:
+        return _command(name, rest, debug=debug)
+    from gateway.cli.failures import with_error_object
+
+    return with_error_object(lambda: _command(name, rest, debug=debug))
+
+
+def _command(name: str, rest: list[str], *, debug: bool) -> int:
     if name not in COMMANDS:
         from gateway.cli.text import did_you_mean
 
@@ -150,7 +158,7 @@ def _run(argv: Sequence[str] | None) -> int:
     except BrokenPipeError:
         raise
     except Exception as error:  # noqa: BLE001 - the one place where errors become words
-        if page := _help_without(error, arguments):
+        if page := _help_without(error, [name, *rest]):
             sys.stdout.write(page)
             return 0
         if debug:

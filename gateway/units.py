@@ -51,6 +51,17 @@ class Unit:
         """For reading: rounded, without the unit; a dash where there is none."""
         return "–" if value is None else f"{value * self.scale:.{self.digits}f}"
 
+    def brief(self, value: float | None) -> str:
+        """For reading what somebody has set: as `text`, three digits at least, and no zeros at the end."""
+        if value is None or not math.isfinite(value):
+            return "–"
+        shown = value * self.scale
+        leading = math.floor(math.log10(abs(shown))) if shown else 0
+        if not -6 <= leading <= 9:
+            return f"{shown:.3g}"
+        text = f"{shown:.{max(self.digits, 2 - leading)}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+
     def editable(self, value: float) -> str:
         """For editing: the fewest digits that lead back to exactly this value."""
         exact = self.shown(value)

@@ -104,12 +104,27 @@ def ask(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
                 line = lines.readline()
         answer: dict[str, Any] = json.loads(line)
     except (OSError, ValueError) as error:
-        raise SimulatorError(
-            f"no simulator answers in {folder} ({error}); start one: gwrms sim --dir {folder}"
-        ) from error
+        raise SimulatorError(f"no simulator answers in {folder}: {_why(folder, error)}") from error
     if "error" in answer:
         raise SimulatorError(answer["error"])
     return answer
+
+
+def _why(folder: Path, error: OSError | ValueError) -> str:
+    """What keeps it from answering, and what to do."""
+    start = f"start one: gwrms sim --dir {folder}"
+    match error:
+        case NotADirectoryError():
+            return "that is no folder; --dir is the folder of gwrms sim"
+        case FileNotFoundError() if not folder.exists():
+            return f"there is no such folder; {start}"
+        case FileNotFoundError() | ConnectionRefusedError():
+            return f"none runs there; {start}"
+        case TimeoutError():
+            return f"it said nothing for {ANSWER_S:g} s"
+        case OSError():
+            return error.strerror or type(error).__name__
+    return "it ended meanwhile, or something else listens there"
 
 
 @contextmanager

@@ -42,8 +42,10 @@ class CanDevice:
         elif self.node.ready and self.node.life.active_emcy is not None:
             state = State.FAULT
             problem = f"it reports {self.node.life.active_emcy.text(self.node.description.vendor_id)}"
-        words = "; ".join(text for text in (problem, *self.node.findings) if text)
-        return Quality(state, age_ms, words or None, self.node.counters())
+        trouble = self.node.trouble
+        texts = (problem, *(one.text(now_ns) for one in trouble), *self.node.findings)
+        words = "; ".join(text for text in texts if text)
+        return Quality(state, age_ms, words or None, self.node.counters(), trouble)
 
     def boot(self, sdo: SdoChannel) -> None:
         """Nothing needs to be read."""

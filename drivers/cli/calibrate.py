@@ -44,7 +44,7 @@ gwrms calibrate COMMAND --help says more.
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run `gwrms calibrate` and return its exit code."""
+    """Run `gwrms calibrate` and return its exit status."""
     kinds = {"insole": _insole_options, "imu": _imu_options}
     if not arguments or arguments[0] not in kinds:
         helped = bool(arguments) and arguments[0] in ("-h", "--help")

@@ -8,6 +8,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
+from drivers.identify import format_of
 from drivers.imu import frame as imu_frame
 from drivers.imu.can import FORMATS as CAN_FORMATS
 from drivers.imu.formats import FORMATS as IMU_FORMATS
@@ -29,7 +30,8 @@ Flatten = Callable[[Any], dict[str, object]]
 
 def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
-        'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}.'
+        'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. '
+        "Exit status 1 where most bytes belong to no frame of this format."
     )
     parser.add_argument("--format", required=True, choices=FORMATS, help="the language of the bytes")
     parser.add_argument(
@@ -40,7 +42,7 @@ def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], i
 
 
 def run(options: argparse.Namespace) -> int:
-    """Decode the capture to standard output.
+    """Decode the capture to standard output; 1 where most of it is of no frame.
 
     Raises:
         SettingsError: the layout is wrong, or the format needs one.
@@ -49,11 +51,9 @@ def run(options: argparse.Namespace) -> int:
     """
     parser, flatten = _reader(options.format, options.layout)
     if options.capture is None:
-        _decode(sys.stdin.buffer, parser, flatten)
-    else:
-        with Path(options.capture).open("rb") as capture:
-            _decode(capture, parser, flatten)
-    return 0
+        return _told(_decode(sys.stdin.buffer, parser, flatten), options, parser)
+    with Path(options.capture).open("rb") as capture:
+        return _told(_decode(capture, parser, flatten), options, parser)
 
 
 def _reader(name: str, layout_name: str | None) -> tuple[Parser[Any], Flatten]:
@@ -65,10 +65,25 @@ def _reader(name: str, layout_name: str | None) -> tuple[Parser[Any], Flatten]:
     return INSOLE_FORMATS[name].parser(layout)(), flatten
 
 
-def _decode(source: BinaryIO, parser: Parser[Any], flatten: Flatten) -> None:
+def _told(heard: tuple[bytes, int], options: argparse.Namespace, parser: Parser[Any]) -> int:
+    """Say it where most bytes were of no frame, and what they look like; returns the exit status."""
+    (start, size), counters = heard, parser.counters
+    if counters.frames and 2 * counters.bytes_dropped <= size:
+        return 0
+    found = format_of(start)
+    said = f"{counters.bytes_dropped} of {size} bytes belong to no frame of {options.format}"
+    said += f", they are {found}: say --format {found}" if found not in (None, options.format) else ""
+    sys.stderr.write(f"gwrms sensor: {options.capture or 'standard input'}: {said}\n")
+    return 1
+
+
+def _decode(source: BinaryIO, parser: Parser[Any], flatten: Flatten) -> tuple[bytes, int]:
+    """Write all that it has; returns its first bytes, and how many there were."""
+    start, size = b"", 0
     write = sys.stdout.write
     read = getattr(source, "read1", source.read)  # what is there already, so that a pipe is shown live
     while data := read(CHUNK):
+        start, size = (start + data)[:CHUNK], size + len(data)
         for frame in parser.feed(data):
             write(_line(flatten(frame)))
         sys.stdout.flush()
@@ -76,6 +91,7 @@ def _decode(source: BinaryIO, parser: Parser[Any], flatten: Flatten) -> None:
         write(_line(flatten(frame)))
     write(_line({"counters": parser.counters.as_dict()}))
     sys.stdout.flush()
+    return start, size
 
 
 def _line(values: dict[str, object]) -> str:

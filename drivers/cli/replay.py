@@ -4,6 +4,7 @@ import argparse
 import math
 import os
 import pty
+import signal
 import sys
 import threading
 import time
@@ -45,7 +46,7 @@ def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namesp
         action="store_true",
         help=f"whatever comes, as of a sensor that nobody knows yet (without --baud at {DEFAULT_BAUDRATE})",
     )
-    parser.add_argument("--seconds", type=float, help="for so long; default: until Ctrl-C")
+    parser.add_argument("--seconds", type=float, help="for so long; default: until Ctrl-C or SIGTERM")
     return record
 
 
@@ -67,7 +68,7 @@ def replay_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namesp
 
 
 def record(options: argparse.Namespace) -> int:
-    """Record until the time is up or Ctrl-C; 1 where bytes may be missing in between.
+    """Record until the time is up, Ctrl-C or SIGTERM; 1 where bytes may be missing in between.
 
     Raises:
         FileExistsError: there is such a file.
@@ -84,11 +85,12 @@ def record(options: argparse.Namespace) -> int:
 
         port = SerialPort(options.port, baudrate, keep)
         began = time.monotonic()
-        port.start()
-        try:
-            problem = _watch(port, options.seconds)
-        finally:
-            port.stop()
+        with _terminated_as_by_ctrl_c():
+            port.start()
+            try:
+                problem = _watch(port, options.seconds)
+            finally:
+                port.stop()
         size = file.tell()
     if not size:
         options.file.unlink()
@@ -98,6 +100,16 @@ def record(options: argparse.Namespace) -> int:
     holes = "" if problem is None else ", NOT all that was sent"
     sys.stdout.write(f"{size} bytes in {about.seconds:.1f} s at {baudrate} baud{holes}\n")
     return 0 if problem is None else 1
+
+
+@contextmanager
+def _terminated_as_by_ctrl_c() -> Iterator[None]:
+    """However it is ended, what describes the bytes is written beside them. For the main thread."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _watch(port: SerialPort, seconds: float | None) -> str | None:

@@ -15,7 +15,7 @@ examples:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run `gwrms sensor` and return its exit code."""
+    """Run `gwrms sensor` and return its exit status."""
     words = {"record": replay.record_options, "replay": replay.replay_options, "decode": decode.options}
     if arguments and arguments[0] in words:
         word, *rest = arguments
@@ -40,7 +40,7 @@ def run_parsed(
     run: Callable[[argparse.Namespace], int],
     arguments: Sequence[str],
 ) -> int:
-    """Parse, then run; wrong usage is exit code 2."""
+    """Parse, then run; wrong usage is exit status 2."""
     try:
         options = parser.parse_args(arguments)
     except SystemExit as done:

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from drivers.imu.motion import TILT
 from drivers.imu.slopes import MappedSlope, SlopePlan
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality, State
+from drivers.shares import beside
 from eds import Description
 
 
@@ -70,11 +72,12 @@ class Inclinometer(TrunkImu):
     def quality(self, now_ns: int) -> Quality:
         node = self.node
         counters = {"frames": self._frames, "short_frames": self._short_frames, **node.counters()}
-        found = self._quality(now_ns, node.problem(now_ns) or self._silence(), counters)
+        known = self._quality(now_ns, node.problem(now_ns) or self._silence(), counters)
+        known = beside(known, node.trouble, now_ns)
         notes = (*node.findings, *(self._plan.notes if self._plan is not None else ()))
-        words = "; ".join(text for text in (found.problem, *notes) if text)
-        state = found.state if node.ready else State.LOST
-        return Quality(state, found.age_ms, words or None, found.counters)
+        words = "; ".join(text for text in (known.problem, *notes) if text)
+        state = known.state if node.ready else State.LOST
+        return replace(known, state=state, problem=words or None)
 
     # What the node tells.
 

@@ -4,6 +4,7 @@ import math
 from collections import deque
 
 from drivers.imu.rotation import Vector
+from drivers.noted import Noted
 
 STANDARD_GRAVITY = 9.80665
 SETTLED_S = 10.0
@@ -16,15 +17,18 @@ FROZEN_S = 5.0
 PERIOD_NS = 39_000_000  # for slow means, faster frames are left out
 
 
-class ImuCheck:
-    """Watches one IMU in trunk axes; `problem` says in words what is wrong."""
+class ImuCheck(Noted):
+    """Watches one IMU in trunk axes."""
 
     def __init__(self, name: str) -> None:
+        super().__init__()
         self._name = name
         self.restart()
 
     def restart(self) -> None:
         """The stream begins anew."""
+        self.clear()
+        self._judged_ns = 0
         self._force: Vector | None = None  # specific force, slow mean
         self._up: Vector | None = None  # the attitude's up, slow mean
         self._began_ns: int | None = None
@@ -51,42 +55,48 @@ class ImuCheck:
             self._last_up_ns = stamp_ns
         if angular_velocity is not None and math.hypot(*angular_velocity) > FASTEST:
             self._fast_ns.append(stamp_ns)
+        if stamp_ns - self._judged_ns >= PERIOD_NS and stamp_ns - self._began_ns >= SETTLED_S * 1e9:
+            self._judged_ns = stamp_ns
+            self._look(stamp_ns)
 
-    @property
-    def problem(self) -> str | None:
-        """What is wrong, with what to check."""
-        if self._began_ns is None or self._now_ns - self._began_ns < SETTLED_S * 1e9:
-            return None
+    def _look(self, stamp_ns: int) -> None:
+        if self._force is not None and stamp_ns - self._changed_ns > FROZEN_S * 1e9:
+            words = f"{self._name} sends the same acceleration again and again, it hangs"
+            self.note(self._changed_ns, words, "restart it")
+        elif (wrong := self._judge()) is not None:
+            self.note(stamp_ns, *wrong)
+        else:
+            self.clear()
+
+    def _judge(self) -> tuple[str, str] | None:
+        """What is wrong with what it measures, and what to check."""
         if len(self._fast_ns) == TOO_FAST and self._now_ns - self._fast_ns[0] < TOO_FAST_IN_S * 1e9:
             return (
-                f"{self._name} reports turns faster than {FASTEST:.0f} rad/s, which no trunk does: "
-                "check the range set in the device, and its wires for noise"
+                f"{self._name} reports turns faster than {FASTEST:.0f} rad/s, which no trunk does",
+                "check the range set in the device, and its wires for noise",
             )
         if self._force is None:
             return None
-        if self._now_ns - self._changed_ns > FROZEN_S * 1e9:
-            return f"{self._name} sends the same acceleration again and again: it hangs; restart it"
         length = math.hypot(*self._force)
         if abs(length / STANDARD_GRAVITY - 1.0) > SCALE:
             return (
-                f"{self._name} measures {length:.1f} m/s² on average instead of 9.8: its scale is off; "
-                "check the range set in the device and its format"
+                f"{self._name} measures {length:.1f} m/s² on average instead of 9.8, its scale is off",
+                "check the range set in the device and its format",
             )
         return self._against_gravity(length)
 
-    def _against_gravity(self, length: float) -> str | None:
+    def _against_gravity(self, length: float) -> tuple[str, str] | None:
         force, up = self._force, self._up
         if force is None or up is None:
             return None
         if up[2] < -0.5 and force[2] < 0.0:
-            return f"{self._name} is upside down: correct `axes` in [imu.{self._name}] or turn it over"
+            return f"{self._name} is upside down", f"correct `axes` in [imu.{self._name}] or turn it over"
         cosine = sum(a * b for a, b in zip(force, up, strict=True)) / (length * (math.hypot(*up) or 1.0))
         angle = math.acos(max(-1.0, min(1.0, cosine)))
         if angle > DISAGREES:
-            return (
-                f"{self._name}'s tilt and gravity disagree by {math.degrees(angle):.0f}°: an angle's sign or "
-                "order is wrong, or it drifts; check `format`, or set attitude = 'filter'"
-            )
+            disagree = f"{self._name}'s tilt and gravity disagree by {math.degrees(angle):.0f}°"
+            why = "an angle's sign or order is wrong, or it drifts"
+            return f"{disagree}: {why}", "check `format`, or set attitude = 'filter'"
         return None
 
 

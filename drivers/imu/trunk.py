@@ -13,7 +13,9 @@ from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion
 from drivers.imu.settings import Attitude, MountedSettings
 from drivers.latest import Latest
+from drivers.noted import found
 from drivers.samples import Quality, State
+from drivers.shares import beside
 
 
 class TrunkImu:
@@ -88,7 +90,8 @@ class TrunkImu:
     def _quality(self, now_ns: int, silence: str | None, counters: Mapping[str, int]) -> Quality:
         """`silence` is why nothing comes, in words; it matters only where nothing comes."""
         state, age_ms = self._freshness.state(now_ns)
-        problem = self.check.problem if state is State.OK else silence or silence_text(age_ms)
-        if state is State.OK and problem is not None:
-            state = State.FAULT
-        return Quality(state, age_ms, problem, {**counters, "stale": self._freshness.stale})
+        counters = {**counters, "stale": self._freshness.stale}
+        if state is not State.OK:
+            return Quality(state, age_ms, silence or silence_text(age_ms), counters)
+        findings = found([self.check])
+        return beside(Quality(State.FAULT if findings else state, age_ms, None, counters), findings, now_ns)

@@ -19,7 +19,7 @@ from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line, Recognise, unrecognised
 from drivers.noted import found
-from drivers.samples import Channel, Quality, State
+from drivers.samples import Channel, Finding, Quality, State
 from drivers.shares import beside, missing_frames, saturated_frames
 
 USUAL_LAYOUT = "insole-16"
@@ -96,14 +96,17 @@ class Insole:
 
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
-        problem = self._fault or self.check.problem or self._feet_check.problem or self._swap_check.problem
         if state is State.OK:
-            if problem is not None or self._saturated_share.finding is not None:
-                state = State.FAULT
-            findings = found((self._saturated_share, self._missing_share))
-            return beside(Quality(state, age_ms, problem, self._counters()), findings, now_ns)
+            wrong = (*self._implausible(), *found([self._saturated_share]))
+            state = State.FAULT if self._fault is not None or wrong else state
+            findings = (*wrong, *found([self._missing_share]))
+            return beside(Quality(state, age_ms, self._fault, self._counters()), findings, now_ns)
         silence = self.line.problem(now_ns) or self._fault or self._wrong_foot()
         return Quality(state, age_ms, silence or silence_text(age_ms), self._counters())
+
+    def _implausible(self) -> tuple[Finding, ...]:
+        """The first thing that cannot be, for what else is told follows from it."""
+        return (*self.check.findings, *found((self._feet_check, self._swap_check)))[:1]
 
     def received(self, frames: Sequence[InsoleFrame], stamp_ns: int) -> None:
         """Frames of the line; called in the port's thread."""

@@ -7,6 +7,9 @@ import math
 from collections.abc import Sequence
 from typing import cast
 
+from drivers.noted import Noted, found
+from drivers.samples import Finding
+
 STEPS = 10  # landings that make a window
 FORCE_SWING = 150.0  # N; a foot that steps loads and unloads by at least this
 DEAD_SHARE = 0.01  # of the hardest pressed cell
@@ -50,18 +53,20 @@ class StepDetector:
 
 
 class FootCheck:
-    """Watches one foot's cells and force; `problem` says in words what is wrong."""
+    """Watches one foot's cells and force."""
 
     def __init__(self, name: str, cells: int) -> None:
         self._name = name
         self._cells = cells
+        self._frozen, self._stepped = Noted(), Noted()
         self.restart()
 
     def restart(self) -> None:
         """The stream begins anew."""
         self.landings = 0
         self._steps = StepDetector()
-        self._window_problem: str | None = None
+        self._frozen.clear()
+        self._stepped.clear()
         self._frozen_since_ns: int | None = None
         self._previous: Sequence[float] | None = None
         self._before: Sequence[float] | None = None
@@ -80,45 +85,62 @@ class FootCheck:
         known = cast("Sequence[float]", pressures)
         if known != self._previous or force <= 0.0:
             self._frozen_since_ns = stamp_ns
+        self._judge_frozen(stamp_ns)
         self._note(known)
         self._before, self._previous, self._last_ns = self._previous or known, known, stamp_ns
         self._force_low = min(self._force_low, force)
         self._force_high = max(self._force_high, force)
         if self._steps.has_landed(stamp_ns, force):
-            self._land()
+            self._land(stamp_ns)
 
     @property
-    def problem(self) -> str | None:
+    def findings(self) -> tuple[Finding, ...]:
         """What is wrong, with what to check."""
-        if self._frozen_since_ns is not None and self._last_ns - self._frozen_since_ns > FROZEN_S * 1e9:
-            return (
-                f"{self._name} sends the same values again and again under load: its cells are unplugged "
-                "or its converter hangs; check the cells' connector and restart it"
-            )
-        return self._window_problem
+        return found((self._frozen, self._stepped))
 
-    def _land(self) -> None:
+    def _judge_frozen(self, stamp_ns: int) -> None:
+        since_ns = self._frozen_since_ns
+        if since_ns is None or stamp_ns - since_ns <= FROZEN_S * 1e9:
+            self._frozen.clear()
+            return
+        self._frozen.note(
+            since_ns,
+            f"{self._name} sends the same values again and again under load: its cells are unplugged "
+            "or its converter hangs",
+            "check the cells' connector and restart it",
+        )
+
+    def _land(self, stamp_ns: int) -> None:
         self.landings += 1
         if self.landings % STEPS == 0:
             if self._force_high - self._force_low >= FORCE_SWING or self._force_high < LOW_PEAK:
-                self._window_problem = self._judge()
+                self._tell(stamp_ns, self._judge())
             self._clear_window()
 
-    def _judge(self) -> str | None:
+    def _tell(self, stamp_ns: int, wrong: tuple[str, str] | None) -> None:
+        if wrong is None:
+            self._stepped.clear()
+        else:
+            self._stepped.note(stamp_ns, *wrong)
+
+    def _judge(self) -> tuple[str, str] | None:
+        """What the steps of this window have shown, and what to check."""
         hardest = max(self._high)
         if self._force_high < LOW_PEAK or self._force_high > HIGH_PEAK:
-            return (
-                f"{self._name} measured at most {self._force_high:.0f} N over {STEPS} steps: its scale is "
-                "off, perhaps by ten; check the calibration's gain and the cells' areas"
-            )
+            most = f"{self._name} measured at most {self._force_high:.0f} N over {STEPS} steps"
+            check = "check the calibration's gain and the cells' areas"
+            return f"{most}: its scale is off, perhaps by ten", check
         for cell, jumps in enumerate(self._jumps):
             if jumps >= JUMPS:
-                return f"{self._name}: cell {cell} jumps between two values; check it for a loose wire"
+                return f"{self._name}: cell {cell} jumps between two values", "check it for a loose wire"
         for cell, (low, high) in enumerate(zip(self._low, self._high, strict=True)):
             if low == high > 0.0:
-                return f"{self._name}: cell {cell} is stuck at {high / 1e3:.1f} kPa; check its wire"
+                return f"{self._name}: cell {cell} is stuck at {high / 1e3:.1f} kPa", "check its wire"
             if high < DEAD_SHARE * hardest:
-                return f"{self._name}: cell {cell} felt nothing over {STEPS} steps; check its wire and place"
+                return (
+                    f"{self._name}: cell {cell} felt nothing over {STEPS} steps",
+                    "check its wire and place",
+                )
         return None
 
     def _note(self, known: Sequence[float]) -> None:
@@ -140,15 +162,16 @@ class FootCheck:
         self._jumps = [0] * self._cells
 
 
-class FeetCheck:
+class FeetCheck(Noted):
     """Watches one foot against the other: both must step."""
 
     def __init__(self, name: str) -> None:
+        super().__init__()
         self._name = name
         self.restart()
 
     def restart(self) -> None:
-        self.problem: str | None = None
+        self.clear()
         self._own = self._others = 0
         self._since_ns = 0
 
@@ -156,16 +179,17 @@ class FeetCheck:
         """How often each foot has landed by `stamp_ns`."""
         if own_landings != self._own or stamp_ns - self._since_ns > ALONE_S * 1e9:
             if own_landings != self._own:
-                self.problem = None
+                self.clear()
             self._own, self._others, self._since_ns = own_landings, others_landings, stamp_ns
         elif others_landings - self._others >= STEPS:
-            self.problem = (
-                f"{self._name} sends, but does not feel the steps that the other foot makes: "
-                "check the cells' connector and that the insole lies in the shoe"
+            self.note(
+                self._since_ns,
+                f"{self._name} sends, but does not feel the steps that the other foot makes",
+                "check the cells' connector and that the insole lies in the shoe",
             )
 
 
-class SwapCheck:
+class SwapCheck(Noted):
     """Watches the feet's force against the hips: a loaded leg's hip extends, a free leg's hip flexes."""
 
     SETTLED_S = 15.0
@@ -173,10 +197,11 @@ class SwapCheck:
     LEAST_FORCE, LEAST_VELOCITY = 80.0, 0.25  # rms of somebody who walks, N and rad/s
 
     def __init__(self) -> None:
+        super().__init__()
         self.restart()
 
     def restart(self) -> None:
-        self.problem: str | None = None
+        self.clear()
         self._force2 = self._velocity2 = self._product = 0.0
         self._began_ns: int | None = None
         self._last_ns = 0
@@ -193,17 +218,18 @@ class SwapCheck:
         self._velocity2 = keep * self._velocity2 + (1 - keep) * velocity_difference**2
         self._product = keep * self._product + (1 - keep) * force_difference * velocity_difference
         if stamp_ns - self._began_ns > 2 * self.SETTLED_S * 1e9:
-            self._judge()
+            self._judge(stamp_ns)
 
-    def _judge(self) -> None:
+    def _judge(self, stamp_ns: int) -> None:
         force, velocity = math.sqrt(self._force2), math.sqrt(self._velocity2)
         if force < self.LEAST_FORCE or velocity < self.LEAST_VELOCITY:
             return
         correlation = self._product / (force * velocity)
         if correlation > self.CORRELATION:
-            self.problem = (
-                "left and right are swapped: each foot is loaded while its own hip flexes; "
-                "check the insoles' ports (and the sign of the hips' `direction`)"
+            self.note(
+                stamp_ns,
+                "left and right are swapped, each foot is loaded while its own hip flexes",
+                "check the insoles' ports (and the sign of the hips' `direction`)",
             )
         elif correlation < 0.0:
-            self.problem = None
+            self.clear()

@@ -18,7 +18,7 @@ to be repaired.
 """
 
 _EPILOG = """\
-exit code
+exit status
   0 when every file can be used, 1 when one cannot, 2 for wrong usage
 
 examples

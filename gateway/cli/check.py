@@ -25,10 +25,10 @@ are up and run at its bit rate, and whether its address is this computer's.
 _EPILOG = """\
 A mistake is what a file is refused for, or, in a file that it names, the component that needs that one: the
 gateway starts without it. A warning is what can work and is likely not what was meant, or what this computer
-lacks: it may come yet. A gateway says the same of its file when it starts, and of ports, buses and devices'
-files in gwrms describe. Of what is no TOML only the first mistake is told.
+lacks: it may come yet. A gateway says the same of its file and of devices' files when it starts, and of ports
+and buses in gwrms describe. Of what is no TOML only the first mistake is told.
 
-exit codes: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
+exit status: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
 
 examples
   gwrms check robot.toml

@@ -10,7 +10,7 @@ Prints a page of the docs, which are installed with GWRMS; without a name, the l
 will do where no other page has it.
 """
 _EPILOG = """\
-exit codes: 0 printed; 1 there is no such page; 2 usage
+exit status: 0 printed; 1 there is no such page; 2 usage
 
 examples
   gwrms docs

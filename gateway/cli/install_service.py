@@ -31,7 +31,7 @@ class NotInstalled(Exception):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Exit code: 0 written or shown, 1 they would not work or cannot be written, 2 usage."""
+    """Exit status: 0 written or shown, 1 they would not work or cannot be written, 2 usage."""
     try:
         options = _parser().parse_args(list(arguments))
     except SystemExit as ended:  # argparse has said why

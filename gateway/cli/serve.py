@@ -18,6 +18,7 @@ from gateway.daemon import Daemon
 from gateway.process import notify
 from gateway.process.memory import share_heap
 from gateway.process.resting import ENDING
+from gateway.tables.finding import Finding
 from gateway.wire import framing
 
 log = logging.getLogger(__name__)
@@ -29,8 +30,9 @@ the computer's own CPU, memory and processes.
 Nothing runs until a client asks: no bus, no port, no timer is open. What a client asked
 for stops linger_s after the last client has left, and the gateway then becomes a small process
 that waits at its port; it reads CONFIG again when the next client comes. What is not there is
-named in `gwrms describe` and tried again; the rest is served. A [guard] in CONFIG runs from the
-start and for ever, and so does what a held stop or a trial needs.
+named in `gwrms describe` and tried again, the rest is served; a device's file that cannot be
+used is told in the log, too. A [guard] in CONFIG runs from the start and for ever, and so does
+what a held stop or a trial needs.
 
 CONFIG is the robot's file (TOML). `gwrms sim --dir DIR` writes a commented example,
 DIR/robot.toml, together with a simulated robot to try it on.
@@ -46,7 +48,7 @@ while one is enabled: gwrms stop, then end it.
 Anybody who can connect can stop the robot and change its parameters: listen on
 127.0.0.1, or on a network of which you know every computer.
 
-exit codes: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
+exit status: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
 """
 
 
@@ -99,13 +101,22 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
-    """The robot of the file; what is likely wrong with it is logged where `tell` says so."""
+    """The robot of the file; what is likely wrong with it, or files that it names, is logged on `tell`."""
     robot, warnings = config.load_with_warnings(options.config)
-    for one in warnings if tell else ():
+    for one in (*warnings, *_beside(robot)) if tell else ():
         log.warning("%s: %s", options.config, one.words)
     given = {"host": options.host, "port": options.port}
     changed = {key: value for key, value in given.items() if value is not None}
     return replace(robot, gateway=replace(robot.gateway, **changed))
+
+
+def _beside(robot: config.RobotConfig) -> list[Finding]:
+    """What `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
+    from gateway.surroundings import beside  # all that drivers need: not for a gateway that wakes for a stop
+
+    found = list(beside(robot))
+    gc.collect()  # buses and components that were built to be looked at
+    return found
 
 
 def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners:

@@ -49,14 +49,15 @@ class Channels:
 
 
 def utc(stamp_ns: int, clock: Clock | None) -> str | None:
-    """Return a time of the robot's monotonic clock as ISO 8601, by what it said of its clocks.
+    """Return a time of the robot's monotonic clock as ISO 8601, such as 2026-11-21T15:30:00.123456Z.
 
-    None where it said nothing, or something that is no time of any calendar.
+    None where the robot said nothing of its clocks, or something that is no time of any calendar.
     """
     if clock is None:
         return None
     at_ns = stamp_ns - clock.monotonic_ns + clock.utc_ns
     try:
-        return (_EPOCH + timedelta(microseconds=at_ns // 1000)).isoformat(timespec="microseconds")
+        at = _EPOCH + timedelta(microseconds=at_ns // 1000)
     except OverflowError:
         return None
+    return at.replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"

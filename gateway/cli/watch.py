@@ -29,8 +29,9 @@ Row = tuple[int, str | None, dict[str, float | None]]  # its stamp, that in UTC,
 MIN_WIDTH = 12
 
 EPILOG = """A missing or stale value is a dash (null with --json), never the old number. Time is the
-robot's, in seconds since the first line; --json and --csv have it as UTC too, by the robot's own clock. Rows
-that were lost on the way are said on stderr. Ctrl-C ends it.
+robot's, in seconds since the first line; --json and --csv have it as UTC too, by the robot's own clock, and
+--csv is as gwrms sessions export writes it. Rows that were lost on the way are said on stderr. Ctrl-C ends
+it.
 
 examples:
   gwrms watch left_knee.position --rate 50
@@ -128,7 +129,7 @@ def _follow_json(rows: Iterator[Row]) -> None:
 
 def _follow_csv(rows: Iterator[Row], names: Sequence[str], shown: Channels) -> None:
     out = csv.writer(sys.stdout, lineterminator="\n")
-    out.writerow(["utc", "stamp_ns", *(plain(shown.title(name)) for name in names)])
+    out.writerow(["utc", "stamp_ns [ns]", *(plain(shown.title(name)) for name in names)])
     for stamp_ns, at, values in rows:
         cells = (shown.value(name, values.get(name)) for name in names)
         out.writerow([at or "", stamp_ns, *("" if cell is None else cell for cell in cells)])

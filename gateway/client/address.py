@@ -20,9 +20,11 @@ class Address:
         """Read `HOST`, `HOST:PORT`, `:PORT` or `[IPV6]:PORT`.
 
         Raises:
-            BadAddress: the text is none of these.
+            BadAddress: the text is none of these; an empty one may be a variable that was not set.
 
         """
+        if not text:
+            raise BadAddress(f"an address is missing; write HOST:PORT, such as {DEFAULT_HOST}:{DEFAULT_PORT}")
         host, colon, port = text.rpartition(":") if not text.endswith("]") else (text, "", "")
         if not colon:
             host, port = (text, "")

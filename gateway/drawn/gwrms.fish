@@ -118,7 +118,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using top' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using top' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using top' -l seconds -x -d 'end after N seconds'
-complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a plot -d 'Channels over time, live, until Ctrl-C.'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a plot -d 'Channels over time, live, until q, or Ctrl-C.'
 complete -c gwrms -n '_shtab_gwrms_using plot' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using plot' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using plot' -l terminal -d 'in the terminal, display or not'
@@ -219,7 +219,7 @@ complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq
 complete -c gwrms -n '_shtab_gwrms_using sensor record' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor record' -l baud -x -d 'default: the first at which a format fits'
 complete -c gwrms -n '_shtab_gwrms_using sensor record' -l raw -d 'whatever comes, as of a sensor that nobody knows yet (without --baud at 115200)'
-complete -c gwrms -n '_shtab_gwrms_using sensor record' -l seconds -x -d 'for so long; default: until Ctrl-C'
+complete -c gwrms -n '_shtab_gwrms_using sensor record' -l seconds -x -d 'for so long; default: until Ctrl-C or SIGTERM'
 complete -c gwrms -n '_shtab_gwrms_using sensor record; and test $_shtab_gwrms_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d FILE
 complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq 1' -a replay -d 'Sends a capture'"'"'s bytes out of a pseudo-terminal, at the pace at which they were recorded. Prints {"ready": true, "port": …} when it can be opened.'
 complete -c gwrms -n '_shtab_gwrms_using sensor replay' -s h -l help -d 'show this help message and exit'
@@ -228,7 +228,7 @@ complete -c gwrms -n '_shtab_gwrms_using sensor replay' -l baud -x -d 'the pace 
 complete -c gwrms -n '_shtab_gwrms_using sensor replay' -l speed -x -d 'times faster than recorded'
 complete -c gwrms -n '_shtab_gwrms_using sensor replay' -l loop -d 'again and again, until Ctrl-C'
 complete -c gwrms -n '_shtab_gwrms_using sensor replay; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d FILE
-complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq 1' -a decode -d 'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}.'
+complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq 1' -a decode -d 'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. Exit status 1 where most bytes belong to no frame of this format.'
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -l format -xka "bno08x-rvc microstrain vectornav witmotion xsens witmotion-can brilliant-star insole-cobs insole-csv insole-frame" -d 'the language of the bytes'
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -l layout -x -d 'an insole'"'"'s layout file, or one that ships: insole-3, insole-8, insole-16, insole-18, insole-35'

@@ -32,7 +32,7 @@ _shtab_gwrms_commands() {
     label:'What robot and wearer did in a recorded session.'
     models:'learned models: look at, promote, roll back, export'
     params:'parameters as files: save, compare, apply'
-    plot:'Channels over time, live, until Ctrl-C.'
+    plot:'Channels over time, live, until q, or Ctrl-C.'
     predict:'What robot and wearer are doing, and how far to believe that.'
     query:'SQL over the store'"'"'s tables.'
     reset:'End a held stop: every drive switched off, none enabled.'
@@ -108,7 +108,7 @@ _shtab_gwrms_params_commands() {
 
 _shtab_gwrms_sensor_commands() {
   local _commands=(
-    decode:'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}.'
+    decode:'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. Exit status 1 where most bytes belong to no frame of this format.'
     record:'Records a port'"'"'s raw bytes, and beside them FILE.json with baud rate, format and duration. Listens first, as gwrms sensor does, and records nothing that no format explains: that may be noise, at a wrong baud rate.'
     replay:'Sends a capture'"'"'s bytes out of a pseudo-terminal, at the pace at which they were recorded. Prints {"ready": true, "port": …} when it can be opened.'
   )
@@ -750,7 +750,7 @@ _shtab_gwrms_sensor_record_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--baud[default\: the first at which a format fits]:baud:"
   "--raw[whatever comes, as of a sensor that nobody knows yet (without --baud at 115200)]"
-  "--seconds[for so long\; default\: until Ctrl-C]:seconds:"
+  "--seconds[for so long\; default\: until Ctrl-C or SIGTERM]:seconds:"
   ":PORT:"
   ":FILE:_files"
 )

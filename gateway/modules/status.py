@@ -62,9 +62,7 @@ class StatusModule:
         return then(measured, lambda host: self._answer(chosen, host))
 
     def _answer(self, chosen: list[Selection], host: ResourceSnapshot) -> Snapshot:
-        snapshot = self._component.read(chosen)
-        for name in self._component.absent:
-            snapshot.quality[name] = self._component.quality(name, snapshot.stamp_ns)
+        snapshot = self._component.read(chosen, self._component.absent)
         for channel, value in zip(RESOURCE_CHANNELS, columns(host), strict=True):
             if channel.name in RESOURCE_GLOBS:
                 snapshot.values[channel.name] = value

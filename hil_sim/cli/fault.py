@@ -32,7 +32,7 @@ by program
   {"controller": "start"}, {"list": true}. The last one tells every fault with what it can be on, its keys and
   where it is on now ("faults"), and those that are on with since when and how ("active").
 
-exit codes: 0 done; 1 refused, or no simulator runs in DIR; 2 wrong usage
+exit status: 0 done; 1 refused, or no simulator runs in DIR; 2 wrong usage
 """
 
 
@@ -60,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str]) -> int:
-    """Ask the simulator; returns the exit code."""
+    """Ask the simulator; returns the exit status."""
     parser = _parser()
     try:
         arguments = parser.parse_intermixed_args(argv)

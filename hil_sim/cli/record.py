@@ -38,7 +38,7 @@ scenarios
                    and trunk angle that the controller allows; with stumbles and falls (default)
   and those of `gwrms sim`.
 
-exit codes
+exit status
   0 written, 1 it cannot be written, 2 wrong usage
 
 example
@@ -155,7 +155,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str]) -> int:
-    """Record; returns the exit code."""
+    """Record; returns the exit status."""
     try:
         arguments = _parser().parse_args(argv)
     except SystemExit as leave:

@@ -31,7 +31,7 @@ the devices
 
 output
   One line when the robot can be used: {"ready": true, "config": "DIR/robot.toml"}
-  It ends with the recording (but see --loop), Ctrl-C, SIGTERM or after N seconds. Exit codes as gwrms sim.
+  It ends with the recording (but see --loop), Ctrl-C, SIGTERM or after N seconds. Exit status as gwrms sim.
 
 example
   candump -l can0 &  gwrms sensor record /dev/ttyUSB0 left.bin
@@ -81,7 +81,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str]) -> int:
-    """Play; returns the exit code."""
+    """Play; returns the exit status."""
     parser = _parser()
     if {"-h", "--help"} & set(argv):  # also behind --replay, which wants a file
         parser.print_help()

@@ -30,7 +30,7 @@ An expectation that failed is inconclusive where this computer was too slow to j
 thing that happened, the simulator came late and the gateway waited for a processor by more than a tenth of
 its window, or 0.2 s. What was met stays met.
 
-exit codes: 0 all that was expected is so; 1 something is not, or it could not be run; 2 wrong usage, or a
+exit status: 0 all that was expected is so; 1 something is not, or it could not be run; 2 wrong usage, or a
 file that is no scenario; 3 nothing failed, but something is inconclusive. gwrms docs scenarios tells how to
 write one.
 
@@ -83,7 +83,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str]) -> int:
-    """Run every file; returns the exit code."""
+    """Run every file; returns the exit status."""
     try:
         arguments = _parser().parse_args(argv)
     except SystemExit as leave:

@@ -17,7 +17,7 @@ def say(sentence: str) -> None:
 def run(robot: Housing, seconds: float | None, prepare: Callable[[], None]) -> int:
     """Run `robot` until SIGINT, SIGTERM or so many seconds; `prepare` is called when it is open.
 
-    Returns the exit code.
+    Returns the exit status.
     """
 
     def end(_signal: int, _frame: FrameType | None) -> None:

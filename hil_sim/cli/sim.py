@@ -85,7 +85,7 @@ recordings
 
 output
   One line when the robot can be used: {"ready": true, "config": "DIR/robot.toml"}
-  It runs until Ctrl-C, SIGTERM or N seconds. Exit code 0; 1 when it cannot run; 2 for wrong usage.
+  It runs until Ctrl-C, SIGTERM or N seconds. Exit status 0; 1 when it cannot run; 2 for wrong usage.
 
 example
   gwrms sim --dir /tmp/robot &
@@ -199,7 +199,7 @@ def _drives(words: list[str]) -> dict[str, Path]:
 
 
 def main(argv: list[str]) -> int:
-    """Run the simulator; returns the exit code."""
+    """Run the simulator; returns the exit status."""
     if argv[:1] == ["run"]:
         return run.main(argv[1:])
     if any(word.startswith("--replay") for word in argv):

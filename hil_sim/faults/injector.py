@@ -2,7 +2,7 @@
 
 import difflib
 import random
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,9 +105,12 @@ def find(name: object) -> Fault:
     """Return the fault of a name; raises `FaultRefused` with the name that is near."""
     if isinstance(name, str) and name in FAULTS:
         return FAULTS[name]
-    near = difflib.get_close_matches(str(name), FAULTS, 1)
-    meant = f"; did you mean {near[0]!r}?" if near else ""
-    raise FaultRefused(f"there is no fault {name!r}{meant} (gwrms sim-fault --list shows all)")
+    raise FaultRefused(f"there is no fault {name!r}: {_meant(name, FAULTS)}gwrms sim-fault --list shows all")
+
+
+def _meant(word: object, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(str(word), list(known), 1)
+    return f"did you mean {near[0]!r}? " if near else ""
 
 
 def check_fault(
@@ -126,14 +129,14 @@ def _device(name: object, fault: Fault, on: object) -> str:
     if isinstance(on, str) and on in allowed:
         return on
     said = "needs to be told where" if on is None else f"cannot be on {on!r}"
-    raise FaultRefused(f"{name} {said}: on is one of {', '.join(allowed)}")
+    raise FaultRefused(f"{name} {said}: {_meant(on, allowed)}on is one of {', '.join(allowed)}")
 
 
 def _values(name: object, fault: Fault, given: Mapping[str, object]) -> dict[str, Value]:
     for key in given:
         if key not in fault.parameters:
-            known = ", ".join(fault.parameters) or "it has none"
-            raise FaultRefused(f"{name} has no parameter {key!r}: {known}")
+            known = f"it has {', '.join(fault.parameters) or 'none'}"
+            raise FaultRefused(f"{name} has no parameter {key!r}: {_meant(key, fault.parameters)}{known}")
     return {
         key: parameter.check(f"{name}: {key}", given.get(key, parameter.default))
         for key, parameter in fault.parameters.items()

@@ -4,10 +4,11 @@ import argparse
 import collections
 import contextlib
 import importlib.metadata
+import os
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 from gateway.cli.arguments import seconds
@@ -26,6 +27,7 @@ from gateway.cli.text import measured, say
 from gateway.client import LinkSettings, Robot
 from server_gui.qt_needs import NoWindow, check, prefer_x
 from server_gui.terminal.braille import Sample, draw, extent
+from server_gui.terminal.keys import Key, Keyboard
 
 SPAN_S: Final = 10.0  # that is in sight
 RATE_HZ: Final = 50.0
@@ -74,7 +76,7 @@ def _terminal(arguments: argparse.Namespace) -> int:
     ends_s = time.monotonic() + (arguments.seconds or (float("inf") if is_live else SPAN_S))
     # A link that drops is told by the curves themselves: no line comes between them.
     link = LinkSettings(client="gwrms plot")
-    with Robot(arguments.robot, link) as robot, contextlib.suppress(KeyboardInterrupt):
+    with Robot(arguments.robot, link) as robot, contextlib.suppress(KeyboardInterrupt), _keys() as is_left:
         description = robot.describe()
         channels = widened(arguments.channels, description)
         check_names("channel", channels, channel_names(description), absent_components(description))
@@ -88,11 +90,21 @@ def _terminal(arguments: argparse.Namespace) -> int:
                 curves.take(stamp_ns / 1e9, values)
             if screen is not None:
                 screen.show(curves)
-            if time.monotonic() >= ends_s:
+            if time.monotonic() >= ends_s or is_left():
                 break
         if screen is None:
             say("\n".join(curves.lines(shutil.get_terminal_size().columns)) + "\n")
     return 0
+
+
+@contextlib.contextmanager
+def _keys() -> Iterator[Callable[[], bool]]:
+    """Yield how to know whether q was pressed."""
+    if os.name != "posix":  # there are no keys without Enter elsewhere: Ctrl-C
+        yield lambda: False
+        return
+    with Keyboard() as keyboard:
+        yield lambda: Key.QUIT in keyboard.wait(0.0)
 
 
 class Curves:
@@ -177,7 +189,7 @@ def _has_window() -> bool:
 def _parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="gwrms plot",
-        description="Channels over time, live, until Ctrl-C.",
+        description="Channels over time, live, until q, or Ctrl-C.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

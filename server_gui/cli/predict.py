@@ -101,6 +101,10 @@ def _name(settings: ServerSettings, text: str) -> str:
     if ":" in text:
         return name_of(text)
     known = ", ".join(settings.robots) or "none"
+    if not text:
+        raise SettingsError(
+            f"--robot is empty: say HOST:PORT, or a robot of the server's file, which names {known}"
+        )
     raise SettingsError(
         f"{text!r} is no robot of the server's file, which names {known}; say where it is: {text}=HOST:PORT"
     )

@@ -205,7 +205,7 @@ def parameters(robot: Robot, controls: Controls, look: Look, rows: int) -> Rende
         chosen = name == controls.selected
         style = "bold" if chosen else "default"
         unit = unit_of(name, held.unit, Units())
-        value = words(NONE if held.value is None else f"{float(unit.shown(held.value)):.6g}", style=style)
+        value = words(unit.brief(held.value), style=style)
         grid.add_row(
             "▶" if chosen else " ",
             words(name, style=style),
@@ -233,8 +233,7 @@ def _range(held: ParameterValue, info: ParameterInfo | None, unit: Unit, look: L
     where = needle(held.value, info.min, info.max, look.parameter)
     if not look.roomy:
         return words(where, style=DIM)
-    low, high = float(unit.shown(info.min)), float(unit.shown(info.max))
-    return Text.assemble(f"{low:>6.4g} ", (where, DIM), f" {high:.4g}")
+    return Text.assemble(f"{unit.brief(info.min):>6} ", (where, DIM), f" {unit.brief(info.max)}")
 
 
 def resources(station: Station, look: Look) -> RenderableType:

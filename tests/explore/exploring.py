@@ -30,7 +30,7 @@ def explore(
     judged: Judged,
     first: bool,
 ) -> int:
-    """Look for violations, and say what was found; the exit code."""
+    """Look for violations, and say what was found; the exit status."""
     with tempfile.TemporaryDirectory(prefix="explore-") as folder:
         options = Options(
             seconds,

@@ -15,7 +15,7 @@ _SECONDS = re.compile(r"hours, (\d+) s,")
 
 
 def judge(names: Sequence[str], seconds: float, workers: int) -> int:
-    """A row for each; the exit code is 1 where one was not found."""
+    """A row for each; the exit status is 1 where one was not found."""
     missed = 0
     _say("| defect | found by | order of events | s |")
     _say("|---|---|---|---|")

@@ -4,7 +4,7 @@ A snapshot of components that have only just been started waits for their first 
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from drivers.component import Component
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel, State
 from gateway.handlers import Handlers, on
-from gateway.modules.component.assembly import Robot, assemble, facts
+from gateway.modules.component.assembly import BUILDERS, Robot, assemble, facts
 from gateway.modules.component.findings import bus_infos, emcy_info, finding_infos
 from gateway.process.futures import done, then
 from gateway.streaming.sources import Selection, Source, channel_info, check_globs, narrow, whole
@@ -114,20 +114,21 @@ class ComponentModule:
         wanted = tuple(selections)
         return self._when(lambda: all(map(_has_values, wanted)))
 
-    def read(self, selections: Iterable[Selection]) -> Snapshot:
-        """The values now, and the quality of their components."""
+    def read(self, selections: Iterable[Selection], also: Collection[str] = ()) -> Snapshot:
+        """The values now, and the quality of their components and of those that are named beside them."""
         now_ns = time.monotonic_ns()
         values: dict[str, float | None] = {}
         stamps_ns: dict[str, int | None] = {}
-        quality: dict[str, QualityInfo] = {}
+        asked = set(also)
         for one in selections:
             latest, channels = one.source.latest, one.source.channels
             for index in one.indices:
                 name = channels[index].name
                 values[name], stamps_ns[name] = latest.read(index, now_ns)
-            if one.source.name in self.robot.components:
-                quality[one.source.name] = self.quality(one.source.name, now_ns)
-        return Snapshot(now_ns, values, stamps_ns, quality)
+            asked.add(one.source.name)
+        quality = {name: self.quality(name, now_ns) for name in self._names() if name in asked}
+        # Not `now_ns`: what has come while this was read would be younger than nothing.
+        return Snapshot(time.monotonic_ns(), values, stamps_ns, quality)
 
     def quality(self, name: str, now_ns: int) -> QualityInfo:
         """One component's state, age and counters, and in words what is wrong."""
@@ -142,12 +143,18 @@ class ComponentModule:
         }
 
     def components(self) -> list[ComponentInfo]:
-        """Every component of the file, there or not."""
+        """Every component of the file, there or not, in the file's order."""
         now_ns = time.monotonic_ns()
-        there = [self._info(name, component, now_ns) for name, component in self.robot.components.items()]
-        return there + [self._absent_info(name) for name in self.robot.absent]
+        return [self._info(name, now_ns) for name in self._names()]
 
-    def _info(self, name: str, component: Component, now_ns: int) -> ComponentInfo:
+    def _names(self) -> list[str]:
+        """Of every component of the file, there or not, in the file's order."""
+        return self._context.config.names(*BUILDERS)
+
+    def _info(self, name: str, now_ns: int) -> ComponentInfo:
+        component = self.robot.components.get(name)
+        if component is None:
+            return self._absent_info(name)
         quality = component.quality(now_ns)
         return ComponentInfo(
             name,
@@ -186,12 +193,8 @@ class ComponentModule:
         return then(ready, lambda _none: self._answer(chosen, everything=params.channels is None))
 
     def _answer(self, chosen: list[Selection], *, everything: bool) -> Snapshot:
-        snapshot = self.read(chosen)
-        if everything:  # also of those without channels, and those that are not there
-            now_ns = snapshot.stamp_ns
-            for name in (*self.robot.components, *self.robot.absent):
-                snapshot.quality.setdefault(name, self.quality(name, now_ns))
-        return snapshot
+        # Everything: also those without channels, and those that are not there.
+        return self.read(chosen, self._names() if everything else ())
 
     def _is_there(self, name: str) -> bool:
         component = self.robot.components.get(name)

@@ -189,11 +189,18 @@ _ORDERS: Mapping[str, tuple[Callable[[ProcessUse], Any], bool]] = {
 
 
 def _sorted(rows: list[ProcessUse], params: ResourceSnapshotParams) -> list[ProcessUse]:
-    """In the order asked for; rows whose CPU is not known yet count as the lowest."""
+    """In the order asked for; rows whose CPU is not known yet count as the lowest, and go by their memory.
+
+    In a first look these are all: those that come first are programs then, not threads of the kernel.
+    """
     key, highest_first = _ORDERS[params.sort]
     descending = highest_first if params.descending is None else params.descending
     if params.sort != "cpu":
         return sorted(rows, key=key, reverse=descending)
     known = sorted((row for row in rows if row.cpu_percent is not None), key=key, reverse=descending)
-    unknown = [row for row in rows if row.cpu_percent is None]
+    unknown = sorted(
+        (row for row in rows if row.cpu_percent is None),
+        key=lambda row: row.memory_bytes,
+        reverse=descending,
+    )
     return known + unknown if descending else unknown + known

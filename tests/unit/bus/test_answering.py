@@ -6,9 +6,18 @@ import pytest
 
 from drivers.bus.arrivals import FEWEST, Arrivals
 from drivers.bus.sdo.round_trips import RoundTrips
+from drivers.noted import Noted
+from drivers.samples import Finding
 
 MS = 1_000_000
 SECOND_NS = 1000 * MS
+
+
+def test_another_check_is_another_finding_with_its_own_beginning() -> None:
+    noted = Noted()
+    for at, words, check in ((1, "a", "x"), (2, "b", "x"), (3, "c", "y")):
+        noted.note(at, words, check)
+        assert noted.finding == Finding({1: 1, 2: 1, 3: 3}[at], words, check)
 
 
 def text(trips: RoundTrips | Arrivals, now_ns: int = 0) -> str:

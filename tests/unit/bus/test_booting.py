@@ -109,6 +109,20 @@ def test_a_node_comes_up_though_a_held_stop_asks_it_four_times_a_second(
     assert drive.begun == 1
 
 
+def test_what_is_wrong_with_the_answers_of_a_device_is_told_of_it(
+    gait: CanDevice, drive: Drive, channel: str
+) -> None:
+    with FakeNode(channel, 5, dict(OBJECTS)):
+        gait.node.attach(drive, "drive")
+        until(lambda: gait.node.ready, "it comes up")
+        for second in (1, 2, 3):
+            gait.node.channel.round_trips.unanswered(second * 1_000_000_000)
+        quality = gait.quality(9_000_000_000)
+    (finding,) = quality.findings
+    assert (finding.since_ns, finding.words) == (1_000_000_000, "it answers no SDO, 3 requests in a row")
+    assert "3 requests in a row (for 8 s): is another SDO client" in str(quality.problem)
+
+
 def test_a_boot_goes_on_where_it_was_interrupted(gait: CanDevice, drive: Drive, channel: str) -> None:
     """At every second object."""
     with FakeNode(channel, 5, dict(OBJECTS)) as fake:

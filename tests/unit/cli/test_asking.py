@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -12,6 +13,8 @@ import pytest
 from gateway.main import main
 from tests.fake_robot import JOINTS, FakeRobot, Refusal
 from tests.support.waiting import until
+
+UTC_TEXT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z")
 
 
 @pytest.fixture
@@ -332,6 +335,7 @@ def test_angles_are_shown_in_degrees_where_asked(
     line = json.loads(printed(capsys))
     assert abs(line["values"]["trunk.tilt_forward"]) < 0.06
     assert abs(float(row.split()[1])) < 4.0
+    assert UTC_TEXT.fullmatch(line["utc"])
     assert datetime.fromisoformat(line["utc"]).tzinfo is not None
 
 
@@ -345,14 +349,15 @@ def test_watch_writes_csv_with_a_column_a_channel(
     assert len(lines) == 3
     assert set(lines[0]) == {
         "utc",
-        "stamp_ns",
+        "stamp_ns [ns]",
         "trunk.tilt_side [rad]",
         "left_insole.force [N]",
         "left_knee.state",
     }
     assert [line["left_insole.force [N]"] for line in lines] == [""] * 3
-    stamps = [int(line["stamp_ns"]) for line in lines]
+    stamps = [int(line["stamp_ns [ns]"]) for line in lines]
     assert stamps == sorted(stamps)
+    assert all(UTC_TEXT.fullmatch(line["utc"]) for line in lines)
     assert all(abs(float(line["trunk.tilt_side [rad]"])) <= 0.02 for line in lines)
 
 

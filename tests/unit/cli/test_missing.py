@@ -57,6 +57,10 @@ def test_a_command_that_needs_less_says_so(command: str) -> None:
     assert {"numpy", "rich"} <= brought("sim")
 
 
+def test_every_help_calls_it_exit_status() -> None:
+    assert [one.words for one in commands() if "exit code" in one.parser.format_help().lower()] == []
+
+
 def test_help_that_was_written_down_is_what_the_parser_says() -> None:
     for one in commands():
         said = one.parser.format_help().replace("\n\nresource:", "")  # whose title alone is not written down

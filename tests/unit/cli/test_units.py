@@ -92,3 +92,24 @@ def test_a_number_beyond_all_floats_is_refused_in_every_unit() -> None:
         for unit in (unit for units in UNITS.values() for unit in units):
             with pytest.raises(ValueError, match="is not a number in"):
                 unit.si_value(typed)
+
+
+@pytest.mark.parametrize(
+    ("si", "value", "text"),
+    [
+        ("rad", 0.052, "2.98"),  # of a device that counts milliradians: 3°
+        ("rad", 1.5, "85.9"),
+        ("m", 0.42, "420"),
+        ("N·m", 30.0, "30"),
+        ("N·m", -1234.5678, "-1234.57"),
+        ("", 0.01234, "0.0123"),
+        ("", 0.0, "0"),
+        ("", 2.0**63, "9.22e+18"),
+        ("", 1e-12, "1e-12"),
+        ("N", 1e300, "1e+300"),
+        ("N", float("inf"), "–"),
+        ("N", None, "–"),
+    ],
+)
+def test_what_was_set_is_read_in_few_digits(si: str, value: float | None, text: str) -> None:
+    assert UNITS[si][0].brief(value) == text

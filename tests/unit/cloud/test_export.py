@@ -4,6 +4,7 @@ import csv
 import errno
 import json
 import math
+import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -48,6 +49,7 @@ def test_csv_has_units_in_its_header_and_every_row(store_url: str, tmp_path: Pat
     header, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
     assert header == ["utc", "stamp_ns [ns]", *(f"{name} [{unit}]" for name, unit in UNITS.items())]
     assert len(rows) == BATCHES * ROWS
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z", rows[0][0])  # as in gwrms watch --csv
     found = sorted(float(row[2]) for row in rows)
     assert found == sorted(value(seq, row, 0) for seq in range(21) if seq != 10 for row in range(ROWS))
 

@@ -97,6 +97,30 @@ def test_what_cannot_be_built_is_named_and_the_rest_is_served(client: Client, be
     assert error.kind == "unavailable"
 
 
+def test_a_component_that_is_not_there_stands_where_the_file_has_it(client: Client, bench: Bench) -> None:
+    bench.absent["left_knee"] = (Kind.JOINT, "knee.eds: line 3: no such object")
+    in_the_file = ["left_knee", "right_knee", "gait", "left_insole"]
+    assert [one["name"] for one in client.call("robot.describe")["components"]] == in_the_file
+    assert list(client.call("component.snapshot")["quality"]) == in_the_file
+    assert list(client.call("status.snapshot")["quality"]) == ["left_knee", "right_knee", "left_insole"]
+
+
+def test_no_value_is_younger_than_the_snapshot_that_it_is_in(
+    client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client.call("component.snapshot")
+    latest = bench.insole.latest
+    read = latest.read
+
+    def comes_meanwhile(index: int, now_ns: int) -> tuple[float | None, int | None]:
+        bench.insole.give(1.0, 2.0, stamp_ns=time.monotonic_ns())
+        return read(index, now_ns)
+
+    monkeypatch.setattr(latest, "read", comes_meanwhile)
+    answer = client.call("component.snapshot", channels=["left_insole.*"])
+    assert max(answer["stamps_ns"].values()) <= answer["stamp_ns"]
+
+
 def test_a_component_that_cannot_start_does_not_stop_the_rest(
     client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

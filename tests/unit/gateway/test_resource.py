@@ -143,6 +143,17 @@ def test_orders_and_limits(params: dict[str, Any], pids: list[int]) -> None:
     assert [row.pid for row in host._sorted(rows, wanted)[: wanted.limit]] == pids
 
 
+def test_a_first_look_begins_with_programs_and_not_with_threads_of_the_kernel() -> None:
+    rows = [
+        ProcessUse(2, "kthreadd", None, 0),
+        ProcessUse(1, "init", None, 20),
+        ProcessUse(9, "gwrms", None, 30),
+    ]
+    assert [row.pid for row in host._sorted(rows, ResourceSnapshotParams())] == [9, 1, 2]
+    lowest_first = ResourceSnapshotParams(descending=False)
+    assert [row.pid for row in host._sorted(rows, lowest_first)] == [2, 1, 9]
+
+
 @pytest.mark.parametrize(
     ("words", "shown"),
     [

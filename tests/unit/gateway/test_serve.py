@@ -1,4 +1,4 @@
-"""`gwrms gateway` as a command: its manual, its exit codes, its errors."""
+"""`gwrms gateway` as a command: its manual, its exit status, its errors."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["gateway", "--help"]) == 0
     text = capsys.readouterr().out
     assert all(
-        part in text for part in ("CONFIG", "--host", "--port", "listening on HOST:PORT", "exit codes")
+        part in text for part in ("CONFIG", "--host", "--port", "listening on HOST:PORT", "exit status")
     )
 
 
@@ -72,4 +72,20 @@ def test_what_is_likely_wrong_with_its_file_is_logged_at_its_start_and_not_each_
     _robot(_parser().parse_args([str(file)]), tell=tell)
     assert [record.getMessage().partition(" lets ")[0] for record in caplog.records] == (
         [f"{file}: [gateway] host: '0.0.0.0'"] if tell else []
+    )
+
+
+@pytest.mark.parametrize("tell", [True, False])
+def test_a_device_s_file_that_cannot_be_used_is_logged_at_its_start(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, tell: bool
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(ROBOT.replace('eds = "joint_drive.eds"', 'eds = "joint_drve.eds"', 1), encoding="utf-8")
+    robot = _robot(_parser().parse_args([str(file)]), tell=tell)
+    assert "left_knee" in robot.joint
+    said = [record.getMessage() for record in caplog.records]
+    about = [one for one in said if one.startswith(f"{file}: [joint.left_knee]")]
+    assert len(about) == int(tell)
+    assert all(
+        "there is no EDS file 'joint_drve.eds'" in one and "'joint_drive.eds'?" in one for one in about
     )

@@ -106,7 +106,7 @@ def test_wrong_usage_is_2(arguments: list[str], capsys: pytest.CaptureFixture[st
 def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
     text = capsys.readouterr().out
-    for word in ("robot.toml", "walk", "sit", "2001h", "Exit code", "example"):
+    for word in ("robot.toml", "walk", "sit", "2001h", "Exit status", "example"):
         assert word in text
 
 

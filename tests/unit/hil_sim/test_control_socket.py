@@ -204,7 +204,22 @@ def test_clients_that_vanish_do_no_harm(folder: Path, connect: Callable[[], Raw]
 
 
 def test_nobody_there_is_said_with_what_to_do(tmp_path: Path) -> None:
-    with pytest.raises(SimulatorError, match=r"no simulator answers in .*gwrms sim --dir"):
+    with pytest.raises(
+        SimulatorError, match=r"no simulator answers in .*: none runs there; .*gwrms sim --dir"
+    ):
+        ask(tmp_path, {"list": True})
+    (file := tmp_path / "robot.toml").touch()
+    with pytest.raises(SimulatorError, match="that is no folder; --dir is the folder of gwrms sim"):
+        ask(file, {"list": True})
+    with pytest.raises(SimulatorError, match="there is no such folder; start one") as told:
+        ask(tmp_path / "nowhere", {"list": True})
+    assert "Errno" not in str(told.value)
+
+
+def test_a_simulator_that_was_killed_is_not_there(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as left_behind:
+        left_behind.bind(str(tmp_path / "control"))
+    with pytest.raises(SimulatorError, match="none runs there; start one"):
         ask(tmp_path, {"list": True})
 
 

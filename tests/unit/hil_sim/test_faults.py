@@ -113,7 +113,7 @@ def test_clear_ends_what_is_named_and_where_it_is_named(faults: Faults) -> None:
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        (("nod_lost",), "there is no fault 'nod_lost'; did you mean 'node_lost'?"),
+        (("nod_lost",), "there is no fault 'nod_lost': did you mean 'node_lost'?"),
         (("node_lost",), "node_lost needs to be told where: on is one of left_hip, .*gait"),
         (("node_lost", "trunk"), "node_lost cannot be on 'trunk': on is one of"),
         (("overcurrent", "gait"), "overcurrent cannot be on 'gait'"),
@@ -122,7 +122,12 @@ def test_clear_ends_what_is_named_and_where_it_is_named(faults: Faults) -> None:
         (("node_lost", "gait", "5"), "for_s = '5' is no time"),
         (("reboot", "gait", 5), "reboot is over as soon as it has begun; leave for_s out"),
         (("node_lost", "gait", 1, {"x": 1}), "node_lost has no parameter 'x': it has none"),
-        (("bus_load", None, 1, {"x": 1}), "bus_load has no parameter 'x': percent, cob_id"),
+        (("bus_load", None, 1, {"x": 1}), "bus_load has no parameter 'x': it has percent, cob_id"),
+        (
+            ("bus_load", None, 1, {"percnt": 1}),
+            "no parameter 'percnt': did you mean 'percent'\\? it has percent",
+        ),
+        (("node_lost", "left_nee"), "cannot be on 'left_nee': did you mean 'left_knee'\\? on is one of"),
         (("bus_load", None, 1, {"percent": 101}), "percent = 101 .*give a number from 1 % to 100 %"),
         (("bus_load", None, 1, {"percent": "much"}), "percent = 'much' is not possible"),
         (("bus_load", None, 1, {"percent": True}), "percent = True is not possible"),

@@ -4,6 +4,7 @@ The wearer is the simulator's; frames go through the real parsers and components
 """
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -202,10 +203,13 @@ CASES: dict[str, tuple[Callable[[], Seeded], str]] = {
     "impossible rates": (lambda: Seeded(motion=spinning), "faster than"),
 }
 
+SINCE_AND_CHECK = re.compile(r" \(for \d+ s\): (check|correct|restart)")
+
 
 @pytest.mark.parametrize("name", CASES)
 def test_seeded_fault_and_nothing_else_is_named_within_a_minute_of_walking(name: str) -> None:
     fault, expected = CASES[name]
     said = Robot(fault()).live(Activity.WALK, 60)
     assert any(expected in problem for problem in said), said
+    assert all(SINCE_AND_CHECK.search(problem) for problem in said), said
     assert [problem for problem in said if expected not in problem] == []

@@ -75,6 +75,8 @@ def test_a_robot_that_is_not_there_is_said_and_no_success(
     ("asked", "why"),
     [
         ("exo-2", "'exo-2' is no robot of the server's file, which names exo-01; .* exo-2=HOST:PORT"),
+        ("", "--robot is empty: say HOST:PORT, or a robot of the server's file, which names exo-01"),
+        ("left=", r"left: an address is missing; write HOST:PORT"),
         ("h:x", r"h-x: 'h:x' is not a robot's address; write HOST:PORT"),
         ("left=h:x", r"left: 'h:x' is not a robot's address"),
         ("new=127.0.0.1:1", r"127\.0\.0\.1:1 is exo-01 already"),

@@ -4,6 +4,8 @@ import io
 import json
 import math
 import random
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +16,7 @@ import pytest
 from drivers.cli import listen, live, sensor
 from drivers.errors import SettingsError, Unavailable
 from drivers.identify import Match
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.port.terminals import Terminal, send_until
 from tests.unit.sensor_cli.streams import capture, streams
 
@@ -104,6 +106,26 @@ def test_decode_of_csv_with_an_own_layout_file(tmp_path: Path, capsys: pytest.Ca
     assert [line["counts"] for line in lines(capsys)[:-1]] == [[2, 3, 4], [6, 7, 8]]
 
 
+def test_decode_of_another_format_is_an_error_that_says_which(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = capture(tmp_path, streams()["witmotion"])
+    assert sensor.main(["decode", "--format", "xsens", str(path)]) == 1
+    said = capsys.readouterr()
+    assert '"frames":0' in said.out
+    assert f"{path}: " in said.err
+    assert "belong to no frame of xsens, they are witmotion: say --format witmotion" in said.err
+
+
+@pytest.mark.parametrize("noise", [b"", random.Random(1).randbytes(5000)])
+def test_decode_of_what_is_no_format_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: bytes
+) -> None:
+    path = capture(tmp_path, noise + ANGLE if noise else noise)
+    assert sensor.main(["decode", "--format", "witmotion", str(path)]) == 1
+    assert f"of {len(path.read_bytes())} bytes belong to no frame of witmotion\n" in capsys.readouterr().err
+
+
 def test_decode_names_what_is_wrong(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"table \[frame\]"):
         sensor.main(["decode", "--format", "insole-frame", str(tmp_path / "x")])
@@ -181,6 +203,21 @@ def test_what_is_recorded_is_replayed_at_its_pace(
     out = [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
     assert out[-1]["found"]["match"]["format_name"] == "bno08x-rvc"
     assert not link.exists()
+
+
+def test_a_recording_that_is_terminated_is_whole(terminal: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "walk.bin"
+    argv = [sys.executable, "-m", "gateway.main", "sensor", "record", str(terminal.path), str(file), "--raw"]
+    with (
+        Talking(terminal, streams()["witmotion"]),
+        subprocess.Popen(argv, stdout=subprocess.PIPE) as recording,
+    ):
+        until(lambda: file.exists() and file.stat().st_size > 0)
+        recording.terminate()
+        told, _ = recording.communicate(timeout=WAIT_S)
+    assert recording.returncode == 0
+    assert told.startswith(f"{file.stat().st_size} bytes in ".encode())
+    assert json.loads((tmp_path / "walk.bin.json").read_text())["baudrate"] == 115200
 
 
 def test_recording_never_overwrites(terminal: Terminal, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from gateway.wire.stop import StopInfo
 from server_gui.cli.plot import ROWS, Curves, fitted
 from server_gui.terminal.braille import BLANK, draw, extent
 from tests.fake_robot import FakeRobot
+from tests.support.terminal import Terminal
+from tests.support.waiting import WAIT_S
 
 EMPTY = chr(BLANK)
 
@@ -74,6 +76,14 @@ def test_it_ends_in_time_and_says_so_where_nothing_comes_any_more(capsys: pytest
         argv = ["plot", "trunk", "--terminal", "--seconds", "1.5", "--robot", robot.address]
         assert main(argv) == 0
     assert "nothing came in the last 1." in capsys.readouterr().out
+
+
+def test_q_ends_it() -> None:
+    with FakeRobot() as robot, Terminal("plot", "trunk", "--terminal", "--robot", robot.address) as terminal:
+        terminal.read_until("trunk.tilt_side.*the last 10 s")
+        terminal.press(b"q")
+        terminal.read_until(None)
+        assert terminal.program.wait(WAIT_S) == 0
 
 
 def test_channels_of_the_robots_computer_are_asked_of_their_module() -> None:
