@@ -10,7 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from tests.stores import (  # noqa: F401  # fixtures, for every test
     backend,
@@ -35,8 +35,11 @@ def hear_ctrl_c() -> None:
 
 
 hear_ctrl_c()
-settings.register_profile("quick", max_examples=40)  # a share of what Hypothesis gives by itself
-settings.register_profile("nightly", settings.get_profile("default"))
+# What a busy computer needs longer for is no failure of a test.
+settings.register_profile("nightly", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "quick", settings.get_profile("nightly"), max_examples=40
+)  # a share of what is usual
 if settings.get_current_profile_name() == "default":
     settings.load_profile("quick")
 
