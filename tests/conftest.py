@@ -1,11 +1,12 @@
 """Rules for every test: a leaked thread, child process, socket or terminal fails the test that leaked it."""
 
+import gc
 import os
 import re
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import psutil
@@ -54,6 +55,16 @@ def _marks_of(item: pytest.Item, marks: list[tuple[str, str]]) -> Iterator[str]:
     callspec = getattr(item, "callspec", None)
     if callspec is not None and callspec.params.get("backend") == "s3" and not item.nodeid.startswith(SMOKE):
         yield "s3"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """All that is collected stays: to look through it for garbage meanwhile takes each worker seconds."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)
