@@ -17,6 +17,12 @@ from tests.support.waiting import until
 from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving
 
 
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What does not come at a cold start is not waited for as long as on a robot."""
+    monkeypatch.setattr("gateway.modules.component.module.COLD_S", 0.1)
+
+
 def test_a_snapshot_has_value_stamp_and_quality_of_every_channel(client: Client, bench: Bench) -> None:
     answer = client.call("component.snapshot")
     assert answer["values"] == {
@@ -74,6 +80,7 @@ def test_a_cold_start_waits_for_the_first_values(
     assert slow.answer(id_)["values"]["left_insole.force"] == 12.0
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_cold_start_does_not_wait_for_ever(client: Client, bench: Bench) -> None:
     bench.insole.latest.clear()
     answer = client.call("component.snapshot")
@@ -109,6 +116,7 @@ def test_a_component_that_cannot_start_does_not_stop_the_rest(
     assert answer["values"]["left_knee.position"] == 0.5
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_component_that_is_lost_says_why(client: Client, bench: Bench) -> None:
     bench.gait.lost = "no frame at all from node 16: check its power"
     described = client.call("robot.describe")
