@@ -17,12 +17,6 @@ from tests.support.waiting import until
 from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving
 
 
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What does not come at a cold start is not waited for as long as on a robot."""
-    monkeypatch.setattr("gateway.modules.component.module.COLD_S", 0.1)
-
-
 def test_a_snapshot_has_value_stamp_and_quality_of_every_channel(client: Client, bench: Bench) -> None:
     answer = client.call("component.snapshot")
     assert answer["values"] == {

@@ -109,7 +109,10 @@ class TestGuardDuringAReset:
 
 
 class TestControllers:
-    def test_one_that_does_not_answer_keeps_the_hold_and_is_named(self, bench: Bench, tmp_path: Path) -> None:
+    def test_one_that_does_not_answer_keeps_the_hold_and_is_named(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("gateway.modules.stop.controllers.INSIST_S", 0.1)
         with stopped(tmp_path, CONTROLLER) as client:
             _silence(bench, on=True)
             answer = client.call("robot.reset")
@@ -124,7 +127,10 @@ class TestControllers:
         assert answer["held"] is True
         assert "not there" in answer["problems"]["gait"]
 
-    def test_one_that_goes_on_by_itself_keeps_the_hold(self, bench: Bench, tmp_path: Path) -> None:
+    def test_one_that_goes_on_by_itself_keeps_the_hold(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("gateway.modules.stop.controllers.INSIST_S", 0.1)
         with stopped(tmp_path, CONTROLLER) as client:
             bench.gait.node.before_upload = lambda _index: bench.gait.node.objects.update(
                 {GAIT_COMMAND: b"\x01"}
