@@ -15,47 +15,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from gateway import __version__
-    from gateway.client import (
-        Address,
-        BadAddress,
-        Batch,
-        CallTimeout,
-        Client,
-        ClientError,
-        ClockOffset,
-        ConnectionState,
-        LinkLost,
-        LinkSettings,
-        NotConnected,
-        ProtocolError,
-        RemoteError,
-        Robot,
-        StreamCounters,
-        Subscription,
-        Unreachable,
-    )
+    from gateway import __version__ as __version__
+    from gateway.client import *  # noqa: F403
 
-__all__ = [
-    "Address",
-    "BadAddress",
-    "Batch",
-    "CallTimeout",
-    "Client",
-    "ClientError",
-    "ClockOffset",
-    "ConnectionState",
-    "LinkLost",
-    "LinkSettings",
-    "NotConnected",
-    "ProtocolError",
-    "RemoteError",
-    "Robot",
-    "StreamCounters",
-    "Subscription",
-    "Unreachable",
-    "__version__",
-]
 _HOME: Final = Path(__file__).resolve().parents[1]  # of all that was installed with this
 _PART: Final = "gateway"  # all that the client needs of the rest
 
@@ -83,6 +45,10 @@ _import_ours()
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    client = import_module("gateway.client")
+    names = [*client.__all__, "__version__"]
+    if name == "__all__":
+        return names
+    if name not in names:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module("gateway" if name == "__version__" else "gateway.client"), name)
+    return getattr(import_module("gateway") if name == "__version__" else client, name)

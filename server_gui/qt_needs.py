@@ -46,6 +46,16 @@ def check(environment: Mapping[str, str] = os.environ) -> None:
     check_libraries(wanted, _is_there)
 
 
+def can_open(environment: MutableMapping[str, str] = os.environ) -> bool:
+    """Whether the window can be opened here; else the terminal is as good a place."""
+    prefer_x(environment)
+    try:
+        check(environment)
+    except (NoWindow, importlib.metadata.PackageNotFoundError):
+        return False
+    return True
+
+
 def prefer_x(environment: MutableMapping[str, str] = os.environ) -> None:
     """On Wayland, open the window by its X server where it has one.
 

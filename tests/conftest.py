@@ -1,16 +1,17 @@
 """Rules for every test: a leaked thread, child process, socket or terminal fails the test that leaked it."""
 
+import gc
 import os
 import re
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import psutil
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from tests.stores import (  # noqa: F401  # fixtures, for every test
     backend,
@@ -35,8 +36,11 @@ def hear_ctrl_c() -> None:
 
 
 hear_ctrl_c()
-settings.register_profile("quick", max_examples=40)  # a share of what Hypothesis gives by itself
-settings.register_profile("nightly", settings.get_profile("default"))
+# What a busy computer needs longer for is no failure of a test.
+settings.register_profile("nightly", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "quick", settings.get_profile("nightly"), max_examples=40
+)  # a share of what is usual
 if settings.get_current_profile_name() == "default":
     settings.load_profile("quick")
 
@@ -51,6 +55,16 @@ def _marks_of(item: pytest.Item, marks: list[tuple[str, str]]) -> Iterator[str]:
     callspec = getattr(item, "callspec", None)
     if callspec is not None and callspec.params.get("backend") == "s3" and not item.nodeid.startswith(SMOKE):
         yield "s3"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """All that is collected stays: to look through it for garbage meanwhile takes each worker seconds."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -1,13 +1,13 @@
 """The zero of a trunk's tilt: the rotation that makes "standing upright now" read zero, and its file."""
 
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 
-from drivers.errors import DriverError, SettingsError
+from drivers import calibration_file
+from drivers.errors import DriverError
 from drivers.imu import rotation
 from drivers.imu.rotation import Quaternion, Vector
 
@@ -67,15 +67,7 @@ def load(path: Path) -> Quaternion:
         SettingsError: it cannot be read or is wrong; the message names file and key.
 
     """
-    try:
-        return msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Zero).rotation
-    except OSError as error:
-        raise SettingsError(
-            f"IMU zero {path} cannot be read ({error.strerror}): gwrms calibrate imu writes it; "
-            "leave the key `zero` out until then"
-        ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        raise SettingsError(f"IMU zero {path}: {error}") from error
+    return calibration_file.load(path, Zero, "IMU zero", "gwrms calibrate imu", "zero").rotation
 
 
 def text(zero: Quaternion, taken_utc: str) -> str:

@@ -1,13 +1,13 @@
 """From a cell's counts to its pressure: polarity, tare, a law and where it saturates."""
 
 import bisect
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, cast
 
 import msgspec
 
+from drivers import calibration_file
 from drivers.errors import SettingsError
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -99,15 +99,9 @@ def load(path: Path) -> Calibration:
         SettingsError: it cannot be read or is wrong; the message names file and key.
 
     """
-    try:
-        return msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Calibration)
-    except OSError as error:
-        raise SettingsError(
-            f"insole calibration {path} cannot be read ({error.strerror}): gwrms calibrate insole writes it; "
-            "leave the key `calibration` out until then"
-        ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        raise SettingsError(f"insole calibration {path}: {error}") from error
+    return calibration_file.load(
+        path, Calibration, "insole calibration", "gwrms calibrate insole", "calibration"
+    )
 
 
 def loaded_counts(cell: CellCalibration) -> Callable[[float], float]:

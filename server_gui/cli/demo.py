@@ -1,12 +1,11 @@
 """The server's commands. What needs rich is imported only when a command runs."""
 
 import argparse
-import importlib.metadata
 import math
 import sys
 from pathlib import Path
 
-from server_gui.qt_needs import NoWindow, check
+from server_gui.qt_needs import can_open
 
 EPILOG = """Where there is a display, the view is the window (gwrms gui --help); else it is in the terminal.
 
@@ -29,7 +28,7 @@ def demo(argv: list[str]) -> int:
     arguments = _parser().parse_args(argv)
     from server_gui.terminal.demo import Options, run
 
-    window = not (arguments.headless or arguments.terminal or arguments.picture) and _can_open_a_window()
+    window = not (arguments.headless or arguments.terminal or arguments.picture) and can_open()
     screen = sys.stdout.isatty() and sys.stdin.isatty()
     if not (screen or window or arguments.headless):
         sys.stderr.write("gwrms demo: this is no terminal, so the run is headless\n")
@@ -43,15 +42,6 @@ def demo(argv: list[str]) -> int:
             picture=arguments.picture,
         )
     )
-
-
-def _can_open_a_window() -> bool:
-    """Whether there are a display and all that the window needs; else the terminal is as good a place."""
-    try:
-        check()
-    except (NoWindow, importlib.metadata.PackageNotFoundError):
-        return False
-    return True
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,8 +3,6 @@
 import argparse
 import collections
 import contextlib
-import importlib.metadata
-import os
 import shutil
 import sys
 import time
@@ -25,7 +23,7 @@ from gateway.cli.connect import (
 from gateway.cli.shown import Channels
 from gateway.cli.text import measured, say
 from gateway.client import LinkSettings, Robot
-from server_gui.qt_needs import NoWindow, check, prefer_x
+from server_gui.qt_needs import can_open
 from server_gui.terminal.braille import Sample, draw, extent
 from server_gui.terminal.keys import Key, Keyboard
 
@@ -49,7 +47,7 @@ examples
 def main(argv: list[str]) -> int:
     """Run `gwrms plot`."""
     arguments = _parser().parse_args(argv)
-    if not arguments.terminal and _has_window():
+    if not arguments.terminal and can_open():
         return _window(arguments)
     return _terminal(arguments)
 
@@ -175,15 +173,6 @@ class _Screen:
         sys.stdout.write(f"{up}\x1b[J")
         say("\n".join(lines) + "\n")
         self._lines = len(lines)
-
-
-def _has_window() -> bool:
-    try:
-        prefer_x()
-        check()
-    except (NoWindow, importlib.metadata.PackageNotFoundError):
-        return False
-    return True
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -53,6 +53,13 @@ def test_on_wayland_its_x_server_is_taken_unless_somebody_says_otherwise(
     assert environment.get("QT_QPA_PLATFORM") == platform
 
 
+def test_whether_the_window_can_be_opened_is_asked_of_where_it_would_be() -> None:
+    environment = {"WAYLAND_DISPLAY": "wayland-0", "DISPLAY": ":0"}
+    qt_needs.can_open(environment)
+    assert environment["QT_QPA_PLATFORM"] == "xcb;wayland"
+    assert not qt_needs.can_open({})
+
+
 def test_a_wrong_address_is_refused_before_anything_is_opened() -> None:
     with pytest.raises(SettingsError, match="is not a robot's address"):
         main(["--robot", "exo-01=host:port"])

@@ -422,7 +422,6 @@ class ControlMachine(RuleBasedStateMachine):
 ControlMachine.TestCase.settings = settings(
     max_examples=examples(40),
     stateful_step_count=50,
-    deadline=None,
     suppress_health_check=list(HealthCheck),
     phases=(Phase.explicit, Phase.reuse, Phase.generate),  # making a failure smaller takes minutes here
 )

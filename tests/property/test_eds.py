@@ -90,7 +90,7 @@ def usable_or_refused(content: bytes) -> None:
 
 
 @given(edits)
-@settings(max_examples=examples(300), deadline=None)
+@settings(max_examples=examples(300))
 def test_a_damaged_file_is_refused_or_usable(damage: list[tuple[int, int, bytes]]) -> None:
     content = SOUND
     for position, length, replacement in damage:
@@ -99,13 +99,12 @@ def test_a_damaged_file_is_refused_or_usable(damage: list[tuple[int, int, bytes]
 
 
 @given(st.permutations(SOUND.splitlines(keepends=True)))
-@settings(max_examples=examples(150), deadline=None)
+@settings(max_examples=examples(150))
 def test_lines_in_any_order_are_refused_or_usable(lines: list[bytes]) -> None:
     usable_or_refused(b"".join(lines))
 
 
 @given(st.binary(max_size=400))
-@settings(deadline=None)
 def test_garbage_is_refused_or_usable(content: bytes) -> None:
     usable_or_refused(content)
 

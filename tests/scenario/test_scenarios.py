@@ -93,7 +93,7 @@ def test_a_failure_while_the_computer_had_no_time_is_inconclusive_and_the_exit_s
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "never.toml"
-    file.write_text('[[expect]]\ntruth = "gait.state"\nis = "asleep"\nwithin_s = [0, 10]\n', encoding="utf-8")
+    file.write_text('[[expect]]\ntruth = "gait.state"\nis = "asleep"\nwithin_s = [0, 6]\n', encoding="utf-8")
     command = [sys.executable, "-P", "-m", "gateway.main", "sim", "run", str(file)]
     with subprocess.Popen([*command, "--dir", str(tmp_path)], stdout=subprocess.PIPE, text=True) as running:
         until(lambda: answers(tmp_path), "the robot runs")
@@ -102,7 +102,7 @@ def test_a_failure_while_the_computer_had_no_time_is_inconclusive_and_the_exit_s
         running.send_signal(signal.SIGCONT)
         said, _ = running.communicate(timeout=DEADLINE_S)
     assert running.returncode == 3, said
-    assert "inconclusive: this computer was too slow between 0 and 10 s" in said
+    assert "inconclusive: this computer was too slow between 0 and 6 s" in said
     assert said.splitlines()[-1] == "1 scenario: 1 inconclusive"
 
 

@@ -1,8 +1,9 @@
 """The extras of GWRMS: the packages that each brings, and what is imported of them."""
 
+import functools
 import importlib.metadata
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -53,7 +54,13 @@ def _required(name: str, extras: Iterable[str]) -> list[str]:
     ]
 
 
+@functools.cache
+def distributions() -> Mapping[str, list[str]]:
+    """Of each name that can be imported, which packages bring it; to find out takes most of a second."""
+    return importlib.metadata.packages_distributions()
+
+
 def imported(packages: set[str]) -> set[str]:
     """The names by which we import what is in these packages."""
-    found = importlib.metadata.packages_distributions()
+    found = distributions()
     return {name for name, of in found.items() if packages & set(map(canonicalize_name, of))} - NEVER

@@ -88,7 +88,7 @@ class Reader:
             assert known in (None, self.server.value)
 
 
-@settings(max_examples=examples(150), deadline=None)
+@settings(max_examples=examples(150))
 @given(st.lists(fates, max_size=40), steps)
 def test_nothing_is_believed_that_is_older_than_its_question(drawn: list[Fate], names: list[str]) -> None:
     server = LateServer(iter(drawn))
@@ -97,7 +97,7 @@ def test_nothing_is_believed_that_is_older_than_its_question(drawn: list[Fate], 
         reader.step(name)
 
 
-@settings(max_examples=examples(50), deadline=None)
+@settings(max_examples=examples(50))
 @given(st.lists(fates, max_size=40), steps)
 def test_once_its_answers_come_again_everything_can_be_asked(drawn: list[Fate], names: list[str]) -> None:
     server = LateServer(iter(drawn))

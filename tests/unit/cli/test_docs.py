@@ -1,6 +1,7 @@
 """`gwrms docs`, and what help and messages point at: it is there wherever GWRMS is installed."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -20,8 +21,13 @@ OF_THE_TREE = re.compile(r"\b(?:docs|scenarios|tests|tools)/\w|\./dev\b|CONTRIBU
 NAMED = re.compile(r"gwrms docs ([a-z][a-z/-]*[a-z])(?: and ([a-z-]+))?")
 
 
-def said() -> Iterator[tuple[Path, str]]:
+@functools.cache
+def said() -> list[tuple[Path, str]]:
     """Every text in our code that is no docstring."""
+    return list(_said())
+
+
+def _said() -> Iterator[tuple[Path, str]]:
     for part in PARTS:
         for file in (ROOT / part).rglob("*.py"):
             tree = ast.parse(file.read_text(encoding="utf-8"))

@@ -1,13 +1,12 @@
 """A part of GWRMS alone: every help is there, and what is missing is named with the extra that brings it."""
 
-import importlib.metadata
 import subprocess
 import sys
 
 import pytest
 
 from gateway import main, missing
-from tests.support.extras import EXTRAS, ROOT, brought, imported, names, own
+from tests.support.extras import EXTRAS, ROOT, brought, distributions, imported, names, own
 from tools.draw.commands import commands
 
 # In a process of its own: what is imported once cannot be missing any more.
@@ -44,9 +43,8 @@ def test_help_needs_no_extra() -> None:
 
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_what_is_missing_is_named_with_an_extra_that_brings_it(extra: str) -> None:
-    packages = importlib.metadata.packages_distributions()
     for name in imported(own(extra)):
-        assert own(missing.extra_of(name)) & names(packages[name]), name
+        assert own(missing.extra_of(name)) & names(distributions()[name]), name
         assert f"pip install 'gwrms[{missing.extra_of(name)}]'" in missing.explained(name)
 
 

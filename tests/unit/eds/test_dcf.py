@@ -219,7 +219,7 @@ def test_an_eds_is_no_dcf(tmp_path: Path) -> None:
         dcf.read(made(tmp_path, ODD, {}), 5)
 
 
-@settings(max_examples=examples(200), deadline=None)
+@settings(max_examples=examples(200))
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_words(data: st.DataObject) -> None:
     text = bytearray(FOREIGN.replace("{speed}", "5").encode())

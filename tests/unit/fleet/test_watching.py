@@ -61,7 +61,9 @@ def test_a_thread_that_dies_again_and_again_does_not_work() -> None:
     assert watch.look() == ()
 
 
-def test_a_thread_that_waits_as_long_as_it_takes_does_not_stand_still_but_its_death_is_said() -> None:
+def test_a_thread_that_waits_as_long_as_it_takes_does_not_stand_still_but_its_death_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     ending = threading.Event()
 
     def run() -> None:
@@ -71,7 +73,8 @@ def test_a_thread_that_waits_as_long_as_it_takes_does_not_stand_still_but_its_de
     watch = ThreadWatch(())
     watch.add(worker)
     worker.start()
-    time.sleep(STILL_S + 0.3)
+    later = SimpleNamespace(monotonic=lambda: time.monotonic() + 1000 * STILL_S)
+    monkeypatch.setattr("server_gui.core.threads.supervision.time", later)
     assert watch.look() == ()
     ending.set()  # it returns, though its owner has not asked for that
     until(watch.look)

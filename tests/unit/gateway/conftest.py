@@ -18,6 +18,12 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 
 @pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What does not come at a cold start is not waited for as long as on a robot."""
+    monkeypatch.setattr("gateway.modules.component.module.COLD_S", 0.1)
+
+
+@pytest.fixture
 def connect(bench: Bench, tmp_path: Path) -> Iterator[Callable[[], Client]]:
     """Another client of one gateway, at every call."""
     with serving(config(tmp_path)) as address, ExitStack() as clients:

@@ -16,7 +16,7 @@ from gateway.wire import limits
 from gateway.wire.framing import BadLine, RpcError, decode_request
 from gateway.wire.limits import BAD_LINES, GLOBS, NAME_LENGTH, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
 from tests.support.waiting import WAIT_S
-from tests.unit.gateway.harness import Answered, Client, config, serving
+from tests.unit.gateway.harness import Answered, Bench, Client, config, serving
 
 HTTP = b"POST / HTTP/1.1\r\nHost: robot\r\nContent-Type: text/plain\r\nContent-Length: 200\r\n\r\n"
 TLS = b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"
@@ -25,7 +25,7 @@ CLOCK = b'{"jsonrpc":"2.0","id":1,"method":"clock.read"}\n'
 
 
 @pytest.fixture
-def address(tmp_path: Path) -> Iterator[tuple[str, int]]:
+def address(bench: Bench, tmp_path: Path) -> Iterator[tuple[str, int]]:
     with serving(config(tmp_path)) as address:
         yield address
 

@@ -74,6 +74,7 @@ def test_a_cold_start_waits_for_the_first_values(
     assert slow.answer(id_)["values"]["left_insole.force"] == 12.0
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_cold_start_does_not_wait_for_ever(client: Client, bench: Bench) -> None:
     bench.insole.latest.clear()
     answer = client.call("component.snapshot")
@@ -133,6 +134,7 @@ def test_a_component_that_cannot_start_does_not_stop_the_rest(
     assert answer["values"]["left_knee.position"] == 0.5
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_component_that_is_lost_says_why(client: Client, bench: Bench) -> None:
     bench.gait.lost = "no frame at all from node 16: check its power"
     described = client.call("robot.describe")

@@ -246,7 +246,7 @@ GARBAGE = st.one_of(
 )
 
 
-@settings(max_examples=examples(60), deadline=None)
+@settings(max_examples=examples(60))
 @given(pieces=st.lists(GARBAGE, max_size=8), cuts=st.lists(st.integers(0, 2000), max_size=4))
 def test_garbage_in_any_pieces_hurts_neither_the_daemon_nor_another_session(
     garbage_gateway: tuple[str, int], pieces: list[bytes], cuts: list[int]

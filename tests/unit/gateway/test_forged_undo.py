@@ -117,7 +117,8 @@ def check(bench: Bench) -> None:
 
 @given(entries=forged, places=damage)
 @settings(
-    max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(60),
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 def test_nothing_is_written_that_the_robots_file_does_not_allow(
     calm: Bench, tmp_path: Path, entries: list[dict[str, Any]], places: list[Any]

@@ -184,11 +184,10 @@ class TestTrip:
     def test_the_stop_is_held_with_its_reason_and_written_down(self, serve: Serve, bench: Bench) -> None:
         client = serve(LIMIT)
         bend(bench, 2.5)
-        until(lambda: client.call("robot.describe")["stop"]["held"], "held")
-        stop = client.call("robot.describe")["stop"]
+        held = until(lambda: client.call("robot.describe")["stop"]["reason"], "held, and why")
         reason = "left_knee.position: 2.5 rad, below -0.1 rad or above 2 rad"
-        assert stop["reason"] == f"guard rule knees: {reason}"
-        until(lambda: journal(client, "stop answered"), "answered")
+        assert held == f"guard rule knees: {reason}"
+        until(lambda: journal(client, "stop answered") and journal(client, "alarm"), "both are told")
         found = {one["what"]: one for one in journal(client) if one["who"] == "guard"}
         assert found["alarm"]["reason"] == reason
         assert found["alarm"]["about"] == "knees"

@@ -109,10 +109,14 @@ class TestGuardDuringAReset:
 
 
 class TestControllers:
-    def test_one_that_does_not_answer_keeps_the_hold_and_is_named(self, bench: Bench, tmp_path: Path) -> None:
+    def test_one_that_does_not_answer_keeps_the_hold_and_is_named(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         with stopped(tmp_path, CONTROLLER) as client:
             _silence(bench, on=True)
-            answer = client.call("robot.reset")
+            with monkeypatch.context() as patch:  # it is given up soon, and has its time afterwards
+                patch.setattr("gateway.modules.stop.controllers.INSIST_S", 0.1)
+                answer = client.call("robot.reset")
             assert (answer["held"], list(answer["problems"])) == (True, ["gait"])
             _silence(bench, on=False)
             assert client.call("robot.reset")["held"] is False
@@ -124,7 +128,10 @@ class TestControllers:
         assert answer["held"] is True
         assert "not there" in answer["problems"]["gait"]
 
-    def test_one_that_goes_on_by_itself_keeps_the_hold(self, bench: Bench, tmp_path: Path) -> None:
+    def test_one_that_goes_on_by_itself_keeps_the_hold(
+        self, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("gateway.modules.stop.controllers.INSIST_S", 0.1)
         with stopped(tmp_path, CONTROLLER) as client:
             bench.gait.node.before_upload = lambda _index: bench.gait.node.objects.update(
                 {GAIT_COMMAND: b"\x01"}

@@ -146,6 +146,7 @@ def test_what_is_settled_is_not_taken_back_again(robot: Tuned, bench: Bench) -> 
 # Two facts: whether the node answers, and whether samples come
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_drive_whose_samples_are_missing_is_taken_back_all_the_same(robot: Tuned, bench: Bench) -> None:
     write = robot.write({MAX_TORQUE: 50}, LONG_S)
     bench.left.lost = "no position for 3 s"

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import pytest
+
 from drivers.errors import DeviceAbort, DeviceTimeout
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import Bench
@@ -76,6 +78,7 @@ def test_a_node_that_reading_shows_not_to_be_trusted_is_not_written_to(robot: Tu
     assert robot.told("write") == []  # it was not even begun
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_node_that_has_not_come_up_is_not_written_to(robot: Tuned, bench: Bench) -> None:
     bench.gait.node.ready = False
     bench.gait.lost = "no frame of node 16"

@@ -45,16 +45,29 @@ def test_an_encoder_that_is_stuck_is_named_until_it_moves_again(tmp_path: Path, 
 
 
 @pytest.mark.parametrize(("degrees", "after_s"), [(5, 4.31), (-5, 4.30), (5, 4.33), (5, 4.345), (20, 4.34)])
-def test_an_encoder_that_jumps_is_named_for_a_while(tmp_path: Path, degrees: int, after_s: float) -> None:
+def test_an_encoder_that_jumps_is_named(tmp_path: Path, degrees: int, after_s: float) -> None:
     """Whenever between two looks it does: the drive pulls the joint back at once."""
-    robot = WatchedRobot(tmp_path, Scenario.STAND)
+    robot = after_a_jump(tmp_path, degrees, after_s)
+    assert "its position jumped by" in robot.words("left_knee")
+    assert "check its encoder and the encoder's cable, and home it again" in robot.words("left_knee")
+    assert set(robot.said) == {"left_knee"}
+
+
+def test_a_jump_is_shown_for_a_while(tmp_path: Path) -> None:
+    robot = after_a_jump(tmp_path, 5, 4.31)
+    robot.run(JUMP_SHOWN_S - 2)
+    assert "its position jumped by" in robot.words("left_knee")
+    assert set(robot.run(2)) == {"left_knee"}
+    assert robot.words("left_knee") == ""
+
+
+def after_a_jump(folder: Path, degrees: int, after_s: float) -> WatchedRobot:
+    """A second after the left knee's encoder has jumped."""
+    robot = WatchedRobot(folder, Scenario.STAND)
     robot.run(after_s)
     robot.faults.begin("encoder_jump", "left_knee", params={"degrees": degrees})
     robot.run(1)
-    assert "its position jumped by" in robot.words("left_knee")
-    assert "check its encoder and the encoder's cable, and home it again" in robot.words("left_knee")
-    assert set(robot.run(JUMP_SHOWN_S)) == {"left_knee"}
-    assert robot.words("left_knee") == ""
+    return robot
 
 
 def test_a_joint_that_is_all_but_jammed_is_to_be_looked_at(tmp_path: Path) -> None:

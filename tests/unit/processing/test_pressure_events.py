@@ -79,7 +79,7 @@ def test_a_bounce_is_no_event() -> None:
 WHOLE = fed(PressureEvents(Leg.LEFT).feed, walk())
 
 
-@settings(deadline=None, max_examples=examples(20))
+@settings(max_examples=examples(20))
 @given(st.floats(2.0, 20.0), st.floats(0.15, 4.0))
 def test_nothing_is_invented_in_a_gap(begin_s: float, lasting_s: float) -> None:
     cut = [(at_ns, value) for at_ns, value in walk() if not begin_s <= at_ns / 1e9 <= begin_s + lasting_s]
@@ -92,7 +92,7 @@ def test_nothing_is_invented_in_a_gap(begin_s: float, lasting_s: float) -> None:
     assert [event.after_gap for event in after[:2]] in ([], [True], [True, False])
 
 
-@settings(deadline=None, max_examples=examples(50))
+@settings(max_examples=examples(50))
 @given(st.lists(st.tuples(st.integers(-50, 400), st.one_of(st.none(), st.floats(-1e4, 1e4))), max_size=300))
 def test_whatever_comes_events_alternate_and_go_on_in_time(steps: list[tuple[int, float | None]]) -> None:
     detector, now_ns, events = PressureEvents(Leg.RIGHT), 10_000_000_000, list[GaitEvent]()
