@@ -3,6 +3,7 @@
 import argparse
 import collections
 import contextlib
+import os
 import shutil
 import sys
 import time
