@@ -1,4 +1,4 @@
-"""Every shell block of tutorial and how-to does what it shows, at a robot that is simulated."""
+"""Every shell block of README, tutorial and how-to does what it shows, at a robot that is simulated."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -7,13 +7,15 @@ from typing import Final
 
 import pytest
 
-from tests.docs.newcomer import Newcomer
-from tests.docs.pages import SHELLS, Command, blocks, name, pages
+from tests.newcomer.newcomer import Newcomer
+from tests.newcomer.pages import SHELLS, Command, Page, blocks, pages
 from tests.unit.insole.encode import Sender
 from tests.unit.training.walkers import day, put
 
 EDS: Final = Path(__file__).parents[2] / "eds" / "files"
 PAGE_S: Final = 300  # a page with a simulator, on a busy machine
+ROBOT: Final = "~/robot"
+READY: Final = '{"ready": true, …'
 
 # Blocks that a test cannot run, a page in their order, and why not.
 BY_HAND: Final[Mapping[str, tuple[str, ...]]] = {
@@ -44,7 +46,7 @@ def _vendors_file(newcomer: Newcomer) -> None:
 
 
 def _a_sensor(newcomer: Newcomer) -> None:
-    newcomer.start(Command("gwrms sim --dir ~/sensor", ('{"ready": true, …',)))
+    newcomer.start(Command("gwrms sim --dir ~/sensor", (READY,)))
 
 
 def _a_recorded_robot(newcomer: Newcomer) -> None:
@@ -64,8 +66,26 @@ def _three_wearers(newcomer: Newcomer) -> None:
     put((data / "store").as_uri(), data / "spool", wearers)
 
 
+def _a_robot(newcomer: Newcomer) -> None:
+    """Its file, and whatever it has that is plugged in."""
+    newcomer.start(Command(f"gwrms sim --dir {ROBOT}", (READY,)))
+
+
+def _a_robot_with_files(newcomer: Newcomer) -> None:
+    _vendors_file(newcomer)
+    _a_robot(newcomer)
+
+
+def _a_robot_that_is_served(newcomer: Newcomer) -> None:
+    _a_robot(newcomer)
+    newcomer.start(Command(f"gwrms gateway {ROBOT}/robot.toml", ("listening on …",)))
+
+
 # What a page takes for granted.
 GIVEN: Final[Mapping[str, Callable[[Newcomer], None]]] = {
+    "README.md: One command": Newcomer.clone,
+    "README.md: You have a robot and want it monitored": _a_robot_with_files,
+    "README.md: You write software": _a_robot_that_is_served,
     "how-to/add-an-imu.md": _a_sensor,
     "how-to/bench.md": _a_recorded_robot,
     "how-to/first-robot.md": _vendors_file,
@@ -75,36 +95,37 @@ GIVEN: Final[Mapping[str, Callable[[Newcomer], None]]] = {
 
 # What a page names that only a real robot has, and what is here in its place.
 STAND_INS: Final[Mapping[str, Mapping[str, str]]] = {
+    "README.md: You have a robot and want it monitored": {"ROBOT:": "127.0.0.1:", "/etc/gwrms": "~/robot"},
     "how-to/add-an-imu.md": {"/dev/ttyUSB0": "sensor/trunk"},
     "how-to/wire-a-sensor.md": {"/dev/serial/by-id/usb-insole-left": "robot/left_insole"},
 }
 
 
-def _has_shell(page: Path) -> bool:
-    return any(block.is_shell and not block.by_hand for block in blocks(page))
+def _is_typed(page: Page) -> bool:
+    return any(block.is_script or (block.is_shell and not block.by_hand) for block in blocks(page))
 
 
 @pytest.mark.usefixtures("store_libraries")  # they open sockets once, for good
 @pytest.mark.timeout(PAGE_S)
-@pytest.mark.parametrize("page", [page for page in pages() if _has_shell(page)], ids=name)
-def test_what_the_page_shows_happens(page: Path) -> None:
-    with Newcomer(STAND_INS.get(name(page), {})) as newcomer:
-        if name(page) in GIVEN:
-            GIVEN[name(page)](newcomer)
+@pytest.mark.parametrize("page", [page for page in pages() if _is_typed(page)], ids=lambda page: page.name)
+def test_what_the_page_shows_happens(page: Page, programs: Path) -> None:
+    with Newcomer(programs, STAND_INS.get(page.name, {})) as newcomer:
+        if page.name in GIVEN:
+            GIVEN[page.name](newcomer)
         for block in blocks(page):
             newcomer.type(block)
         newcomer.end()
 
 
 def test_nobody_hides_a_block_from_being_run() -> None:
-    found = {name(page): sum(block.is_shell and block.by_hand for block in blocks(page)) for page in pages()}
+    found = {page.name: sum(block.is_shell and block.by_hand for block in blocks(page)) for page in pages()}
     assert {page: count for page, count in found.items() if count} == {
         page: len(reasons) for page, reasons in BY_HAND.items()
     }
 
 
-@pytest.mark.parametrize("page", pages(), ids=name)
-def test_what_is_typed_stands_in_a_block_that_is_run(page: Path) -> None:
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_what_is_typed_stands_in_a_block_that_is_run(page: Page) -> None:
     for block in blocks(page):
         if block.language not in SHELLS:
             assert not block.text.startswith(("$ ", "gwrms ", "./dev ")), block.text
