@@ -77,15 +77,21 @@ class Newcomer:
         terminal.wait()
 
     def end(self) -> None:
-        """Ctrl-C in every terminal, the newest first: each ends well."""
+        """Ctrl-C in every terminal, the newest first."""
         while self._terminals:
-            terminal = self._terminals.pop()
-            assert terminal.end() in (0, 130), terminal.said
+            self.close()
+
+    def close(self) -> None:
+        """Ctrl-C in the newest terminal: it ends well."""
+        terminal = self._terminals.pop()
+        assert terminal.end() in (0, 130), terminal.said
 
     def _run(self, command: Command, block: Block) -> None:
         here = Command(self.here(command.typed), command.shown)
         if block.terminal:
             self.start(here)
+            if block.closed:
+                self.close()
         else:
             self.run(here)
 

@@ -11,6 +11,7 @@ README: Final = ROOT / "README.md"
 RUN_KINDS: Final = ("tutorial", "how-to")  # every shell block of these is run, as are the README's
 BY_HAND: Final = "by-hand"  # needs hardware, a display, root, or a service that a test has not
 TERMINAL: Final = "terminal"  # goes on until the page ends, as in a terminal of its own
+CLOSED: Final = "closed"  # … or only until it has shown something
 
 _FENCE = re.compile(r"^```(\S+)[ ]?([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LEAD = re.compile(r"^(?:#+ (.+)$|\*\*(.+?)\.\*\*)", re.MULTILINE)  # a heading, or a paragraph's first words
@@ -41,6 +42,10 @@ class Block:
     @property
     def terminal(self) -> bool:
         return TERMINAL in self.words.split()
+
+    @property
+    def closed(self) -> bool:
+        return CLOSED in self.words.split()
 
     @property
     def is_shell(self) -> bool:
