@@ -1,4 +1,4 @@
-"""The environment in which newcomers work: all that the desk's extra brings, and pytest, made once for all."""
+"""The environment where newcomers work: what the desk takes, a cluster and pytest; made once for all."""
 
 import fcntl
 import os

@@ -29,9 +29,6 @@ esac
 exec @RUN@ "$@"
 """
 
-# A clone's own door, and what it compares to know that its environment is made.
-_CLONE: Final = ("dev", "pyproject.toml", "requirements.lock")
-
 
 class Newcomer:
     """Types block after block; leaving ends every terminal that was opened.
@@ -42,12 +39,13 @@ class Newcomer:
 
     def __init__(self, programs: Path, stand_ins: Mapping[str, str]) -> None:
         self._programs = programs
-        self._stand_ins = stand_ins
+        self._stand_ins = dict(stand_ins)
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self.home = Path(stack.enter_context(TemporaryDirectory(prefix="gwrms-home-")))
-            self._port = _free_port()
+            self.folder = self.home  # where it is typed
+            self._port = free_port()
             self._environment = self._prepare()
             self._terminals: list[Terminal] = []
             self._stack = stack.pop_all()
@@ -71,7 +69,7 @@ class Newcomer:
 
     def start(self, command: Command) -> None:
         """Let it run in a terminal of its own, until it has said what it is to show."""
-        terminal = Terminal(command, self.home, self._environment)
+        terminal = Terminal(command, self.folder, self._environment)
         self._stack.callback(terminal.end)
         self._terminals.append(terminal)
         terminal.wait()
@@ -99,7 +97,7 @@ class Newcomer:
         """Wait for its end, which is well, and compare what it has said."""
         ran = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", here.typed],
-            cwd=self.home,
+            cwd=self.folder,
             env=self._environment,
             input="y\n",  # whoever is asked says yes, and presses Enter
             stdout=subprocess.PIPE,
@@ -119,11 +117,21 @@ class Newcomer:
             text = text.replace(word, stand_in)
         return text
 
+    def call(self, word: str, here: str) -> None:
+        """Type this in the place of a word."""
+        self._stand_ins[word] = here
+
+    def set(self, **variables: str) -> None:
+        """Have these in the environment of what is typed from now on."""
+        self._environment |= variables
+
     def clone(self) -> None:
-        """Be in a clone whose environment is made."""
-        for name in _CLONE:
-            (self.home / name).symlink_to(ROOT / name)
-        (self.home / ".venv").symlink_to(self._programs.parent)
+        """Be in a clone whose environment is made, as far as its own door looks."""
+        self.folder = self.home / "clone"
+        self.folder.mkdir()
+        for name in ("dev", "pyproject.toml", "requirements.lock"):
+            (self.folder / name).symlink_to(ROOT / name)
+        (self.folder / ".venv").symlink_to(self._programs.parent)
 
     def _prepare(self) -> dict[str, str]:
         folder = self.home / "bin"
@@ -140,7 +148,8 @@ def _install(program: Path, text: str) -> None:
     program.chmod(0o755)
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """Of this computer."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -21,7 +21,7 @@ SHELLS = frozenset({"sh", "console", "bash", "shell", "shell-session", "zsh"})
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What is typed from its beginning to its end in one home: a page of the docs, a section of the README."""
+    """What is typed in one home: a page of the docs, or a section of the README."""
 
     name: str
     text: str

@@ -29,7 +29,7 @@ _CONTROL: Final = re.compile(r"\x1b(?:\[[0-9;:?]*[ -/]*[@-~]|[()][A-Z0-9]|[=>78]
 class Terminal:
     """A command at a pseudo-terminal, and all that it has shown there."""
 
-    def __init__(self, command: Command, home: Path, environment: Mapping[str, str]) -> None:
+    def __init__(self, command: Command, folder: Path, environment: Mapping[str, str]) -> None:
         self._command = command
         self._shown = bytearray()
         self._master, there = pty.openpty()
@@ -38,7 +38,7 @@ class Terminal:
         try:
             self._process = subprocess.Popen(
                 ["setsid", "--ctty", "bash", "-c", f"exec {command.typed}"],
-                cwd=home,
+                cwd=folder,
                 env=environment,
                 stdin=there,
                 stdout=there,

@@ -1,40 +1,41 @@
 """Every shell block of README, tutorial and how-to does what it shows, at a robot that is simulated."""
 
 import shutil
+import tarfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from tests.newcomer.newcomer import Newcomer
-from tests.newcomer.pages import BY_HAND, CLOSED, SHELLS, TERMINAL, Command, Page, blocks, pages
-from tests.unit.insole.encode import Sender
+from tests.newcomer.newcomer import Newcomer, free_port
+from tests.newcomer.pages import BY_HAND, CLOSED, ROOT, SHELLS, TERMINAL, Command, Page, blocks, pages
+from tests.support.extras import brought, needed
+from tests.support.installed import build
+from tests.support.wheelhouse import pack
 from tests.unit.training.walkers import day, put
 
-EDS: Final = Path(__file__).parents[2] / "eds" / "files"
+EDS: Final = ROOT / "eds" / "files"
 PAGE_S: Final = 300  # a page with a simulator, on a busy machine
-ROBOT: Final = "~/robot"
+MACHINE: Final = "~/robot"
 READY: Final = '{"ready": true, …'
 
 # Blocks that a test cannot run, a page in their order, and why not.
 NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     "how-to/bench.md": (
-        "a recorded robot's own bus and serial port",
+        "a recorded robot's own bus",
         "root, to make an interface of the kernel",
         "a CAN adapter with real drives",
     ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
-    "how-to/first-robot.md": ("the package index, and leave to write into /opt",),
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
-    "how-to/install.md": ("the package index",),
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
     "how-to/run-as-a-service.md": ("root, and systemd",),
-    "how-to/train.md": ("a wearer who steps for more than a minute, and a model of others", "a Dask cluster"),
+    "how-to/train.md": ("a wearer who steps for more than a minute, and a model of others",),
     "how-to/wire-a-joint.md": ("root, and a CAN adapter",),
     "how-to/wire-a-sensor.md": ("somebody who loads an insole with known weights",),
 }
@@ -49,12 +50,18 @@ def _a_sensor(newcomer: Newcomer) -> None:
 
 
 def _a_recorded_robot(newcomer: Newcomer) -> None:
-    """Its bus, on which a node shows that it lives, and its left insole."""
+    """Its bus, on which a node shows that it lives."""
     log = "".join(f"({1_795_255_200 + tenth / 10:.6f}) can0 702#05\n" for tenth in range(20))
     (newcomer.home / "candump-2026-11-21_101500.log").write_text(log, encoding="utf-8")
-    insole = Sender()
-    (newcomer.home / "left.bin").write_bytes(b"".join(insole.frame([200] * 16) for _ in range(200)))
-    (newcomer.home / "left.bin.json").write_text('{"baudrate": 230400, "seconds": 1.0}', encoding="utf-8")
+
+
+def _three_wearers_and_a_cluster(newcomer: Newcomer) -> None:
+    _three_wearers(newcomer)
+    address = f"tcp://127.0.0.1:{free_port()}"
+    newcomer.call("tcp://192.0.2.9:8786", address)
+    dask = "python3 -m distributed.cli.dask_"
+    newcomer.start(Command(f"{dask}scheduler --host {address} --no-dashboard", ("…", "…Scheduler at:…")))
+    newcomer.start(Command(f"{dask}worker {address} --nthreads 1 --no-dashboard", ("…", "…Registered to:…")))
 
 
 def _three_wearers(newcomer: Newcomer) -> None:
@@ -67,7 +74,7 @@ def _three_wearers(newcomer: Newcomer) -> None:
 
 def _a_robot(newcomer: Newcomer) -> None:
     """Its file, and whatever it has that is plugged in."""
-    newcomer.start(Command(f"gwrms sim --dir {ROBOT}", (READY,)))
+    newcomer.start(Command(f"gwrms sim --dir {MACHINE}", (READY,)))
 
 
 def _a_robot_with_files(newcomer: Newcomer) -> None:
@@ -77,7 +84,23 @@ def _a_robot_with_files(newcomer: Newcomer) -> None:
 
 def _a_robot_that_is_served(newcomer: Newcomer) -> None:
     _a_robot(newcomer)
-    newcomer.start(Command(f"gwrms gateway {ROBOT}/robot.toml", ("listening on …",)))
+    newcomer.start(Command(f"gwrms gateway {MACHINE}/robot.toml", ("listening on …",)))
+
+
+def _a_clone_and_an_index(newcomer: Newcomer) -> None:
+    """The sources, and what pip would find on the index, but for what only the desk has."""
+    with tarfile.open(build("sdist", ROOT, newcomer.home)) as archive:
+        archive.extractall(newcomer.home, filter="data")
+    (newcomer.folder,) = newcomer.home.glob("gwrms-*/")
+    index = newcomer.home / "index"
+    index.mkdir()
+    pack(brought("sim") | needed(["hatchling"]), index)
+    newcomer.set(PIP_NO_INDEX="1", PIP_FIND_LINKS=str(index), PIP_DISABLE_PIP_VERSION_CHECK="1")
+
+
+def _a_clone_and_a_vendors_file(newcomer: Newcomer) -> None:
+    _a_clone_and_an_index(newcomer)
+    shutil.copy(EDS / "schunk_prl.eds", newcomer.folder / "my_drive.eds")
 
 
 # What a page takes for granted.
@@ -87,15 +110,21 @@ GIVEN: Final[Mapping[str, Callable[[Newcomer], None]]] = {
     "README.md: You write software": _a_robot_that_is_served,
     "how-to/add-an-imu.md": _a_sensor,
     "how-to/bench.md": _a_recorded_robot,
-    "how-to/first-robot.md": _vendors_file,
+    "how-to/first-robot.md": _a_clone_and_a_vendors_file,
+    "how-to/install.md": _a_clone_and_an_index,
     "how-to/wire-a-joint.md": _vendors_file,
-    "how-to/train.md": _three_wearers,
+    "how-to/run-as-a-service.md": _a_robot,
+    "how-to/train.md": _three_wearers_and_a_cluster,
     "tutorial/first-walk.md": Newcomer.clone,
 }
 
 # What a page names that only a real robot has, and what is here in its place.
 STAND_INS: Final[Mapping[str, Mapping[str, str]]] = {
     "README.md: You have a robot and want it monitored": {"ROBOT:": "127.0.0.1:", "/etc/gwrms": "~/robot"},
+    "how-to/bench.md": {"/dev/ttyUSB0": "robot/left_insole"},
+    "how-to/first-robot.md": {"/opt/gwrms": "~/opt"},
+    "how-to/install.md": {"[server]": "[sim]"},
+    "how-to/run-as-a-service.md": {"/etc/gwrms": "~/robot"},
     "how-to/add-an-imu.md": {"/dev/ttyUSB0": "sensor/trunk"},
     "how-to/wire-a-sensor.md": {"/dev/serial/by-id/usb-insole-left": "robot/left_insole"},
 }
