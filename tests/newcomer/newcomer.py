@@ -57,11 +57,12 @@ class Newcomer:
     def type(self, block: Block) -> None:
         """Do what a block shows, and compare what comes of it."""
         if block.file is not None:
-            file = self.home / block.file.removeprefix("~/")
+            at_home = block.file.startswith("~/")
+            file = (self.home if at_home else self.folder) / block.file.removeprefix("~/")
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(self.here(block.text), encoding="utf-8")
         elif block.is_script:
-            (self.home / "script.py").write_text(self.here(block.text), encoding="utf-8")
+            (self.folder / "script.py").write_text(self.here(block.text), encoding="utf-8")
             self.run(Command("python3 script.py > /dev/null"))
         elif block.is_shell and not block.by_hand:
             for command in commands(block):

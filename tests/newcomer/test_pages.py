@@ -50,7 +50,8 @@ def _a_sensor(newcomer: Newcomer) -> None:
 
 
 def _a_recorded_robot(newcomer: Newcomer) -> None:
-    """Its bus, on which a node shows that it lives."""
+    """Its bus, on which a node shows that it lives, and its left insole."""
+    _a_sensor(newcomer)
     log = "".join(f"({1_795_255_200 + tenth / 10:.6f}) can0 702#05\n" for tenth in range(20))
     (newcomer.home / "candump-2026-11-21_101500.log").write_text(log, encoding="utf-8")
 
@@ -121,7 +122,7 @@ GIVEN: Final[Mapping[str, Callable[[Newcomer], None]]] = {
 # What a page names that only a real robot has, and what is here in its place.
 STAND_INS: Final[Mapping[str, Mapping[str, str]]] = {
     "README.md: You have a robot and want it monitored": {"ROBOT:": "127.0.0.1:", "/etc/gwrms": "~/robot"},
-    "how-to/bench.md": {"/dev/ttyUSB0": "robot/left_insole"},
+    "how-to/bench.md": {"/dev/ttyUSB0": "sensor/left_insole"},
     "how-to/first-robot.md": {"/opt/gwrms": "~/opt"},
     "how-to/install.md": {"[server]": "[sim]"},
     "how-to/run-as-a-service.md": {"/etc/gwrms": "~/robot"},

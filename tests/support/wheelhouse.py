@@ -17,7 +17,8 @@ def pack(packages: Iterable[str], into: Path) -> None:
 
 def _pack(package: importlib.metadata.Distribution, into: Path) -> None:
     said = package.read_text("WHEEL") or ""
-    tag = next(line.partition(": ")[2] for line in said.splitlines() if line.startswith("Tag: "))
+    tags = [line.partition(": ")[2].split("-") for line in said.splitlines() if line.startswith("Tag: ")]
+    tag = "-".join(".".join(dict.fromkeys(part)) for part in zip(*tags, strict=True))
     name = f"{package.name.replace('-', '_')}-{package.version}"
     files = [file for file in package.files or () if file.parts[0] != SCRIPTS and file.suffix != ".pyc"]
     (record,) = (file for file in files if file.match("*.dist-info/RECORD"))
