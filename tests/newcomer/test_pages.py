@@ -10,6 +10,7 @@ import pytest
 
 from tests.newcomer.newcomer import Newcomer, free_port
 from tests.newcomer.pages import BY_HAND, CLOSED, ROOT, SHELLS, TERMINAL, Command, Page, blocks, pages
+from tests.newcomer.walks import PASSED, WALKS
 from tests.support.extras import brought, needed
 from tests.support.installed import build
 from tests.support.wheelhouse import pack
@@ -131,20 +132,37 @@ STAND_INS: Final[Mapping[str, Mapping[str, str]]] = {
 }
 
 
-def _is_typed(page: Page) -> bool:
-    return any(block.is_script or (block.is_shell and not block.by_hand) for block in blocks(page))
+def _typed(page: Page) -> str:
+    """All that is typed of it."""
+    return "".join(
+        block.text for block in blocks(page) if block.is_script or (block.is_shell and not block.by_hand)
+    )
+
+
+TYPED: Final = {page.name: page for page in pages() if _typed(page)}
 
 
 @pytest.mark.usefixtures("store_libraries")  # they open sockets once, for good
 @pytest.mark.timeout(PAGE_S)
-@pytest.mark.parametrize("page", [page for page in pages() if _is_typed(page)], ids=lambda page: page.name)
-def test_what_the_page_shows_happens(page: Page, programs: Path) -> None:
+@pytest.mark.parametrize(("walk", "name"), [(walk, name) for walk in WALKS for name in WALKS[walk]])
+def test_what_the_page_shows_happens(walk: str, name: str, programs: Path) -> None:
+    page = TYPED[name]
     with Newcomer(programs, STAND_INS.get(page.name, {})) as newcomer:
         if page.name in GIVEN:
             GIVEN[page.name](newcomer)
         for block in blocks(page):
             newcomer.type(block)
         newcomer.end()
+
+
+def test_every_page_on_which_something_is_typed_is_on_a_walk() -> None:
+    assert sorted(name for walk in WALKS.values() for name in walk) == sorted(TYPED)
+
+
+@pytest.mark.parametrize("walk", WALKS)
+def test_a_walk_leads_past_what_its_user_needs(walk: str) -> None:
+    typed = "".join(_typed(TYPED[name]) for name in WALKS[walk])
+    assert [one for one in PASSED[walk] if one not in typed] == []
 
 
 def test_nobody_hides_a_block_from_being_run() -> None:
