@@ -22,7 +22,8 @@ def difference(shown: Sequence[str], output: str) -> str | None:
             (at for at in range(place, last + 1 if free else place + 1) if _fits(run, lines, at)), None
         )
         if found is None:
-            return f"{'\n'.join(run)!r} is not where it is shown; the output was\n{output}"
+            told = "\n".join(run)
+            return f"{told!r} is not where it is shown; the output was\n{output}"
         place, free = found + len(run), left_out
     if not free and place < len(lines):
         return f"{lines[place]!r} is not shown; the output was\n{output}"
