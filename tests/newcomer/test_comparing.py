@@ -9,7 +9,7 @@ from tests.newcomer.comparing import difference
     ("shown", "output"),
     [
         ([], "anything"),
-        (["left_knee   0.12  rad"], "left_knee  -3.5e rad".replace("e", "")),
+        (["left_knee   0.12  rad"], "left_knee  -3.5 rad"),
         (["…"], ""),
         (["{…, 1}"], '{"ready": true, 2}'),
         (["one", "…", "two", "three"], "one\ntwo\ntwo\nthree"),
