@@ -18,7 +18,7 @@ from typing import Final
 from tests.newcomer.comparing import difference
 from tests.newcomer.pages import Command
 
-DEADLINE_S: Final = 120.0
+DEADLINE_S: Final = 240.0
 ENDS_S: Final = 60.0
 LOOK_S: Final = 0.05
 ROWS, COLUMNS = 50, 200

@@ -17,7 +17,7 @@ from tests.support.wheelhouse import pack
 from tests.unit.training.walkers import day, put
 
 EDS: Final = ROOT / "eds" / "files"
-PAGE_S: Final = 300  # a page with a simulator, on a busy machine
+PAGE_S: Final = 600  # a page with a simulator, on a busy machine
 MACHINE: Final = "~/robot"
 READY: Final = '{"ready": true, …'
 
