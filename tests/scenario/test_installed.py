@@ -1,12 +1,7 @@
-"""The wheel as it is installed: an environment with the packages of one extra each, and nothing of the clone.
+"""The wheel as it is installed: in environments with the packages of one extra each."""
 
-No package index is asked: what an extra brings is linked from the environment that the tests run in.
-"""
-
-import importlib.metadata
 import os
 import subprocess
-import sys
 import tarfile
 import zipfile
 from pathlib import Path
@@ -14,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.extras import ROOT, brought
+from tests.support.installed import build, install
 from tests.support.waiting import until
 
 WITHIN_S = 120.0
@@ -25,13 +21,7 @@ class Environment:
     def __init__(self, folder: Path, wheel: Path, extra: str | None) -> None:
         self.home = folder / "home"
         self.home.mkdir(parents=True)
-        self._bin = folder / "env" / "bin"
-        subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "env"], check=True)
-        install = [sys.executable, "-m", "uv", "pip", "install", "--quiet", "--offline", "--no-deps"]
-        subprocess.run([*install, "--python", self._bin / "python", wheel], check=True)
-        (packages,) = (folder / "env").glob("lib/python*/site-packages")
-        for name in brought(extra):
-            _link(importlib.metadata.distribution(name), packages)
+        self._bin = install(wheel, brought(extra), folder / "env")
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "XDG_"))}
         self._environment = kept | {"HOME": str(self.home), "PATH": f"{self._bin}:/usr/bin:/bin"}
 
@@ -60,23 +50,14 @@ class Environment:
         return (self.home / f"{name}.log").read_text(encoding="utf-8")
 
 
-def _link(package: importlib.metadata.Distribution, into: Path) -> None:
-    tops = {file.parts[0] for file in package.files or () if file.parts[0] not in ("..", "__pycache__")}
-    for top in tops:
-        if not (into / top).exists():
-            (into / top).symlink_to(Path(str(package.locate_file(top))))
-
-
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the sdist, and the wheel that was made from it."""
     folder, unpacked = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("sdist")
-    build = [sys.executable, "-m", "hatchling", "build", "-d", str(folder)]
-    subprocess.run([*build, "-t", "sdist"], cwd=ROOT, check=True, capture_output=True)
-    with tarfile.open(next(folder.glob("*.tar.gz"))) as archive:
+    with tarfile.open(build("sdist", ROOT, folder)) as archive:
         archive.extractall(unpacked, filter="data")
     (source,) = unpacked.iterdir()
-    subprocess.run([*build, "-t", "wheel"], cwd=source, check=True, capture_output=True)
+    build("wheel", source, folder)
     return folder
 
 
@@ -86,9 +67,7 @@ def wheel(built: Path) -> Path:
 
 
 def test_the_sdist_makes_the_same_wheel(built: Path, wheel: Path, tmp_path: Path) -> None:
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
-    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
-    with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as ours, zipfile.ZipFile(wheel) as made:
+    with zipfile.ZipFile(build("wheel", ROOT, tmp_path)) as ours, zipfile.ZipFile(wheel) as made:
         assert set(made.namelist()) == set(ours.namelist())
 
 

@@ -30,10 +30,12 @@ def own(extra: str) -> set[str]:
 
 def brought(extra: str | None) -> set[str]:
     """Every package that comes with GWRMS and this extra, also by way of others."""
-    wanted = list(PROJECT["dependencies"])
-    if extra is not None:
-        wanted += EXTRAS[extra]
-    found: set[str] = set()
+    return needed([*PROJECT["dependencies"], *(EXTRAS[extra] if extra is not None else ())])
+
+
+def needed(requirements: Iterable[str]) -> set[str]:
+    """Every package that these name, and those that they need."""
+    wanted, found = list(requirements), set[str]()
     while wanted:
         one = Requirement(wanted.pop())
         name = canonicalize_name(one.name)

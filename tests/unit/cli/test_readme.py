@@ -7,7 +7,7 @@ import pytest
 
 from gateway import config
 from gateway.main import COMMANDS
-from tests.docs.pages import blocks
+from tests.newcomer.pages import blocks
 from tests.fake_robot import FakeRobot
 
 ROOT = Path(__file__).parents[3]

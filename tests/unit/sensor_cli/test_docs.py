@@ -7,7 +7,7 @@ from drivers.imu.canopen import FORMATS as CANOPEN_FORMATS
 from gateway import config
 from gateway.modules.component.assembly import assemble
 from hil_sim.sensors.suite import IMUS, INSOLES
-from tests.docs.pages import blocks
+from tests.newcomer.pages import blocks
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "wire-a-sensor.md"
 

@@ -7,7 +7,7 @@ import pytest
 from gateway.client import Address
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.core.settings.server_file import RecordingSettings, SettingsError, Upload, add_robots, load
-from tests.docs.pages import blocks
+from tests.newcomer.pages import blocks
 
 WHOLE = """
 [robots]

@@ -1,24 +1,19 @@
-"""A newcomer who types what a page shows, with a home in which nothing is yet."""
+"""A newcomer who types what a page shows, with a home and an environment in which nothing is yet."""
 
 import os
-import signal
 import socket
 import subprocess
-import sys
-import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, Self
 
-from tests.docs.comparing import difference
-from tests.docs.pages import Block, Command, commands
+from tests.newcomer.comparing import difference
+from tests.newcomer.pages import ROOT, Block, Command, commands
+from tests.newcomer.terminal import COLUMNS, DEADLINE_S, Terminal
 
-DEADLINE_S: Final = 120.0
 SLOW = "This computer was too slow"  # what a scenario adds on a busy one
-ENDS_S: Final = 60.0
-LOOK_S: Final = 0.05
 PORT: Final = "7420"  # which the pages name, and nobody here may rely on
 
 # `gwrms` as it is installed, but that a robot which no option names is at a free port.
@@ -34,67 +29,23 @@ esac
 exec @RUN@ "$@"
 """
 
-# pytest with our plugin, as where both are installed.
-_PYTEST: Final = """#!/bin/sh
-export PYTEST_DISABLE_PLUGIN_AUTOLOAD=1
-exec @PYTHON@ -m pytest -p hil_sim.pytest_plugin -p no:cacheprovider "$@"
-"""
-
-
-class Terminal:
-    """A command that goes on; what it says is in a file."""
-
-    def __init__(self, command: Command, home: Path, environment: Mapping[str, str], log: Path) -> None:
-        self._command = command
-        self._log = log
-        with log.open("wb") as said:
-            self._process = subprocess.Popen(
-                ["bash", "-c", f"exec {command.typed}"],
-                cwd=home,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=said,
-                stderr=subprocess.STDOUT,
-                process_group=0,
-            )
-
-    def wait(self) -> None:
-        """Until it has said what the page shows."""
-        deadline = time.monotonic() + DEADLINE_S
-        while wrong := difference((*self._command.shown, "…"), self.said):
-            assert self._process.poll() is None, f"{self._command.typed} has ended:\n{self.said}"
-            assert time.monotonic() < deadline, wrong
-            time.sleep(LOOK_S)
-
-    @property
-    def said(self) -> str:
-        return self._log.read_text(encoding="utf-8")
-
-    def end(self) -> int:
-        """Ctrl-C; its exit status."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-        try:
-            return self._process.wait(ENDS_S)
-        finally:
-            if self._process.poll() is None:
-                os.killpg(self._process.pid, signal.SIGKILL)
-                self._process.wait()
-
 
 class Newcomer:
     """Types block after block; leaving ends every terminal that was opened.
 
-    `stand_ins` are what is typed here in the place of what a page names and only a real robot has.
+    `programs` are those of the environment in which GWRMS is installed; `stand_ins` are what is typed here in
+    the place of what a page names and only a real robot has.
     """
 
-    def __init__(self, stand_ins: Mapping[str, str]) -> None:
-        self._stand_ins = stand_ins
+    def __init__(self, programs: Path, stand_ins: Mapping[str, str]) -> None:
+        self._programs = programs
+        self._stand_ins = dict(stand_ins)
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self.home = Path(stack.enter_context(TemporaryDirectory(prefix="gwrms-home-")))
-            self._port = _free_port()
+            self.folder = self.home  # where it is typed
+            self._port = free_port()
             self._environment = self._prepare()
             self._terminals: list[Terminal] = []
             self._stack = stack.pop_all()
@@ -106,31 +57,40 @@ class Newcomer:
     def type(self, block: Block) -> None:
         """Do what a block shows, and compare what comes of it."""
         if block.file is not None:
-            file = self.home / block.file.removeprefix("~/")
+            at_home = block.file.startswith("~/")
+            file = (self.home if at_home else self.folder) / block.file.removeprefix("~/")
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(self.here(block.text), encoding="utf-8")
+        elif block.is_script:
+            (self.folder / "script.py").write_text(self.here(block.text), encoding="utf-8")
+            self.run(Command("python3 script.py > /dev/null"))
         elif block.is_shell and not block.by_hand:
             for command in commands(block):
                 self._run(command, block)
 
     def start(self, command: Command) -> None:
         """Let it run in a terminal of its own, until it has said what it is to show."""
-        log = self.home / "bin" / f"terminal-{len(self._terminals)}.log"
-        terminal = Terminal(command, self.home, self._environment, log)
+        terminal = Terminal(command, self.folder, self._environment)
         self._stack.callback(terminal.end)
         self._terminals.append(terminal)
         terminal.wait()
 
     def end(self) -> None:
-        """Ctrl-C in every terminal, the newest first: each ends well."""
+        """Ctrl-C in every terminal, the newest first."""
         while self._terminals:
-            terminal = self._terminals.pop()
-            assert terminal.end() in (0, 130), terminal.said
+            self.close()
+
+    def close(self) -> None:
+        """Ctrl-C in the newest terminal: it ends well."""
+        terminal = self._terminals.pop()
+        assert terminal.end() in (0, 130), terminal.said
 
     def _run(self, command: Command, block: Block) -> None:
         here = Command(self.here(command.typed), command.shown)
         if block.terminal:
             self.start(here)
+            if block.closed:
+                self.close()
         else:
             self.run(here)
 
@@ -138,7 +98,7 @@ class Newcomer:
         """Wait for its end, which is well, and compare what it has said."""
         ran = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", here.typed],
-            cwd=self.home,
+            cwd=self.folder,
             env=self._environment,
             input="y\n",  # whoever is asked says yes, and presses Enter
             stdout=subprocess.PIPE,
@@ -158,15 +118,30 @@ class Newcomer:
             text = text.replace(word, stand_in)
         return text
 
+    def call(self, word: str, here: str) -> None:
+        """Type this in the place of a word."""
+        self._stand_ins[word] = here
+
+    def set(self, **variables: str) -> None:
+        """Have these in the environment of what is typed from now on."""
+        self._environment |= variables
+
+    def clone(self) -> None:
+        """Be in a clone whose environment is made, as far as its own door looks."""
+        self.folder = self.home / "clone"
+        self.folder.mkdir()
+        for name in ("dev", "pyproject.toml", "requirements.lock"):
+            (self.folder / name).symlink_to(ROOT / name)
+        (self.folder / ".venv").symlink_to(self._programs.parent)
+
     def _prepare(self) -> dict[str, str]:
         folder = self.home / "bin"
         folder.mkdir()
-        run = f"'{sys.executable}' -P -m gateway.main"
+        run = f"'{self._programs / 'gwrms'}'"
         _install(folder / "gwrms", _GWRMS.replace("@RUN@", run).replace("@PORT@", str(self._port)))
-        _install(folder / "pytest", _PYTEST.replace("@PYTHON@", f"'{sys.executable}'"))
-        kept = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
-        path = os.pathsep.join([str(folder), str(Path(sys.executable).parent), os.environ["PATH"]])
-        return kept | {"HOME": str(self.home), "PATH": path, "COLUMNS": "200"}
+        path = os.pathsep.join([str(folder), str(self._programs), "/usr/local/bin:/usr/bin:/bin"])
+        known = {"HOME": str(self.home), "PATH": path, "LANG": "C.UTF-8", "TERM": "xterm-256color"}
+        return known | {"COLUMNS": str(COLUMNS)}
 
 
 def _install(program: Path, text: str) -> None:
@@ -174,7 +149,8 @@ def _install(program: Path, text: str) -> None:
     program.chmod(0o755)
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """Of this computer."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

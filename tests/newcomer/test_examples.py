@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 
 import pytest
 
-from tests.docs.newcomer import Newcomer
-from tests.docs.pages import Command
+from tests.newcomer.newcomer import Newcomer
+from tests.newcomer.pages import Command
 from tools.draw.commands import commands, parser_of
 
 ROOT: Final = Path(__file__).parents[2]
@@ -65,8 +65,8 @@ def test_an_example_is_taken_by_its_command(example: Example) -> None:
     parser_of(name).parse_intermixed_args(words[len(name) :])
 
 
-def test_examples_at_a_robot_do_something() -> None:
-    with Newcomer(STAND_INS) as newcomer:
+def test_examples_at_a_robot_do_something(programs: Path) -> None:
+    with Newcomer(programs, STAND_INS) as newcomer:
         newcomer.start(Command(f"gwrms sim --dir {ROBOT}", ('{"ready": true, …',)))
         newcomer.start(Command("gwrms gateway robot/robot.toml", ("listening on …",)))
         _prepare(newcomer.home)
