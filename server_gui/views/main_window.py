@@ -35,6 +35,7 @@ from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.help import Help
+from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.recordings.panel import Recordings
@@ -113,9 +114,11 @@ class MainWindow(QMainWindow):
         if archive is not None:
             self.recordings = Recordings(archive, desk.recording, theme)
             self.cloud = Cloud(archive, desk.recording, theme)
-            self._views += (self.recordings, self.cloud)
+            self.models = ModelsPage(archive.models, theme)
+            self._views += (self.recordings, self.cloud, self.models)
             self.tabs.addTab(Scrolled(self.recordings), "Re&cordings")
             self.tabs.addTab(Scrolled(self.cloud), "C&loud")
+            self.tabs.addTab(Scrolled(self.models), "&Models")
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
