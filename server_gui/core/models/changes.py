@@ -1,6 +1,6 @@
 """What a promotion or a way back would change, said before it is done; done only while that is still so."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,7 +9,7 @@ from ml.registry.pointers import Pointer
 from ml.registry.registry import Registry
 from server_gui.core.models.catalogue import open_registry
 from server_gui.core.models.comparison import headline
-from server_gui.core.models.names import EVERY, model_name, task_name
+from server_gui.core.models.names import EVERY, model_names, task_name
 
 SOON: Final = "Servers that run take it within seconds, without a restart."
 OWN: Final = "A robot with a model of its own keeps that."
@@ -24,12 +24,18 @@ class Change:
     now: Card | None
     then: Card | None
     is_rollback: bool
-    shipped: frozenset[str]
+    names: Mapping[str, str]  # of models by their ids
 
     @property
     def changes_nothing(self) -> bool:
         """Whether that serves already."""
         return self.now is not None and self.then is not None and self.now.id == self.then.id
+
+    @property
+    def outcome(self) -> str:
+        """Return what is so afterwards."""
+        then = "no model of its own" if self.then is None else self.names[self.then.id]
+        return f"{task_name(self.task)}: {then} serves {self.robot or EVERY}"
 
     @property
     def title(self) -> str:
@@ -55,8 +61,7 @@ class Change:
     def _told(self, card: Card | None) -> str:
         if card is None:
             return f"no model {'of its own' if self.robot else 'that somebody has promoted'}"
-        name = model_name(card, shipped=card.id in self.shipped)
-        return f"{name} ({headline(card)} on people never seen)"
+        return f"{self.names[card.id]} ({headline(card)} on people never seen)"
 
 
 def promotion(url: str, model: str, robot: str) -> Change:
@@ -70,7 +75,7 @@ def promotion(url: str, model: str, robot: str) -> Change:
     registry = open_registry(url)
     card = registry.promotable(model, robot)
     now = registry.serving(card.task, robot, set(card.channels))
-    return Change(card.task, robot, _card(registry, now), card, False, registry.shipped())
+    return Change(card.task, robot, _card(registry, now), card, False, _names(registry))
 
 
 def way_back(url: str, task: str, robot: str) -> Change:
@@ -84,7 +89,7 @@ def way_back(url: str, task: str, robot: str) -> Change:
     registry = open_registry(url)
     before = registry.before(task, robot)
     now = registry.serving(task, robot)
-    return Change(task, robot, _card(registry, now), _card(registry, before), True, registry.shipped())
+    return Change(task, robot, _card(registry, now), _card(registry, before), True, _names(registry))
 
 
 def carry_out(url: str, change: Change, who: str, why: str) -> Pointer:
@@ -104,6 +109,10 @@ def carry_out(url: str, change: Change, who: str, why: str) -> Pointer:
     if change.then is None:
         raise ValueError("a promotion is of a model")
     return registry.promote(change.then.id, change.robot, who=who, why=why, over=now)
+
+
+def _names(registry: Registry) -> Mapping[str, str]:
+    return model_names(registry.entries(), registry.shipped())
 
 
 def _card(registry: Registry, model: str | None) -> Card | None:

@@ -3,12 +3,12 @@
 import getpass
 import time
 from collections.abc import Callable, Set
+from enum import Enum
 from typing import Final
 
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import Change, carry_out, promotion, way_back
-from server_gui.core.models.names import EVERY, model_name
 from server_gui.core.models.training import Trained, TrainingWish
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
@@ -22,6 +22,14 @@ NOT_BETTER: Final = (
 )
 
 
+class Tone(Enum):
+    """How something is said."""
+
+    PLAIN = ""
+    GOOD = "good"
+    BAD = "bad"
+
+
 class Models:
     """For the window's thread; `close` ends its own. `revision` rises with every look that came back."""
 
@@ -32,7 +40,7 @@ class Models:
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
         self.change: Change | None = None  # what waits to be confirmed
         self.said = ""  # what came of the newest wish, in words
-        self.is_refused = False  # whether that is a refusal
+        self.tone = Tone.PLAIN  # of that
         self.trained: dict[str, Trained] = {}  # what this window has trained, by model
         self.robots = robots
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)), "training")
@@ -81,7 +89,7 @@ class Models:
         """Find out what it would change, for `change` to be confirmed."""
         judged = self.trained.get(model)
         if judged is not None and not judged.better:
-            self._say(NOT_BETTER.format(why="; ".join(judged.why)), refused=True)
+            self._say(NOT_BETTER.format(why="; ".join(judged.why)), Tone.BAD)
             return
         self._ask(lambda: promotion(self.url, model, robot))
 
@@ -92,7 +100,7 @@ class Models:
     def confirm(self, why: str = "") -> None:
         """Do what `change` says, if nothing else has changed what serves since."""
         change, self.change = self.change, None
-        if change is None or change.changes_nothing:
+        if change is None:
             return
         done = self._thread.do(lambda: carry_out(self.url, change, self._who, why))
         when_done(done, self._deliver, lambda _: self._done(change), self._refused)
@@ -110,20 +118,22 @@ class Models:
         when_done(self._thread.do(plan), self._deliver, self._planned, self._refused)
 
     def _planned(self, change: Change) -> None:
+        if change.changes_nothing:
+            self._say(" ".join(change.sentences))
+            return
         self.change = change
         self._say("")
 
     def _done(self, change: Change) -> None:
-        name = "no promoted model" if change.then is None else model_name(change.then)
-        self._say(f"Done: {name} serves {change.robot or EVERY}.")
+        self._say(f"Done. {change.outcome}.", Tone.GOOD)
         self.look(now=True)
 
     def _refused(self, error: Exception) -> None:
-        self._say(f"Refused: {error}", refused=True)
+        self._say(f"Refused: {error}", Tone.BAD)
         self.look(now=True)
 
-    def _say(self, text: str, *, refused: bool = False) -> None:
-        self.said, self.is_refused = text, refused
+    def _say(self, text: str, tone: Tone = Tone.PLAIN) -> None:
+        self.said, self.tone = text, tone
 
     def _looked(self, found: Catalogue) -> None:
         self._looks, self.looked_s = False, time.monotonic()
@@ -134,5 +144,5 @@ class Models:
         self._looked(Catalogue(problem=f"internal error, {type(error).__name__}"))
 
     def _over(self, job: Job) -> None:
-        self._say(f"{job.name}: {job.said}", refused=job.state is JobState.FAILED)
+        self._say(f"{job.name}: {job.said}", Tone.BAD if job.state is JobState.FAILED else Tone.PLAIN)
         self.look(now=True)

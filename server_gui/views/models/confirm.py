@@ -44,6 +44,5 @@ class Confirm(Card):
             self.setAccessibleName(change.title)
             set_text(self.words, "\n".join(change.sentences))
             self.yes.setText("Roll back" if change.is_rollback else "Promote")
-            self.yes.setEnabled(not change.changes_nothing)
             self.why.clear()
             self.no.setFocus()

@@ -144,7 +144,7 @@ class ModelsPage(QWidget):
         self.state.setVisible(bool(lines))
         set_text(self.said, self._models.said)
         self.said.setVisible(bool(self._models.said))
-        tone = "bad" if self._models.is_refused else "good"
+        tone = self._models.tone.value
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QPushButton
+from PySide6.QtWidgets import QAbstractItemView, QComboBox, QGridLayout, QLineEdit, QPushButton, QSizePolicy
 
 from server_gui.core.models.models import Models
 from server_gui.core.models.names import EVERY, TASKS
@@ -43,6 +43,8 @@ class TrainForm(Card):
         self.begin.clicked.connect(self._begin)
         self.jobs = JobsTable(models.jobs, theme)
         self.jobs.setAccessibleName("Trainings")
+        self.jobs.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.jobs.setSizeAdjustPolicy(QAbstractItemView.SizeAdjustPolicy.AdjustToContents)
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         names = {"What it predicts": self.task, "For": self.robot, "Judged by": self.held_out}
