@@ -21,15 +21,17 @@ class Opening:
         self.own = own
         self._steps = steps
         self._splash = splash
+        self._is_over = False
 
     def look(self, station: "Station | None" = None, *, window: bool = False) -> None:
         """Count what is so; `window`: it is there."""
-        if self._steps.is_over:
+        if self._is_over:
             return
         for part in self.own.ready:
             self._steps.reach(STEPS[part])
-        if window:
+        if window and Step.WINDOW not in self._steps.took_s:
             self._steps.reach(Step.WINDOW)
+            self._splash.raise_()  # the window has come to lie above it
         if station is not None and station.robot.parts and station.is_live:
             self._steps.reach(Step.DATA)
             if station.processing.derived().gait.walking:
@@ -37,4 +39,5 @@ class Opening:
         self._splash.refresh()
         too_long = self._steps.elapsed_s > LONGEST_S
         if too_long or self.own.problem or self._steps.now is None:
+            self._is_over = True
             self._splash.close()

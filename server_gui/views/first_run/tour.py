@@ -6,7 +6,7 @@ from typing import Final
 
 from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QDockWidget, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDockWidget, QHBoxLayout, QPushButton, QWidget
 
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
@@ -26,34 +26,31 @@ class Stop:
 
 STOPS: Final = (
     Stop(
-        "One look",
-        "Robot, drives, what it does, link and warnings stand at the top, whatever tab is open. What is not "
-        "known now is grey and says so.",
+        "one look",
+        "robot, drives, status, link and warnings stand at the top, whatever tab is open. What is not known "
+        "now is grey.",
         lambda window: window.header,
     ),
     Stop(
         "STOP",
-        "A quick stop on every drive, by this button, F12 or Ctrl+Space, at any time. It says when every "
-        "drive has confirmed. It is software, not a safety-rated emergency stop. Try it: after Reset stop, "
-        "Start walking goes on.",
+        "a quick stop on every drive, also by F12 and Ctrl+Space; not a safety-rated emergency stop. Try it, "
+        "then Reset stop and Start walking.",
         lambda window: window.header.stop,
     ),
     Stop(
-        "Overview",
-        "What the wearer does, posture, pressure under both feet, and every joint. Break something above and "
-        "look where it shows, what it is called and what to check.",
+        "overview",
+        "what the wearer does, posture, pressure, every joint. Break something and look where it shows.",
         lambda window: window.tabs,
     ),
     Stop(
-        "Parameters",
-        "Type a new step length: it is staged, not sent. Review shows old and new; a trial takes itself back "
-        "unless you keep it.",
+        "parameters",
+        "a new value is staged, not sent. Review shows old and new; a trial takes itself back unless you "
+        "keep it.",
         lambda window: window.parameters,
     ),
     Stop(
-        "Afterwards",
-        "Everything is recorded by itself: Recordings plays it in the same views, Signals compares channels, "
-        "Audit says who changed what. F1 explains the tab that you look at.",
+        "afterwards",
+        "everything is recorded: Recordings plays it, Audit says who changed what, F1 explains each tab.",
         lambda window: window.tabs.tabBar(),
     ),
 )
@@ -96,28 +93,23 @@ class Tour(QWidget):
         self._window = window
         self._outline = Outline(window, theme)
         self.at = 0
-        self.title, self.words = PlainLabel(), PlainLabel()
-        self.title.setObjectName("title")
+        self.words = PlainLabel()
         self.words.setWordWrap(True)
         self.back, self.next, self.skip = (
             QPushButton("Back"),
             QPushButton("Next"),
-            QPushButton("Skip the tour"),
+            QPushButton("Skip tour"),
         )
         self.next.setObjectName("primary")
         self.back.clicked.connect(lambda: self.go(self.at - 1))
         self.next.clicked.connect(lambda: self.go(self.at + 1))
         self.skip.clicked.connect(self.end)
-        row = QHBoxLayout()
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 0, 10, 3)
         row.setSpacing(6)
-        row.addWidget(self.title, 1)
+        row.addWidget(self.words, 1)
         for button in (self.back, self.next, self.skip):
             row.addWidget(button)
-        everything = QVBoxLayout(self)
-        everything.setContentsMargins(10, 0, 10, 4)
-        everything.setSpacing(2)
-        everything.addLayout(row)
-        everything.addWidget(self.words)
         self.hide()
 
     def begin(self) -> None:
@@ -132,9 +124,8 @@ class Tour(QWidget):
             return
         self.at = max(at, 0)
         stop = STOPS[self.at]
-        self.title.setText(f"Tour, {self.at + 1} of {len(STOPS)}: {stop.title}")
-        self.words.setText(stop.words)
-        self.setAccessibleName(f"{self.title.text()}. {stop.words}")
+        self.words.setText(f"{self.at + 1} of {len(STOPS)}, {stop.title}: {stop.words}")
+        self.setAccessibleName(f"Tour, {self.words.text()}")
         self.back.setEnabled(self.at > 0)
         self.next.setText("Done" if self.at == len(STOPS) - 1 else "Next")
         self.skip.setVisible(self.at < len(STOPS) - 1)
