@@ -46,7 +46,7 @@ class Models:
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)), "training")
         self._who = who or getpass.getuser()
         self._deliver = deliver
-        self._thread = Background("models")
+        self._thread = Background("list of models")
         self._looking = Looking(url)
         self._looks = False
         self._ending = False
