@@ -30,9 +30,13 @@ from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.settings.server_file import ServerSettings, name_of
 from server_gui.core.tuning.link import Link
 from server_gui.processes.own_robot import OwnRobot
-from server_gui.views.main_window import MainWindow
+from server_gui.processes.sim_control import SimControl
+from server_gui.views.application import application, kept_settings, kept_theme
+from server_gui.views.first_run.demo_bar import DemoBar
+from server_gui.views.first_run.opening import Opening
+from server_gui.views.main_window import SLOW, MainWindow
 from server_gui.views.stop_keys import StopKeys
-from server_gui.views.theme import Look, Theme
+from server_gui.views.theme import Look
 from server_gui.views.x11_keys import NoX, X11Keys
 
 FRAME_MS: Final = 33
@@ -80,6 +84,7 @@ class App:
     """Everything from the robots of the server's file to the window that shows them.
 
     Without `record` it only shows, and so it does as long as another program records into the same spool.
+    `opening` is of a simulated robot that has been started already.
     """
 
     def __init__(
@@ -90,6 +95,7 @@ class App:
         following: FollowSettings,
         record: Record | None = None,
         file: Path | None = None,
+        opening: Opening | None = None,
     ) -> None:
         self.desk = Desk()
         self._qt = qt
@@ -101,11 +107,11 @@ class App:
         self.feeds = Feeds(settings, following, record, self._show, self._predicted.extend, self._stop)
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self._predicts = settings.prediction.enabled
-        self._own = OwnRobot(self._own_ready, self._own_failed)
+        self._opening = opening
+        self._own = OwnRobot() if opening is None else opening.own
+        self.demo: DemoBar | None = None  # once a simulated robot of ours is followed
         self._desk_units(kept)
-        self.theme = Theme(
-            qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100
-        )
+        self.theme = kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
         self._ended = True
@@ -130,9 +136,12 @@ class App:
 
     def __exit__(self, *exc: object) -> None:
         self._timer.stop()
-        self._own.close()
-        self._ended = self._archive.close(BREAK_OFF_S)
-        self.feeds.__exit__(*exc)
+        asked = self.demo is None or self.demo.end(BREAK_OFF_S)
+        try:
+            self._ended = self._archive.close(BREAK_OFF_S) and asked
+            self.feeds.__exit__(*exc)
+        finally:
+            self._own.close()  # last, so that nobody misses it
 
     @property
     def hangs(self) -> bool:
@@ -174,7 +183,13 @@ class App:
         for news in [self._predicted.popleft() for _ in range(len(self._predicted))]:
             self._stations[news.robot].take_prediction(news)
         self.feeds.look(self.desk.recording)
+        self._look_at_own()
         self.window.refresh()
+
+    def first_look(self) -> None:
+        """Fill in everything, so that nothing is empty that is shown for the first time."""
+        for _ in range(SLOW):
+            self.tick()
 
     def _show(self, robot: str, event: Event) -> None:
         """What has come; in the network's thread."""
@@ -182,15 +197,24 @@ class App:
 
     # --- the simulated robot
 
-    def _own_ready(self, address: Address) -> None:
-        self._poster.deliver(lambda: self._follow_own(address))
+    def _look_at_own(self) -> None:
+        own = self._own
+        if own.address is not None and self.demo is None:
+            self._follow_own(own.address)
+        if self.demo is not None:
+            self.demo.refresh()
+        elif own.problem:
+            self.window.empty.say(own.problem, again=True)
+        if self._opening is not None:
+            self._opening.look(self.desk.selected, window=self.window.isVisible())
 
     def _follow_own(self, address: Address) -> None:
         station = self.follow("simulated", address)
         self.desk.select(station)
-
-    def _own_failed(self, why: str) -> None:
-        self._poster.deliver(lambda: self.window.empty.say(why, again=True))
+        if self._own.folder is not None:
+            control = SimControl(self._own.folder)
+            deliver = self._poster.deliver
+            self.demo = DemoBar(self.window, self._own, control, station, self.theme, deliver)
 
     def _desk_units(self, kept: QSettings) -> None:
         by_si = kept.value("units")
@@ -206,22 +230,22 @@ def run(
     record: Record | None = None,
     file: Path | None = None,
     signals: Sequence[str] = (),
+    opening: Opening | None = None,
 ) -> int:
     """Open the window until it is closed, or for so many seconds; the exit status.
 
     `file` has the settings; without one they are not to be changed. `signals` are globs of channels to begin
-    with.
+    with. `opening` is of a simulated robot that starts already.
     """
     sys.setswitchinterval(SWITCH_S)
-    qt = QApplication(sys.argv[:1])
-    qt.setApplicationName("gwrms")
-    qt.setStyle("Fusion")
-    with App(qt, settings, QSettings("gwrms", "gui"), FOLLOWING, record, file) as app:
+    qt = application()
+    with App(qt, settings, kept_settings(), FOLLOWING, record, file, opening) as app:
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: qt.quit())
         if signals:
             app.window.show_signals(signals)
+        app.first_look()
         app.window.show()
         if seconds is not None:
             QTimer.singleShot(round(seconds * 1000), qt.quit)

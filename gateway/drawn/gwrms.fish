@@ -331,6 +331,7 @@ complete -c gwrms -n '_shtab_gwrms_using train' -l held-out -x -d 'wearers, or s
 complete -c gwrms -n '_shtab_gwrms_using train' -l promote -d 'let it serve, if it is better'
 complete -c gwrms -n '_shtab_gwrms_using train' -l pseudo-labels -x -d 'learn also from what the serving model says with at least this probability, where nobody else says anything'
 complete -c gwrms -n '_shtab_gwrms_using train' -l adapt-from -x -d 'teach this one a wearer'"'"'s gait (gait_phase)'
+complete -c gwrms -n '_shtab_gwrms_using train' -l progress -d 'say how far it is, a line a step'
 complete -c gwrms -n '_shtab_gwrms_using train' -l cluster -x -d 'a Dask scheduler, for many sessions'
 complete -c gwrms -n '_shtab_gwrms_using train; and test $_shtab_gwrms_npos -eq 0' -ka "activity gait_phase falling" -d 'what it predicts: activity, gait_phase, falling'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a cloud -d 'the store: browse, upload, download, verify, tidy'

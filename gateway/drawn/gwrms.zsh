@@ -982,6 +982,7 @@ _shtab_gwrms_train_options=(
   "--promote[let it serve, if it is better]"
   "--pseudo-labels[learn also from what the serving model says with at least this probability, where nobody else says anything]:P:"
   "--adapt-from[teach this one a wearer\'s gait (gait_phase)]:MODEL:"
+  "--progress[say how far it is, a line a step]"
   "--cluster[a Dask scheduler, for many sessions]:ADDRESS:"
   ":what it predicts\: activity, gait_phase, falling:(activity gait_phase falling)"
 )

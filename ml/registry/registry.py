@@ -15,7 +15,7 @@ import msgspec
 from ml.errors import Overtaken, UnusableModel
 from ml.registry.card import Card, checked_name, content_id, decoded, encoded
 from ml.registry.code import features_hash
-from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers
+from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, Target
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
 from ml.store import Store, upkeep
@@ -152,12 +152,10 @@ class Registry:
 
         Raises:
             Overtaken: another one than `over` serves now; it stays.
-            UnusableModel: it cannot be loaded, or was adapted to another robot; what serves stays.
+            UnusableModel: as `promotable`; what serves stays.
 
         """
-        card, _ = self.load(model)
-        if card.robot not in ("", robot):
-            raise UnusableModel(f"{model} was adapted to {card.robot}: promote it for that robot alone")
+        card = self.promotable(model, robot)
         if model in self.shipped():  # the next version of GWRMS may bring another in its place
             for name in (*card.sha256, CARD):
                 self._create(model, name, self.file(model, name))
@@ -172,19 +170,47 @@ class Registry:
             self._withdraw(pointers, done, over, every.newest())
         return done
 
-    def rollback(self, task: str, robot: str = "", *, who: str, why: str = "") -> Pointer:
-        """Let that serve which did before; after another rollback, what did before that.
+    def promotable(self, model: str, robot: str = "") -> Card:
+        """The card of a model that may be promoted.
 
         Raises:
-            UnusableModel: nothing was before, that model cannot be loaded any more, or somebody else changed
-                what serves at the same time; what serves stays.
+            UnusableModel: it cannot be loaded, or was adapted to another robot.
 
         """
-        pointers = Pointers(self._objects, task, robot)
-        target = pointers.target()
-        if target.model:
-            self.load(target.model)
-        return pointers.roll_back(target, who, why)
+        card, _ = self.load(model)
+        if card.robot not in ("", robot):
+            raise UnusableModel(f"{model} was adapted to {card.robot}: promote it for that robot alone")
+        return card
+
+    def rollback(
+        self, task: str, robot: str = "", *, who: str, why: str = "", to: str | None = None
+    ) -> Pointer:
+        """Let that serve which did before; after another rollback, what did before that.
+
+        With `to` only where that is this model, or none where it is empty.
+
+        Raises:
+            Overtaken: it would go back to another one than `to` by now; what serves stays.
+            UnusableModel: as `before`, or somebody else changed what serves at the same time; what serves
+                stays.
+
+        """
+        target = self._target(task, robot)
+        if to is not None and target.model != to:
+            raise Overtaken(
+                f"{task}: going back leads to {target.model or 'no model of its own'} by now, not to "
+                f"{to or 'none'}: somebody changed what serves; look, and say it again"
+            )
+        return Pointers(self._objects, task, robot).roll_back(target, who, why)
+
+    def before(self, task: str, robot: str = "") -> str:
+        """The model that a rollback leads to, or none ("").
+
+        Raises:
+            UnusableModel: nothing was before, or that model cannot be loaded any more.
+
+        """
+        return self._target(task, robot).model
 
     def history(self, task: str, robot: str = "") -> list[Pointer]:
         """What has served, oldest first; raises `UnusableModel` where a part of that is damaged."""
@@ -201,6 +227,12 @@ class Registry:
                 yield task, robot, now
 
     # --- inside
+
+    def _target(self, task: str, robot: str) -> Target:
+        target = Pointers(self._objects, task, robot).target()
+        if target.model:
+            self.load(target.model)
+        return target
 
     def _check_serves(self, card: Card, robot: str, over: str | None) -> None:
         if over is None:

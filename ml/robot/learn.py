@@ -17,6 +17,7 @@ from sklearn.preprocessing import StandardScaler
 from ml.errors import UnusableData
 from ml.features.recipe import Features, Recipe
 from ml.neural import fixed_epochs
+from ml.progress import Tell, untold
 from ml.robot import novelty
 from ml.robot.learned import Floats, Learned, on_circle, scaled, scores, softmax
 from ml.robot.network import FAR, Rows, outputs
@@ -40,7 +41,13 @@ Network = Callable[[], Any]
 
 
 def learn(
-    task: Task, recipe: Recipe, features: Features, truth: npt.NDArray[Any], group: Groups, seed: int = 0
+    task: Task,
+    recipe: Recipe,
+    features: Features,
+    truth: npt.NDArray[Any],
+    group: Groups,
+    seed: int = 0,
+    told: Tell = untold,
 ) -> Learned:
     """A model for `task` from rows of features.
 
@@ -55,11 +62,17 @@ def learn(
     if not np.isfinite(features).all():
         raise UnusableData(f"{recipe.name}: features that are not finite cannot be learned from")
     teach = _classes if task.fold else _phases
-    return teach(task, recipe, features, truth, np.asarray(group), seed)
+    return teach(task, recipe, features, truth, np.asarray(group), seed, told)
 
 
 def _classes(
-    task: Task, recipe: Recipe, features: Features, truth: npt.NDArray[Any], group: Groups, seed: int
+    task: Task,
+    recipe: Recipe,
+    features: Features,
+    truth: npt.NDArray[Any],
+    group: Groups,
+    seed: int,
+    told: Tell,
 ) -> Learned:
     can = task.classes(recipe)
     rows = np.flatnonzero(np.isin(truth, can))
@@ -73,7 +86,7 @@ def _classes(
         _enough(name, int((truth == name).sum()))
     targets = (truth[rows, None] == np.array(classes)).argmax(axis=1)
     model, unseen, limits = _taught(
-        features[rows], targets, group[rows], lambda: _classifier(task, seed), len(classes), seed
+        features[rows], targets, group[rows], lambda: _classifier(task, seed), len(classes), seed, told
     )
     temperature = _temperature(unseen, targets)
     probabilities = softmax(unseen / temperature)
@@ -84,14 +97,20 @@ def _classes(
 
 
 def _phases(
-    task: Task, recipe: Recipe, features: Features, truth: npt.NDArray[Any], group: Groups, seed: int
+    task: Task,
+    recipe: Recipe,
+    features: Features,
+    truth: npt.NDArray[Any],
+    group: Groups,
+    seed: int,
+    told: Tell,
 ) -> Learned:
     rows = np.flatnonzero(np.isnan(truth).all(axis=1) | ~np.isnan(truth).any(axis=1))
     truth = truth[rows].astype(np.float64)
     steps = ~np.isnan(truth[:, 0])
     _enough("steps", int(steps.sum()))
     model, unseen, limits = _taught(
-        features[rows], pointers(truth), group[rows], lambda: _regressor(task, seed), 4, seed
+        features[rows], pointers(truth), group[rows], lambda: _regressor(task, seed), 4, seed, told
     )
     phases, lengths = on_circle(unseen.astype(np.float32))
     error = np.abs((phases - np.where(steps[:, None], truth, 0.0) + 0.5) % 1.0 - 0.5)
@@ -112,7 +131,13 @@ def pointers(truth: Floats) -> Rows:
 
 
 def _taught(
-    features: Features, targets: npt.NDArray[Any], group: Groups, network: Network, columns: int, seed: int
+    features: Features,
+    targets: npt.NDArray[Any],
+    group: Groups,
+    network: Network,
+    columns: int,
+    seed: int,
+    told: Tell,
 ) -> tuple[dict[str, Any], Floats, dict[str, float]]:
     """Parts that learned from all; what was said of left-out people (n, columns); the novelty's limits."""
     people = len(np.unique(group))
@@ -122,7 +147,9 @@ def _taught(
         )
     unseen = np.zeros((len(features), columns))
     far = np.zeros((2, len(features)))
-    for train, held_out in GroupKFold(min(FOLDS, people)).split(features, groups=group):
+    folds = min(FOLDS, people)
+    for fold, (train, held_out) in enumerate(GroupKFold(folds).split(features, groups=group)):
+        told("learning", fold, folds + 1)
         if len(np.unique(targets[train])) < 2:
             raise UnusableData(
                 "each class has examples of too few people: without some of them one class alone is left"
@@ -131,6 +158,7 @@ def _taught(
         inputs = scaled(parts["scale"], features[held_out])
         unseen[held_out] = _columns(parts["network"], outputs(parts["network"], inputs), columns)
         far[:, held_out] = novelty.distances(parts, inputs)
+    told("learning", folds, folds + 1)
     return _parts(features, targets, network, seed), unseen, novelty.limits((far[0], far[1]))
 
 

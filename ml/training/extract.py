@@ -8,20 +8,29 @@ import asyncio
 from collections.abc import Sequence
 
 from ml.errors import UnusableData
+from ml.progress import Tell, untold
 from ml.training.dataset import Ask, LeftOut, Part, part
 
 PATIENCE_S = 30  # for a cluster to answer
 
 
-def extract(asks: Sequence[Ask], cluster: str = "") -> list[Part | LeftOut]:
+def extract(asks: Sequence[Ask], cluster: str = "", told: Tell = untold) -> list[Part | LeftOut]:
     """A result for each that is asked for, in this order; `cluster` is a Dask scheduler's address.
+
+    `told` hears of each session that is read here.
 
     Raises:
         UnusableData: there is no Dask here, or the cluster does not answer, or gives up.
         StoreError, UnusableModel: as `part`.
 
     """
-    return _on(cluster, asks) if cluster else list(map(part, asks))
+    if cluster:
+        return _on(cluster, asks)
+    found = []
+    for at, ask in enumerate(asks):
+        told("reading sessions", at, len(asks))
+        found.append(part(ask))
+    return found
 
 
 def _on(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:

@@ -7,6 +7,7 @@ from msgspec import Struct
 
 from ml.errors import UnusableData
 from ml.features.recipe import Recipe
+from ml.progress import Tell, untold
 from ml.registry.card import TableVersion
 from ml.robot.task import TASKS, Task
 from ml.store import Store
@@ -37,13 +38,17 @@ class Wish(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """The sessions of a wish. `cluster` is the address of a Dask scheduler that reads them, if any."""
+    """The sessions of a wish. `cluster` is the address of a Dask scheduler that reads them, if any.
+
+    `told` hears how far the reading is.
+    """
 
     task: Task
     store: Store
     sessions: list[Session]  # in time's order
     versions: dict[str, int]
     cluster: str = ""
+    told: Tell = untold
 
     def parts(
         self, recipe: Recipe, teacher: str = "", least: float = 1.0
@@ -53,7 +58,7 @@ class Material:
             Ask(self.store.url, self.versions, each.robot, each.session, recipe.name, teacher, least)
             for each in self.sessions
         ]
-        found = extract(asks, self.cluster)
+        found = extract(asks, self.cluster, self.told)
         parts = [each for each in found if isinstance(each, Part)]
         return parts, [each for each in found if isinstance(each, LeftOut)]
 
@@ -82,7 +87,7 @@ class Material:
         )
 
 
-def material(url: str, wish: Wish, cluster: str = "") -> Material:
+def material(url: str, wish: Wish, cluster: str = "", told: Tell = untold) -> Material:
     """What the store has for a wish, at the versions of now.
 
     Raises:
@@ -104,7 +109,7 @@ def material(url: str, wish: Wish, cluster: str = "") -> Material:
     if not chosen:
         whose = f"of {wish.robot} " if wish.robot else ""
         raise UnusableData(f"no session {whose}in {url} has labels: give some (gwrms label --help)")
-    return Material(TASKS[wish.task], store, chosen, pinned, cluster)
+    return Material(TASKS[wish.task], store, chosen, pinned, cluster, told)
 
 
 def _labelled(store: Store, pinned: dict[str, int]) -> set[tuple[str, str]]:

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from ml.errors import UnusableData, UnusableModel
 from ml.features.recipe import Recipe
+from ml.progress import Tell, untold
 from ml.registry.card import Card, Metrics
 from ml.registry.card import Source as Origin
 from ml.registry.code import features_hash
@@ -58,8 +59,10 @@ class _Model:
     learned: Learned
 
 
-def train(registry: Registry, wish: Wish, cluster: str = "") -> Trained:
+def train(registry: Registry, wish: Wish, cluster: str = "", tell: Tell = untold) -> Trained:
     """Learn what is wished for from the registry's store, and judge it against what serves.
+
+    `tell` hears how far it is.
 
     Raises:
         UnusableData: nothing can be learned; says what is missing.
@@ -69,7 +72,7 @@ def train(registry: Registry, wish: Wish, cluster: str = "") -> Trained:
     """
     teach = _personal if wish.adapt_from else _general
     with threadpool_limits(1):  # the same bits on every computer; and networks as small as these learn faster
-        return teach(registry, material(registry.url, wish, cluster), wish)
+        return teach(registry, material(registry.url, wish, cluster, tell), wish)
 
 
 def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
@@ -93,7 +96,9 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
         np.concatenate([each.truth for each in lessons]),
         np.concatenate([np.full(len(each.truth), each.group) for each in lessons]),
         SEED,
+        found.told,
     )
+    found.told("judging", 0, 1)
     other = None if serving is None else serving.learned
     its = _its_parts(found, serving, recipe, [*judges, *regression])
     people = judge("held-out people", learned, judges, other, its)
@@ -114,7 +119,9 @@ def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
         raise UnusableModel(f"{base.name} is a model of {base.learned.task.name}, not of {found.task.name}")
     parts, left_out = found.parts(base.learned.recipe)
     walk = divided([each for each in parts if not each.regression])
+    found.told("learning", 0, 1)
     learned = adapted(base.learned, walk.early, SEED)
+    found.told("judging", 0, 1)
     serves = _serving(registry, found.task, wish.robot, base.learned.recipe)
     serving = serves or base
     its = _its_parts(found, serving, base.learned.recipe, walk.later)

@@ -2,11 +2,9 @@
 
 import argparse
 import getpass
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, Self
-from urllib.parse import urlsplit
+from typing import Any, Final
 
 import msgspec
 
@@ -19,11 +17,11 @@ from ml.registry.pointers import Pointer
 from ml.registry.registry import Registry
 from ml.robot.learned import Learned
 from ml.robot.task import TASKS
-from ml.store import StoreError
 from ml.store.private import private_files
-from ml.store.url import checked_url
 from server_gui.cli.cloud_options import add_url, parser, url, when
 from server_gui.cli.models_show import told
+from server_gui.core.models.catalogue import Serving, open_registry, why_it_cannot_serve
+from server_gui.core.models.names import EVERY
 from server_gui.core.settings.server_file import load
 
 USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL] [--json]
@@ -46,7 +44,6 @@ examples
   gwrms models promote gait_phase-77aa --robot exo-01 --why "adapted to Ada's walk\""""
 ROLLBACK_EPILOG: Final = """Said again, it goes back further. Before the first model of a robot's own serves
 that for all robots, and before the first of these what comes with GWRMS."""
-EVERY: Final = "every robot"
 NOTHING: Final = "nothing"  # that serves
 
 
@@ -72,21 +69,6 @@ def ls(argv: list[str]) -> int:
     for problem in damaged.values():
         warn("models", problem)
     return 1 if damaged else 0
-
-
-@dataclass(frozen=True, slots=True)
-class Serving:
-    """Whom each model serves that was promoted, and which came with GWRMS."""
-
-    whom: Mapping[str, list[str]]
-    shipped: frozenset[str]
-
-    @classmethod
-    def of(cls, registry: Registry) -> Self:
-        whom: dict[str, list[str]] = {}
-        for _, robot, now in registry.served():
-            whom.setdefault(now.model, []).append(robot or EVERY)
-        return cls(whom, registry.shipped())
 
 
 def _row(card: Card, serving: Serving) -> tuple[str, ...]:
@@ -116,7 +98,7 @@ def show(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
     card = registry.card(_named(registry, arguments.model))
-    problem = _problem(registry, card.id)
+    problem = why_it_cannot_serve(registry, card.id)
     serving = Serving.of(registry)
     if arguments.json:
         say_json(_fields(card, serving) | {"problem": problem})
@@ -124,15 +106,6 @@ def show(argv: list[str]) -> int:
         whom, shipped = serving.whom.get(card.id, []), card.id in serving.shipped
         say("\n".join(told(card, whom, problem, shipped=shipped)))
     return 1 if problem else 0
-
-
-def _problem(registry: Registry, model: str) -> str:
-    """Why it cannot serve here; nothing where it can."""
-    try:
-        registry.load(model)
-    except UnusableModel as error:
-        return str(error)
-    return ""
 
 
 def promote(argv: list[str]) -> int:
@@ -237,10 +210,7 @@ def _add_who(made: argparse.ArgumentParser, whose: str) -> None:
 
 
 def _registry(arguments: argparse.Namespace) -> Registry:
-    place = checked_url(url(arguments))
-    if arguments.url is not None and place.startswith("file://") and not Path(urlsplit(place).path).is_dir():
-        raise StoreError(f"there is no store at {place}")
-    return Registry(place)
+    return open_registry(url(arguments), given=arguments.url is not None)
 
 
 def _named(registry: Registry, text: str) -> str:

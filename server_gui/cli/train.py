@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from gateway.amounts import NONE
-from gateway.cli.text import say, say_json, table
+from gateway.cli.text import say, say_json, table, warn
 from ml.errors import Overtaken
+from ml.progress import Tell, untold
 from ml.registry.card import Metrics
 from ml.registry.registry import Registry
 from ml.robot.task import TASKS
@@ -17,6 +18,7 @@ from ml.training.material import Wish
 from ml.training.training import Trained, told, train
 from server_gui.cli.cloud_options import add_url, parser, url
 from server_gui.cli.models import NOTHING
+from server_gui.core.models.training import Progress
 
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
 EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
@@ -53,7 +55,7 @@ def main(argv: list[str]) -> int:
         arguments.adapt_from,
     )
     registry = Registry(url(arguments))
-    trained = train(registry, wish, arguments.cluster)
+    trained = train(registry, wish, arguments.cluster, _teller(arguments))
     model = registry.publish(trained.learned.state(), trained.card)
     promoted, overtaken = _promoted(registry, model, trained, arguments)
     if arguments.json:
@@ -61,6 +63,15 @@ def main(argv: list[str]) -> int:
     else:
         say("\n".join(_text(model, trained, overtaken, arguments, promoted=promoted)))
     return 0 if promoted or not arguments.promote else 1
+
+
+def _teller(arguments: argparse.Namespace) -> Tell:
+    """What tells how far it is: for machines in lines of JSON before the answer."""
+    if not arguments.progress:
+        return untold
+    if arguments.json:
+        return lambda what, done, total: say_json({"progress": Progress(what, done, total)})
+    return lambda what, done, total: warn("train", f"{what}, {done} of {total}")
 
 
 def _promoted(
@@ -122,6 +133,7 @@ def _answer(model: str, trained: Trained, overtaken: str, *, promoted: bool) -> 
     return {
         "model": model,
         "compared_with": trained.serving,
+        "over": trained.over,
         "better": trained.decision.better,
         "promoted": promoted,
         "overtaken": overtaken or None,
@@ -159,6 +171,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--adapt-from", default="", metavar="MODEL", help="teach this one a wearer's gait (gait_phase)"
     )
+    made.add_argument("--progress", action="store_true", help="say how far it is, a line a step")
     made.add_argument("--cluster", default="", metavar="ADDRESS", help="a Dask scheduler, for many sessions")
     return made
 

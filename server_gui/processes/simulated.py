@@ -4,6 +4,7 @@ import contextlib
 import json
 import re
 from collections.abc import Callable, Iterator
+from enum import Enum
 from pathlib import Path
 from typing import Final
 
@@ -13,25 +14,36 @@ from server_gui.processes.children import Child
 START_S: Final = 60.0  # for a simulator or a gateway to become ready, on a slow machine
 
 
+class Part(Enum):
+    """What a simulated robot is made of, in the order in which it starts."""
+
+    SIMULATOR = "simulator"
+    GATEWAY = "gateway"
+
+
 @contextlib.contextmanager
 def simulated_robot(
-    folder: Path, scenario: str, give_up: Callable[[], None]
+    folder: Path, scenario: str, give_up: Callable[[], None], ready: Callable[[Part], None] = lambda _: None
 ) -> Iterator[tuple[Address, Callable[[], None]]]:
     """Where its gateway listens, and how to check that all is well; `give_up` may raise while it starts.
+
+    `ready` hears of each part as soon as it is.
 
     Raises:
         ChildFailed: simulator or gateway ended, or never became ready.
 
     """
-    with Child("simulator", ["sim", "--dir", str(folder), "--scenario", scenario]) as simulator:
+    with Child(Part.SIMULATOR.value, ["sim", "--dir", str(folder), "--scenario", scenario]) as simulator:
         config = simulator.wait_ready(_config_in, START_S, give_up)
+        ready(Part.SIMULATOR)
 
         def check_simulator() -> None:
             give_up()
             simulator.check()
 
-        with Child("gateway", ["gateway", config, "--port", "0"]) as gateway:
+        with Child(Part.GATEWAY.value, ["gateway", config, "--port", "0"]) as gateway:
             address = gateway.wait_ready(_address_in, START_S, check_simulator)
+            ready(Part.GATEWAY)
 
             def check() -> None:
                 check_simulator()

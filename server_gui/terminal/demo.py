@@ -1,28 +1,40 @@
-"""The demo: simulator and gateway as processes, a view on them, and all three ended together."""
+"""The demo: simulator and gateway as processes, a view on them, and all three ended together.
+
+What is said is said from the beginning, and what takes long (Qt, tables, plots) is imported meanwhile.
+"""
 
 import contextlib
+import importlib
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from server_gui.core.settings.server_file import (
-    RecordingSettings,
-    RobotSettings,
-    ServerSettings,
-    StoreSettings,
-)
+from gateway.client import Address
+from server_gui.core.desk.first_steps import FirstSteps, Step
 from server_gui.processes.ending import Ended, Ending
-from server_gui.processes.simulated import simulated_robot
-from server_gui.terminal import headless
-from server_gui.terminal.controls import Controls
-from server_gui.terminal.dashboard import Dashboard, save_picture
-from server_gui.terminal.followed_robot import FollowedRobot
+from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.simulated import Part
+from server_gui.terminal.saying import say
 
+if TYPE_CHECKING:  # what takes long to import is imported while simulator and gateway start
+    from server_gui.terminal.controls import Controls
+    from server_gui.terminal.followed_robot import FollowedRobot
+
+DONE = {
+    Step.SIMULATOR: "the simulator runs",
+    Step.GATEWAY: "the gateway listens",
+    Step.WINDOW: "the window is open",
+    Step.DATA: "data come from every component",
+    Step.WALK: "the robot walks",
+}
 WHOLE_S = 60.0  # for every component to be there
 TICK_S = 0.05
 LINE_S = 1.0
+WALKS = "walk"  # the scenario
+SHOWN_ONLY = (Step.SIMULATOR, Step.GATEWAY)  # of the steps, where the terminal shows the rest
 DEMO_BATCH_S = 10.0  # of recording that go to the store together: soon enough to be looked at
 
 
@@ -50,27 +62,84 @@ def run(options: Options) -> int:
         DemoFailed: headless, and the robot did not walk.
 
     """
+    view = "the window" if options.window else "a view"
+    say(f"gwrms demo: a simulated exoskeleton, its gateway and {view} start; Ctrl-C ends all of them")
     with Ending() as ending, _folder(options.folder) as folder:
         try:
-            with simulated_robot(folder, options.scenario, ending.check) as (address, check):
+            with OwnRobot(options.scenario, folder) as own:
                 if options.window:
-                    return _window(str(address), options.seconds, folder)
-                with FollowedRobot(address) as session:
-                    _view(session, options, str(address), check)
+                    return _window(own, options, folder.absolute(), ending.check)
+                _in_terminal(own, options, ending.check)
         except Ended as ended:
             return ended.status
     return 0
 
 
-def _window(address: str, seconds: float | None, folder: Path) -> int:
+def _window(own: OwnRobot, options: Options, folder: Path, check: Callable[[], None]) -> int:
     """What it records stays in the demo's folder: nothing simulated comes among real recordings."""
-    from server_gui.app import run  # Qt is only here when it is wanted
-    from server_gui.core.desk.feeds import Record
+    from server_gui.views.application import application, kept_settings, kept_theme
+    from server_gui.views.first_run.splash import Splash
 
-    store = StoreSettings((folder / "store").absolute().as_uri())
+    steps = FirstSteps(_tell, [step for step in Step if step is not Step.WALK or options.scenario == WALKS])
+    qt = application()
+    splash = Splash(steps, kept_theme(qt, kept_settings()))
+    splash.show()
+    qt.processEvents()
+    check()
+    from server_gui.views.first_run.opening import Opening
+
+    opening = Opening(own, steps, splash)
+    for _ in import_slowly():
+        opening.look()
+        qt.processEvents()
+        check()
+    from server_gui.app import run
+    from server_gui.core.desk.feeds import Record
+    from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+
+    store = StoreSettings((folder / "store").as_uri())
     recorder = RecordingSettings(spool=folder / "spool", batch_s=DEMO_BATCH_S)
-    settings = ServerSettings({"simulated": RobotSettings(address)}, store, recorder)
-    return run(settings, seconds=seconds, record=Record("demo", "gwrms demo"))
+    settings = ServerSettings({}, store, recorder)
+    status = run(settings, seconds=options.seconds, record=Record("demo", "gwrms demo"), opening=opening)
+    own.check()
+    return status
+
+
+def import_slowly() -> Iterator[str]:
+    """Import what the window is made of, a part at a time; yields the name of each that is there."""
+    for name in ("numpy", "pyarrow.dataset", "deltalake", "pyqtgraph", "server_gui.core.archive.archive"):
+        importlib.import_module(name)
+        yield name
+
+
+def _tell(step: Step, took_s: float) -> None:
+    say(f"{took_s:5.1f} s  {DONE[step]}")
+
+
+def _in_terminal(own: OwnRobot, options: Options, check: Callable[[], None]) -> None:
+    steps = FirstSteps(_tell, SHOWN_ONLY)
+    from server_gui.terminal.followed_robot import FollowedRobot  # while the others start
+
+    address = _started(own, steps, check)
+
+    def check_all() -> None:
+        check()
+        own.check()
+
+    with FollowedRobot(address) as session:
+        _view(session, options, str(address), check_all)
+
+
+def _started(own: OwnRobot, steps: FirstSteps, check: Callable[[], None]) -> Address:
+    """Where the gateway listens, once it does."""
+    while True:
+        check()
+        own.check()
+        for part in own.ready:
+            steps.reach(Step.SIMULATOR if part is Part.SIMULATOR else Step.GATEWAY)
+        if own.address is not None:
+            return own.address
+        time.sleep(TICK_S)
 
 
 @contextlib.contextmanager
@@ -82,7 +151,10 @@ def _folder(wanted: Path | None) -> Iterator[Path]:
         yield Path(made)
 
 
-def _view(session: FollowedRobot, options: Options, where: str, check: Callable[[], None]) -> None:
+def _view(session: "FollowedRobot", options: Options, where: str, check: Callable[[], None]) -> None:
+    from server_gui.terminal.controls import Controls
+    from server_gui.terminal.dashboard import Dashboard
+
     controls = Controls(session.station)
     if options.headless:
         _wait_whole(session, check)
@@ -102,12 +174,14 @@ def _view(session: FollowedRobot, options: Options, where: str, check: Callable[
     _picture(options.picture, session, controls, where)
 
 
-def _picture(path: Path | None, session: FollowedRobot, controls: Controls, where: str) -> None:
+def _picture(path: Path | None, session: "FollowedRobot", controls: "Controls", where: str) -> None:
     if path is not None:
+        from server_gui.terminal.dashboard import save_picture
+
         save_picture(path, session.station, controls, where)
 
 
-def _wait_whole(session: FollowedRobot, check: Callable[[], None]) -> None:
+def _wait_whole(session: "FollowedRobot", check: Callable[[], None]) -> None:
     deadline = time.monotonic() + WHOLE_S
     while not session.is_whole():
         check()
@@ -122,7 +196,9 @@ def _wait_whole(session: FollowedRobot, check: Callable[[], None]) -> None:
         time.sleep(TICK_S)
 
 
-def _headless(session: FollowedRobot, seconds: float | None, check: Callable[[], None]) -> None:
+def _headless(session: "FollowedRobot", seconds: float | None, check: Callable[[], None]) -> None:
+    from server_gui.terminal import headless
+
     summary, robot, processing = session.begin_summary(), session.station.robot, session.station.processing
     began = time.monotonic()
     next_line = began + LINE_S
@@ -131,13 +207,13 @@ def _headless(session: FollowedRobot, seconds: float | None, check: Callable[[],
             check()
             session.update()
             if time.monotonic() >= next_line:
-                headless.say(headless.line(robot, processing.derived().gait, next_line - began))
+                say(headless.line(robot, processing.derived().gait, next_line - began))
                 next_line += LINE_S
             time.sleep(TICK_S)
     finally:
         # Also of a run that was cut short.
-        headless.say(headless.table(summary, processing.derived().gait, robot))
+        say(headless.table(summary, processing.derived().gait, robot))
     failures = summary.failures()
     if failures:
         raise DemoFailed(f"this was no walk: {'; '.join(failures)}")
-    headless.say("The joints moved, the feet alternated, no component was lost.")
+    say("The joints moved, the feet alternated, no component was lost.")

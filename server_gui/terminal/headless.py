@@ -1,10 +1,8 @@
 """The run without a screen: one compact line a second, and a table of what the run showed."""
 
 import math
-import sys
 
 from gateway.client import ConnectionState
-from gateway.plain import plain
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait
@@ -62,12 +60,6 @@ def _cadence(gait: Gait) -> str:
 def _stances(gait: Gait) -> str:
     shares = ((leg, gait.legs[leg].stance) for leg in Leg)
     return ", ".join(f"{leg} {NONE if share is None else f'{100 * share:.0f}'} %" for leg, share in shares)
-
-
-def say(text: str) -> None:
-    """Print a line at once, also into a pipe."""
-    sys.stdout.write(plain(text, "\n") + "\n")
-    sys.stdout.flush()
 
 
 def _degrees(value_rad: float | None) -> str:

@@ -1,60 +1,120 @@
-"""The page before there is a robot: how to get one, or a simulated one at once."""
+"""The page before there is a robot: add one, start a simulated one, or open a recording."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
+from gateway.client import Address, BadAddress
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plain import PlainLabel
 
-WORDS = """<p>No robot is in the list yet.</p>
-<p>Type the address of a robot's gateway at the left, below <i>Robots</i>: HOST:PORT, as
-<code>gwrms gateway</code> prints it.<br>Robots that are always there go into
-<code>~/.config/gwrms/server.toml</code>.</p>
-<p>Without hardware, a whole simulated exoskeleton walks on this computer:</p>"""
+WIDTH = 560  # at text of 100 %: longer lines are not read
+ADD = (
+    "Type where its gateway listens, HOST:PORT, as gwrms gateway prints it. Robots that are always there go "
+    "into ~/.config/gwrms/server.toml."
+)
+SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
+OPEN = "Everything that was recorded, played in the same views; no robot is needed."
 
 
 class EmptyView(QWidget):
-    """`simulator` asks for the simulated robot, `recordings` for what was recorded before."""
+    """`added` brings an address, `simulator` asks for the simulated robot, `recordings` for the past."""
 
+    added = Signal(str)
     simulator = Signal()
     recordings = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self._theme = theme
         self.setObjectName("page")
-        title = PlainLabel("Welcome to GWRMS")
-        title.setObjectName("title")
-        title.setStyleSheet("font-size: 180%;")
-        words = QLabel(WORDS)
-        words.setWordWrap(True)
-        words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.start = QPushButton("Start the simulator")
+        self.title = PlainLabel("Welcome to GWRMS")
+        self.title.setObjectName("title")
+        self.address, self.add = QLineEdit(), QPushButton("Add")
+        self.address.setPlaceholderText("HOST:PORT")
+        self.address.setAccessibleName("Address of the first robot")
+        self.address.returnPressed.connect(self._add)
+        self.add.setAccessibleName("Add this robot")
+        self.add.clicked.connect(self._add)
+        self.start, self.open = QPushButton("Start the simulated robot"), QPushButton("Open a recording")
         self.start.setObjectName("primary")
         self.start.clicked.connect(self._start)
-        look = QPushButton("Look at recordings")
-        look.clicked.connect(self.recordings)
-        self._said = PlainLabel()
-        self._said.setObjectName("dim")
-        self._said.setWordWrap(True)
-        self._said.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.open.clicked.connect(self.recordings)
+        self.wrong, self.said = _words(""), _words("")
+        self.wrong.hide()
+        self.said.hide()
+        self._column = QVBoxLayout()
+        self._column.setSpacing(10)
+        self._column.addWidget(self.title, 0, Qt.AlignmentFlag.AlignCenter)
+        self._column.addWidget(self._adding())
+        self._column.addWidget(_offer("Simulated robot", SIMULATE, self.start, self.said))
+        self._column.addWidget(_offer("Recording", OPEN, self.open))
+        middle = QWidget()
+        middle.setLayout(self._column)
+        self._middle = middle
         row = QHBoxLayout()
         row.addStretch(1)
-        row.addWidget(self.start)
-        row.addWidget(look)
+        row.addWidget(middle, 20)
         row.addStretch(1)
         everything = QVBoxLayout(self)
         everything.addStretch(1)
-        everything.addWidget(title, 0, Qt.AlignmentFlag.AlignCenter)
-        everything.addWidget(words)
         everything.addLayout(row)
-        everything.addWidget(self._said)
         everything.addStretch(2)
+        theme.changed.connect(self._restyle)
+        self._restyle()
 
     def say(self, text: str, *, again: bool) -> None:
         """Say how the start goes; `again`: it can be asked for once more."""
-        self._said.setText(text)
-        self.start.setEnabled(again)
+        if self.said.text() != text or self.start.isEnabled() != again:
+            self.said.setText(text)
+            self.said.setVisible(bool(text))
+            self.start.setEnabled(again)
+
+    # --- inside
+
+    def _adding(self) -> Card:
+        card = _offer("A robot", ADD)
+        row = QHBoxLayout()
+        row.addWidget(self.address, 1)
+        row.addWidget(self.add)
+        card.body.addLayout(row)
+        card.body.addWidget(self.wrong)
+        return card
+
+    def _add(self) -> None:
+        text = self.address.text().strip()
+        try:
+            where = str(Address.parse(text))
+        except BadAddress as error:
+            self.wrong.setText(str(error))
+            self.wrong.show()
+            return
+        self.wrong.hide()
+        self.added.emit(where)
 
     def _start(self) -> None:
-        self.say("The simulator is starting; this takes a few seconds …", again=False)
+        self.say("The simulated robot is starting; this takes a few seconds …", again=False)
         self.simulator.emit()
+
+    def _restyle(self) -> None:
+        self.title.setFont(self._theme.text_font(1.8, bold=True))
+        self._middle.setMaximumWidth(self._theme.px(WIDTH))
+
+
+def _offer(title: str, text: str, *more: QWidget) -> Card:
+    card = Card(title)
+    card.body.addWidget(_words(text))
+    for each in more:
+        row = QHBoxLayout()
+        row.addWidget(each, 0 if isinstance(each, QPushButton) else 1)
+        if isinstance(each, QPushButton):
+            row.addStretch(1)
+        card.body.addLayout(row)
+    return card
+
+
+def _words(text: str) -> PlainLabel:
+    label = PlainLabel(text)
+    label.setObjectName("dim")
+    label.setWordWrap(True)
+    return label

@@ -35,6 +35,7 @@ from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.help import Help
+from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.recordings.panel import Recordings
@@ -102,6 +103,7 @@ class MainWindow(QMainWindow):
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
+        self.empty.added.connect(self.added)
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()
@@ -112,13 +114,15 @@ class MainWindow(QMainWindow):
         if archive is not None:
             self.recordings = Recordings(archive, desk.recording, theme)
             self.cloud = Cloud(archive, desk.recording, theme)
-            self._views += (self.recordings, self.cloud)
+            self.models = ModelsPage(archive.models, theme)
+            self._views += (self.recordings, self.cloud, self.models)
             self.tabs.addTab(Scrolled(self.recordings), "Re&cordings")
             self.tabs.addTab(Scrolled(self.cloud), "C&loud")
+            self.tabs.addTab(Scrolled(self.models), "&Models")
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
-        self._pages.addWidget(self.empty)
+        self._pages.addWidget(Scrolled(self.empty))
         self._pages.addWidget(self.tabs)
         self._build()
         self._offer_help()

@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from server_gui.app import App
+from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
@@ -102,3 +103,19 @@ def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplica
         station = app.desk.stations[0]
         wait(lambda: station.title == "simulated-exo" and not station.robot.is_stale(), "was live")
         wait(lambda: station.processing.derived().gait.walking, "walked")
+        assert app.demo is not None
+        demo = app.demo
+        app.stop("test")
+        wait(
+            lambda: station.stopping.held and not demo.walk.isEnabled(),
+            "held the stop, and did not offer to walk",
+        )
+        station.reset()
+        wait(lambda: not station.stopping.held and demo.walk.isEnabled(), "was reset, and offered to walk")
+        assert set(_states(station)) == {"switch on disabled"}
+        demo.walk.click()
+        wait(lambda: set(_states(station)) == {"operation enabled"}, "was started by its own controller")
+
+
+def _states(station: Station) -> list[str | None]:
+    return [station.robot.word(f"{joint}.state") for joint in station.robot.names("joint")]

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QComboBox,
     QLineEdit,
-    QPushButton,
     QWidget,
 )
 
@@ -65,9 +64,7 @@ def test_recordings_can_be_looked_at_without_a_robot(
     bench.desk.select(None)
     whole.draw()
     assert full_window.empty.isVisible()
-    next(
-        button for button in full_window.empty.findChildren(QPushButton) if "recordings" in button.text()
-    ).click()
+    full_window.empty.open.click()
     page = full_window.recordings.list
     whole.until(lambda: page.sessions.rowCount(), "listed it")
     assert page.isVisible()

@@ -75,7 +75,7 @@ def test_no_label_is_left_to_find_out_by_itself() -> None:
         for line in file.read_text().splitlines()
         if re.search(r"(?<!\w)(QLabel|QTextBrowser|QErrorMessage)\(", line) and "class " not in line
     ]
-    own = {("empty.py", "words = QLabel(WORDS)"), ("store_page.py", "explained = QLabel(EXPLAINED)")}
+    own = {("store_page.py", "explained = QLabel(EXPLAINED)")}
     rich_ones = {("trend.py", "self.legend = QLabel()"), ("unit_plot.py", "self._legend = QLabel()")}
     assert set(labels) == own | rich_ones | {("help.py", "self.text = QTextBrowser()")}  # the manual's
     tips = [

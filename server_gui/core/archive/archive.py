@@ -13,6 +13,7 @@ from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.news import NewsKind
+from server_gui.core.models.models import Models
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
@@ -39,6 +40,7 @@ class Archive:
         self.playback = Playback(self._reading.do, deliver, desk.shown)
         self.labels = SessionLabels(settings, self._reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
+        self.models = Models(settings.store.url, deliver, self._robots, author)
         self.tape: Tape | None = None  # of the session that is chosen
         self.problem = ""  # why there is none
         self.chosen: Session | None = None
@@ -47,7 +49,7 @@ class Archive:
 
     def close(self, within_s: float) -> bool:
         """End everything; False where something hangs, which only the end of the process ends."""
-        ended = [part.close(within_s) for part in (self.jobs, self.library, self._reading)]
+        ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self._reading)]
         return all(ended)
 
     def choose(self, session: Session | None) -> None:
@@ -69,6 +71,10 @@ class Archive:
         self.playback.open(self.tape, self._words(self.tape.session.robot), recall)
         self.labels.open(self.tape.session)
         return True
+
+    def _robots(self) -> set[str]:
+        """Those of the server's file, and those that are shown."""
+        return {*self.settings.robots, *(station.name for station in self._desk)}
 
     def _words(self, robot: str) -> dict[str, dict[str, str]]:
         """The words of states, which recordings do not have: of the live robot, if it is there."""

@@ -16,8 +16,14 @@ from server_gui.core.threads.background import Background
 
 log = logging.getLogger(__name__)
 
-KNOWN: Final = (StoreError, RecordingError, NobodyCollects, OSError)
 KEPT: Final = 100  # jobs that are remembered
+
+
+class JobFailed(Exception):
+    """The work cannot be done; the message says why, and what to do."""
+
+
+KNOWN: Final = (JobFailed, StoreError, RecordingError, NobodyCollects, OSError)
 
 
 class JobState(Enum):
@@ -78,11 +84,11 @@ Work = Callable[[Job], str]  # tells what came of it
 class Jobs:
     """The newest first. What goes wrong with a job stands on it, and ends no other."""
 
-    def __init__(self, told: Callable[[Job], None] = lambda _: None) -> None:
+    def __init__(self, told: Callable[[Job], None] = lambda _: None, thread: str = "jobs") -> None:
         """`told` hears in the jobs' thread of each that is over."""
         self.jobs: deque[Job] = deque(maxlen=KEPT)
         self._told = told
-        self._thread = Background("jobs")
+        self._thread = Background(thread)
 
     def add(self, name: str, work: Work) -> Job:
         """Do this when its turn comes."""

@@ -78,6 +78,7 @@ class JobsTable(QTableWidget):
             if item is not None and item.text() != text:
                 item.setText(text)
                 set_tip(item, text)
+            if item is not None:  # the palette may be another by now
                 item.setForeground(self._theme.colour("bad" if job.state is JobState.FAILED else "text"))
         for bar in self.cellWidget(row, BAR).findChildren(QProgressBar):
             bar.setRange(0, 0 if job.state is JobState.RUNNING and job.total is None else STEPS)

@@ -1,12 +1,12 @@
 """A view that is scrolled where the screen is small or the text large, rather than the window made larger."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QScrollArea, QWidget
 
 
 class Scrolled(QScrollArea):
-    """Has no focus of its own. Words that need more lines where they are narrow get them."""
+    """Has no focus of its own. Words that need more lines where they are narrow get them, also later ones."""
 
     def __init__(self, view: QWidget) -> None:
         super().__init__()
@@ -15,8 +15,16 @@ class Scrolled(QScrollArea):
         self.setWidget(view)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest and watched is self._view:
+            self._grow()
+        return super().eventFilter(watched, event)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self._grow()
+
+    def _grow(self) -> None:
         layout = self._view.layout()
         if layout is not None and layout.hasHeightForWidth():
             width = max(self.viewport().width(), layout.totalMinimumSize().width())

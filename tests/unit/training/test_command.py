@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from gateway import main
+from ml.progress import Tell
 from ml.registry.registry import Registry
 from ml.training import training
 from ml.training.material import Wish
@@ -56,8 +57,8 @@ def test_a_model_that_another_one_has_overtaken_while_it_was_judged_is_not_promo
     put(folder_url, tmp_path / "spool", [day(f"s{number}", number, each_s=5.0) for number in range(4)])
     teach = training.train
 
-    def overtaken(registry: Registry, wish: Wish, cluster: str) -> Trained:
-        trained = teach(registry, wish, cluster)
+    def overtaken(registry: Registry, wish: Wish, cluster: str, tell: Tell) -> Trained:
+        trained = teach(registry, wish, cluster, tell)
         faster = registry.publish(trained.learned.state(), replace(trained.card, notes="faster"))
         registry.promote(faster, who="Ada", why="a test")
         return trained

@@ -1,0 +1,13 @@
+"""How far something long is: whoever does it tells, whoever shows it listens."""
+
+from typing import Protocol
+
+
+class Tell(Protocol):
+    """Hears what is done now, and how much of it: `done` of `total` steps of the same kind."""
+
+    def __call__(self, what: str, done: int, total: int) -> None: ...
+
+
+def untold(what: str, done: int, total: int) -> None:
+    """For whoever does not want to know."""

@@ -1,0 +1,1 @@
+"""Learned models, as window and commands look at them: named, compared, trained, promoted, rolled back."""

@@ -1,0 +1,142 @@
+"""Every model of a store: whom it serves, what it would take the place of, how right it was last week."""
+
+from collections.abc import Callable, Iterator, Mapping, Set
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Self
+from urllib.parse import urlsplit
+
+from ml.errors import UnusableModel
+from ml.registry.card import Card
+from ml.registry.registry import Registry
+from ml.store import StoreError
+from ml.store.url import checked_url
+from server_gui.core.models.names import EVERY, model_names
+from server_gui.core.prediction.state import Quality
+from server_gui.core.prediction.track_record import TrackRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """Whom each model serves that was promoted, and which came with GWRMS."""
+
+    whom: Mapping[str, list[str]]
+    shipped: frozenset[str]
+
+    @classmethod
+    def of(cls, registry: Registry) -> Self:
+        whom: dict[str, list[str]] = {}
+        for _, robot, now in registry.served():
+            whom.setdefault(now.model, []).append(robot or EVERY)
+        return cls(whom, registry.shipped())
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A model; `serving` is the id of what serves in its place now, which may be itself, or ""."""
+
+    card: Card
+    name: str
+    shipped: bool
+    serves: tuple[str, ...]
+    serving: str
+    hits: Mapping[str, Quality] = field(default_factory=dict)  # by robot, within the last week
+
+    @property
+    def whom(self) -> str:
+        """Return whom it serves, in words."""
+        return "where no other does" if self.shipped else ", ".join(self.serves) or "nobody"
+
+
+@dataclass(frozen=True, slots=True)
+class Catalogue:
+    """What a look has found, newest first; `problem` says why there is nothing, or not all."""
+
+    entries: tuple[Entry, ...] = ()
+    damaged: tuple[str, ...] = ()
+    problem: str = ""
+    hits_problem: str = ""  # why nothing is known of the last week
+
+    def find(self, model: str) -> Entry | None:
+        """Return a model by its id."""
+        return next((entry for entry in self.entries if entry.card.id == model), None)
+
+
+Hits = Mapping[str, Mapping[str, Quality]]  # by model and robot
+
+
+def open_registry(url: str, *, given: bool = True) -> Registry:
+    """Return the registry at a store's URL; where it is `given` by somebody, it must be there.
+
+    Raises:
+        StoreError: the URL is none, or there is no such folder.
+
+    """
+    place = checked_url(url)
+    if given and place.startswith("file://") and not Path(urlsplit(place).path).is_dir():
+        raise StoreError(f"there is no store at {place}")
+    return Registry(place)
+
+
+def why_it_cannot_serve(registry: Registry, model: str) -> str:
+    """Return why a model cannot serve here; nothing where it can."""
+    try:
+        registry.load(model)
+    except UnusableModel as error:
+        return str(error)
+    return ""
+
+
+class Looking:
+    """Looks into one store again and again; for one thread."""
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+        self._record: TrackRecord | None = None
+
+    def look(self, robots: Set[str], ending: Callable[[], bool] = lambda: False) -> Catalogue:
+        """Return what there is now; blocks. What goes wrong is a problem in it."""
+        try:
+            registry = open_registry(self._url, given=False)
+            hits, hits_problem = self._hits(robots, ending)
+            entries = tuple(reversed(list(_entries(registry, hits))))
+            return Catalogue(entries, tuple(registry.damaged().values()), "", hits_problem)
+        except (StoreError, UnusableModel, OSError) as error:
+            return Catalogue(problem=str(error))
+
+    def _hits(self, robots: Set[str], ending: Callable[[], bool]) -> tuple[Hits, str]:
+        try:
+            if self._record is None:
+                self._record = TrackRecord(self._url)
+            figures = self._record.figures(robots, datetime.now(UTC), ending)
+        except (StoreError, OSError) as error:
+            self._record = None
+            return {}, str(error)
+        found: dict[str, dict[str, Quality]] = {}
+        for robot, tasks in figures.items():
+            for models in tasks.values():
+                for model, quality in models.items():
+                    found.setdefault(model, {})[robot] = quality
+        return found, ""
+
+
+def _entries(registry: Registry, hits: Hits) -> Iterator[Entry]:
+    cards, serving = registry.entries(), Serving.of(registry)
+    names = model_names(cards, serving.shipped)
+    for card in cards:
+        yield Entry(
+            card,
+            names[card.id],
+            card.id in serving.shipped,
+            tuple(serving.whom.get(card.id, ())),
+            _in_its_place(registry, card),
+            hits.get(card.id, {}),
+        )
+
+
+def _in_its_place(registry: Registry, card: Card) -> str:
+    try:
+        return registry.serving(card.task, card.robot, set(card.channels)) or ""
+    except UnusableModel:
+        return ""  # what should serve is damaged, which the list says

@@ -1,0 +1,156 @@
+"""One model beside another: figures, classes and wearers, each with which of the two is better."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.amounts import NONE, counted
+from ml.registry.card import Card, Metrics
+from server_gui.core.models.catalogue import Catalogue, Entry
+from server_gui.core.models.names import class_name
+from server_gui.core.prediction.state import WITHIN_DAYS
+
+UNKNOWN: Final = "not labelled"
+ALIKE: Final = 0.05  # percent: a difference that is not shown is none
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure of a card: its words, what makes a percent of it, and whether more is better."""
+
+    words: str
+    scale: float
+    more_is_better: bool
+
+
+FIGURES: Final[Mapping[str, Figure]] = {
+    "macro_f1": Figure("F1, mean over classes", 100.0, True),
+    "accuracy": Figure("Right", 100.0, True),
+    "rmse_percent": Figure("Error, of the gait cycle", 1.0, False),
+    "abstained": Figure("Says “unknown”", 100.0, False),
+    "stepping_where_none_steps": Figure("Says steps where nobody steps", 100.0, False),
+}
+F1: Final = Figure("F1", 100.0, True)
+CALIBRATION: Final = Figure("Probabilities are off by", 100.0, False)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A figure of both, in percent; None where one has none. `decisions` are those behind it, where known."""
+
+    group: str
+    name: str
+    one: float | None
+    other: float | None
+    more_is_better: bool
+    decisions: int | None = None
+
+    @property
+    def difference(self) -> float | None:
+        """One less the other, in percent points."""
+        return None if self.one is None or self.other is None else self.one - self.other
+
+    @property
+    def verdict(self) -> str:
+        """Return whether the one is better or worse than the other; nothing where that cannot be said."""
+        difference = self.difference
+        if difference is None:
+            return ""
+        if abs(difference) < ALIKE:
+            return "alike"
+        return "better" if (difference > 0) == self.more_is_better else "worse"
+
+
+def rows(one: Card, other: Card | None) -> list[Row]:
+    """Return everything by which the two were judged, each on people whom it had never seen."""
+    mine, its = one.metrics, Metrics() if other is None else other.metrics
+    return [*_overall(mine, its), *_classes(mine, its), *_wearers(one, other)]
+
+
+def notes(one: Entry, other: Entry | None) -> Iterator[str]:
+    """Yield what is to be known of such a comparison."""
+    if other is not None and set(one.card.held_out) != set(other.card.held_out):
+        yield "Each was judged on sessions of its own, so compare roughly; training judges both on the same."
+    if other is not None and (known := set(other.card.learned) & set(one.card.held_out)):
+        yield f"{other.name} has learned from {counted(len(known), 'session')} that judged the other."
+
+
+def last_week(entry: Entry) -> str:
+    """Return how often it was right of late, in words; never a number where nobody has labelled."""
+    if not entry.hits:
+        return f"not known: nothing that it said within {WITHIN_DAYS} days was labelled"
+    return "; ".join(f"{robot}: {quality.text}" for robot, quality in sorted(entry.hits.items()))
+
+
+def week_short(entry: Entry) -> str:
+    """Return the same for a narrow place."""
+    return (
+        ", ".join(f"{robot} {quality.shares[0]}" for robot, quality in sorted(entry.hits.items())) or UNKNOWN
+    )
+
+
+def usual_other(entry: Entry, found: Catalogue) -> Entry | None:
+    """Return what a model is compared with first: what serves in its place, else the newest beside it."""
+    if entry.serving and entry.serving != entry.card.id:
+        return found.find(entry.serving)
+    beside = (each for each in found.entries if each.card.task == entry.card.task and each is not entry)
+    return next(beside, None)
+
+
+def percent(value: float | None) -> str:
+    """Return a percentage for people."""
+    return NONE if value is None else f"{value:.1f} %"
+
+
+def signed(value: float | None) -> str:
+    """Return a difference in percent points."""
+    if value is None:
+        return NONE
+    return "±0.0" if abs(value) < ALIKE else f"{value:+.1f}".replace("-", "−")
+
+
+def headline(card: Card) -> str:
+    """Return the figure that people ask for first."""
+    for name in ("macro_f1", "rmse_percent"):
+        if name in card.metrics.figures:
+            figure = FIGURES[name]
+            short = "F1" if name == "macro_f1" else "error"
+            return f"{short} {percent(card.metrics.figures[name] * figure.scale)}"
+    return NONE
+
+
+def _overall(mine: Metrics, its: Metrics) -> Iterator[Row]:
+    for name, figure in FIGURES.items():
+        one, other = (_scaled(metrics.figures.get(name), figure) for metrics in (mine, its))
+        if one is not None or other is not None:
+            yield Row("On people never seen", figure.words, one, other, figure.more_is_better)
+    one, other = (_scaled(metrics.calibration_error, CALIBRATION) for metrics in (mine, its))
+    if one is not None or other is not None:
+        yield Row("On people never seen", CALIBRATION.words, one, other, CALIBRATION.more_is_better)
+
+
+def _classes(mine: Metrics, its: Metrics) -> Iterator[Row]:
+    for name in dict.fromkeys((*mine.per_class, *its.per_class)):
+        one, other = mine.per_class.get(name), its.per_class.get(name)
+        yield Row(
+            "By class, F1",
+            class_name(name),
+            None if one is None or not one.support else one.f1 * F1.scale,
+            None if other is None or not other.support else other.f1 * F1.scale,
+            F1.more_is_better,
+            None if one is None else one.support,
+        )
+
+
+def _wearers(one: Card, other: Card | None) -> Iterator[Row]:
+    figure = FIGURES["rmse_percent" if "rmse_percent" in one.metrics.figures else "macro_f1"]
+    mine = one.metrics.per_subject
+    its = {} if other is None else other.metrics.per_subject
+    unit = "error" if not figure.more_is_better else "F1"
+    for name in dict.fromkeys((*mine, *its)):
+        first, second = (_scaled(found.get(name), figure) for found in (mine, its))
+        yield Row(f"By wearer, {unit}", name, first, second, figure.more_is_better)
+
+
+def _scaled(value: float | None, figure: Figure) -> float | None:
+    return None if value is None else value * figure.scale

@@ -1,0 +1,95 @@
+"""A training in a process of its own, `gwrms train`: what is asked of it, and what it says."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import msgspec
+
+from server_gui.core.cloud.jobs import Job, JobFailed
+from server_gui.core.models.names import EVERY, task_name
+
+UNITS: Final = {
+    "reading sessions": "sessions read",
+    "learning": "rounds of learning",
+    "judging": "judged",
+}
+
+
+class Progress(msgspec.Struct, frozen=True):
+    """How far it is."""
+
+    what: str
+    done: int
+    total: int
+
+
+class Trained(msgspec.Struct, frozen=True):
+    """What came of it: the model's id, what it may take the place of, and whether it is better."""
+
+    model: str
+    better: bool
+    why: tuple[str, ...]
+    over: str = ""
+    left_out: dict[str, str] = {}
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """Return it in words."""
+        return f"{'Better' if self.better else 'Not better'}: {'; '.join(self.why)}"
+
+
+class _Wrong(msgspec.Struct, frozen=True):
+    message: str
+
+
+class _Line(msgspec.Struct, frozen=True):
+    """Any line that it prints."""
+
+    progress: Progress | None = None
+    error: _Wrong | None = None
+    model: str | None = None
+
+
+class TrainingFailed(JobFailed):
+    """It cannot be trained; the message says what is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingWish:
+    """What is to be learned, from the store's labelled sessions; `robot` "": from all, for every robot."""
+
+    task: str
+    robot: str = ""
+    held_out: Sequence[str] = ()
+
+    @property
+    def title(self) -> str:
+        """Return its name among jobs."""
+        return f"Train {task_name(self.task).lower()} for {self.robot or EVERY}"
+
+    def arguments(self, url: str) -> list[str]:
+        """Return the command."""
+        robot = ["--robot", self.robot] if self.robot else []
+        held_out = [word for who in self.held_out for word in ("--held-out", who)]
+        return ["train", self.task, "--json", "--progress", "--url", url, *robot, *held_out]
+
+
+def heard(line: str, job: Job) -> Trained | None:
+    """Take a line that it printed; return what came of it, once it says so.
+
+    Raises:
+        TrainingFailed: it says that it cannot be.
+
+    """
+    try:
+        said = msgspec.json.decode(line, type=_Line)
+    except msgspec.DecodeError:
+        return None  # a warning of a library
+    if said.error is not None:
+        raise TrainingFailed(said.error.message)
+    if said.progress is not None:
+        job.expect(said.progress.total, UNITS.get(said.progress.what, said.progress.what))
+        job.done = said.progress.done
+    return None if said.model is None else msgspec.json.decode(line, type=Trained)

@@ -1,0 +1,28 @@
+"""The one Qt application of this process, and the theme as it was kept from the last time."""
+
+import sys
+
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QApplication
+
+from server_gui.views.theme import Look, Theme
+
+
+def application() -> QApplication:
+    """Return the application, which is made where there is none yet."""
+    made = QApplication.instance()
+    if not isinstance(made, QApplication):
+        made = QApplication(sys.argv[:1])
+        made.setApplicationName("gwrms")
+        made.setStyle("Fusion")
+    return made
+
+
+def kept_settings() -> QSettings:
+    """Return what the window keeps from one time to the next."""
+    return QSettings("gwrms", "gui")
+
+
+def kept_theme(qt: QApplication, kept: QSettings) -> Theme:
+    """Return the look and the size of text that were chosen last."""
+    return Theme(qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100)

@@ -1,0 +1,144 @@
+"""What can be done with the simulated robot: let it walk, break something, mend it, look around."""
+
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtWidgets import QHBoxLayout, QMenu, QPushButton, QToolBar, QVBoxLayout, QWidget
+
+from server_gui.core.desk.station import Station
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.threads.background import Background
+from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.sim_control import Listed, SimControl, SimulatorRefuses
+from server_gui.views.first_run.fault_menu import fill, words
+from server_gui.views.first_run.tour import Tour
+from server_gui.views.main_window import MainWindow
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.plain import PlainLabel, set_tip
+
+TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
+HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
+WALKS: Final = "Tells the simulated controller to start and the wearer to walk, as after a stop or a fault"
+
+
+class DemoBar(QToolBar):
+    """Below the header; every question to the simulator waits in a thread of its own, which `end` joins."""
+
+    def __init__(
+        self,
+        window: MainWindow,
+        own: OwnRobot,
+        control: SimControl,
+        station: Station,
+        theme: Theme,
+        deliver: Deliver,
+    ) -> None:
+        super().__init__("Simulated robot")
+        self._own, self._control, self._station = own, control, station
+        self._kept = window.kept
+        self._deliver = deliver
+        self._asking = Background("simulator")
+        self._listed = Listed({}, ())
+        self._failed = ""
+        self.setObjectName("Simulated robot")
+        self.setMovable(False)
+        self.setFloatable(False)
+        self.toggleViewAction().setEnabled(
+            False
+        )  # it can be closed by nobody: what is broken is to be mended
+        self.walk, self.mend, self.again = (
+            QPushButton("Start walking"),
+            QPushButton("Mend all"),
+            QPushButton("Tour"),
+        )
+        self.breaking = QPushButton("Break something")
+        self.faults = QMenu(self.breaking)
+        self.said = PlainLabel()
+        self.said.setObjectName("dim")
+        self.said.setWordWrap(True)
+        self.tour = Tour(window, theme)
+        self._build()
+        window.addToolBar(self)
+        self._ask(lambda: None)
+        if not window.kept.value(TOURED, defaultValue=False, type=bool):
+            self._begin_tour()
+
+    def end(self, within_s: float) -> bool:
+        """Ask no more; False where a question hangs."""
+        return self._asking.close(within_s)
+
+    def refresh(self) -> None:
+        """Show how it is now."""
+        held = self._station.stopping.held
+        self.walk.setEnabled(not held and self._own.is_running)
+        set_tip(self.walk, HELD if held else WALKS)
+        self.breaking.setEnabled(bool(self._listed.faults) and self._own.is_running)
+        self.mend.setEnabled(bool(self._listed.active) and self._own.is_running)
+        set_text(self.said, self._words(held=held))
+        self.tour.refresh()
+
+    # --- inside
+
+    def _build(self) -> None:
+        self.walk.clicked.connect(lambda: self._ask(self._control.walk))
+        self.mend.clicked.connect(lambda: self._ask(self._control.mend))
+        self.mend.setToolTip(
+            "End every fault that is on. A drive that has tripped stays off until its fault is cleared"
+        )
+        self.again.clicked.connect(self._begin_tour)
+        self.again.setToolTip("What stands where, in five steps")
+        self.breaking.setMenu(self.faults)
+        self.faults.aboutToShow.connect(self._fill)
+        self.breaking.setToolTip("The simulator's faults by name, as gwrms sim-fault makes them")
+        self.tour.left.connect(self._toured)
+        row = QHBoxLayout()
+        row.setContentsMargins(10, 0, 10, 2)
+        row.setSpacing(6)
+        for button in (self.walk, self.breaking, self.mend, self.again):
+            row.addWidget(button)
+        row.addWidget(self.said, 1)
+        page = QWidget()
+        page.setObjectName("dock")
+        column = QVBoxLayout(page)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(self.tour)
+        self.addWidget(page)
+
+    def _begin_tour(self) -> None:
+        self.again.setEnabled(False)
+        self.tour.begin()
+
+    def _toured(self) -> None:
+        self.again.setEnabled(True)
+        self._kept.setValue(TOURED, True)
+
+    def _words(self, *, held: bool) -> str:
+        if self._own.problem:
+            return f"The simulated robot has ended: {self._own.problem}"
+        if self._failed:
+            return f"Not done: {self._failed}"
+        broken = ", ".join(f"{words(one.name)} on {words(one.on)}" for one in self._listed.active)
+        said = f"Broken: {broken}" if broken else "Simulated robot; nothing is broken"
+        return f"{said}. A stop is held: reset it, then Start walking" if held else said
+
+    def _ask(self, work: Callable[[], None]) -> None:
+        """Do this in the thread, and look then what is broken."""
+
+        def asked() -> Listed:
+            work()
+            return self._control.listed()
+
+        when_done(self._asking.do(asked), self._deliver, self._know, self._refused)
+
+    def _know(self, listed: Listed) -> None:
+        self._listed, self._failed = listed, ""
+
+    def _fill(self) -> None:
+        """Never while it is open."""
+        fill(self.faults, self._listed, lambda fault, on: self._ask(lambda: self._control.break_(fault, on)))
+
+    def _refused(self, error: Exception) -> None:
+        self._failed = str(error) if isinstance(error, SimulatorRefuses) else type(error).__name__

@@ -1,0 +1,43 @@
+"""What the window does until the simulated robot walks: it counts the steps, and ends the splash."""
+
+from typing import TYPE_CHECKING, Final
+
+from server_gui.core.desk.first_steps import FirstSteps, Step
+from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.simulated import Part
+from server_gui.views.first_run.splash import Splash
+
+if TYPE_CHECKING:  # it takes long to import, and the splash does not wait for it
+    from server_gui.core.desk.station import Station
+
+STEPS: Final = {Part.SIMULATOR: Step.SIMULATOR, Part.GATEWAY: Step.GATEWAY}
+LONGEST_S: Final = 60.0  # that a splash stands there
+
+
+class Opening:
+    """`look` is called now and then, while the robot starts and after that."""
+
+    def __init__(self, own: OwnRobot, steps: FirstSteps, splash: Splash) -> None:
+        self.own = own
+        self._steps = steps
+        self._splash = splash
+        self._is_over = False
+
+    def look(self, station: "Station | None" = None, *, window: bool = False) -> None:
+        """Count what is so; `window`: it is there."""
+        if self._is_over:
+            return
+        for part in self.own.ready:
+            self._steps.reach(STEPS[part])
+        if window and Step.WINDOW not in self._steps.took_s:
+            self._steps.reach(Step.WINDOW)
+            self._splash.raise_()  # the window has come to lie above it
+        if station is not None and station.robot.parts and station.is_live:
+            self._steps.reach(Step.DATA)
+            if station.processing.derived().gait.walking:
+                self._steps.reach(Step.WALK)
+        self._splash.refresh()
+        too_long = self._steps.elapsed_s > LONGEST_S
+        if too_long or self.own.problem or self._steps.now is None:
+            self._is_over = True
+            self._splash.close()

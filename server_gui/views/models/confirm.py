@@ -1,0 +1,48 @@
+"""What a promotion or a way back would change, to be confirmed; it stands in the way of nothing."""
+
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton
+
+from server_gui.core.models.changes import Change
+from server_gui.core.models.models import Models
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import PlainLabel
+
+
+class Confirm(Card):
+    """Hidden while there is nothing to be confirmed."""
+
+    def __init__(self, models: Models) -> None:
+        super().__init__("")
+        self._models = models
+        self._shown: Change | None = None
+        self.words = PlainLabel()
+        self.words.setWordWrap(True)
+        self.why = QLineEdit()
+        self.why.setPlaceholderText("Why: kept in the history")
+        self.why.setAccessibleName("Why this is changed")
+        self.yes, self.no = QPushButton(), QPushButton("Change nothing")
+        self.yes.setObjectName("primary")
+        self.yes.clicked.connect(lambda: self._models.confirm(self.why.text().strip()))
+        self.no.clicked.connect(models.forget)
+        row = QHBoxLayout()
+        row.addWidget(self.why, 1)
+        row.addWidget(self.no)
+        row.addWidget(self.yes)
+        self.body.addWidget(self.words)
+        self.body.addLayout(row)
+        self.hide()
+
+    def refresh(self) -> None:
+        """Show what waits to be confirmed."""
+        change = self._models.change
+        if change is self._shown:
+            return
+        self._shown = change
+        self.setVisible(change is not None)
+        if change is not None:
+            self.set_title(f"{change.title}?")
+            self.setAccessibleName(change.title)
+            set_text(self.words, "\n".join(change.sentences))
+            self.yes.setText("Roll back" if change.is_rollback else "Promote")
+            self.why.clear()
+            self.no.setFocus()

@@ -1,0 +1,79 @@
+"""Every model, newest first: what it predicts, whom it serves, how well it was judged, how old it is."""
+
+from typing import Any, Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView
+
+from gateway.amounts import counted
+from gateway.plain import plain
+from ml.registry.card import age_days
+from server_gui.core.models.catalogue import Entry
+from server_gui.core.models.comparison import headline, week_short
+from server_gui.core.models.names import SOURCES
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import tip
+from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
+
+TITLES: Final = ("Model", "Serves", "Judged", "Age, days", "Right last week", "Learned from")
+NAME, SERVES, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
+NUMBERS: Final = frozenset({JUDGED, AGE})
+
+
+class ModelsModel(RowsModel[Entry]):
+    """A row a model."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(TITLES, lambda entry: entry.card.id)
+        self._theme = theme
+
+    def data(self, index: Index, role: int = 0) -> Any:
+        entry, column = self.rows[index.row()], index.column()
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return plain(_cells(entry)[column])
+            case _ if role == SORT_ROLE:
+                return entry.card.made.timestamp() if column == NAME else _keys(entry)[column]
+            case Qt.ItemDataRole.ToolTipRole:
+                return tip(f"{_cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
+            case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
+                return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            case Qt.ItemDataRole.FontRole if column in NUMBERS:
+                return self._theme.number_font()
+        return None
+
+
+class ModelsTable(RowsTable):
+    """Names are cut in their middle; numbers have the room that they need."""
+
+    def __init__(self, model: ModelsModel, theme: Theme) -> None:
+        self._theme = theme
+        super().__init__(Filtered(model), "Models", NAME)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        header = self.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStretchLastSection(True)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        self.verticalHeader().setDefaultSectionSize(self._theme.px(24))
+        self.setMinimumHeight(self._theme.px(120))
+
+
+def _cells(entry: Entry) -> tuple[str, ...]:
+    card = entry.card
+    sessions = f"{counted(len(card.learned), 'session')}, " if card.learned else ""
+    return (
+        entry.name,
+        entry.whom,
+        headline(card),
+        f"{age_days(card):.0f}",
+        week_short(entry),
+        f"{sessions}{SOURCES[card.source]}",
+    )
+
+
+def _keys(entry: Entry) -> tuple[Any, ...]:
+    return (*_cells(entry)[:AGE], age_days(entry.card), *_cells(entry)[WEEK:])

@@ -1,0 +1,157 @@
+"""The tab of models: which there are, one beside another, which serves; train, promote, roll back."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from server_gui.core.models.catalogue import Entry
+from server_gui.core.models.models import Models
+from server_gui.core.models.training import TrainingWish
+from server_gui.processes.training import training
+from server_gui.views.models.compare import Compare
+from server_gui.views.models.confirm import Confirm
+from server_gui.views.models.models_table import ModelsModel, ModelsTable
+from server_gui.views.models.train_form import TrainForm, offer_robots
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import PlainLabel
+
+SLOW: Final = 6  # frames between two looks
+NARROW: Final = 480  # at text of 100 %: no room for all buttons in a row
+LOOKING: Final = "Looking for models …"
+EMPTY: Final = (
+    "No model is known here. Train one from labelled recordings, or install those that come with GWRMS."
+)
+
+
+class ModelsPage(QWidget):
+    """Nothing here waits: the store is read in a thread, and a training is a process of its own."""
+
+    def __init__(self, models: Models, theme: Theme) -> None:
+        super().__init__()
+        self._models = models
+        self._theme = theme
+        self._frame = 0
+        self._revision = -1
+        self.setObjectName("page")
+        self.rows = ModelsModel(theme)
+        self.table = ModelsTable(self.rows, theme)
+        self.state, self.said = PlainLabel(LOOKING), PlainLabel()
+        self.state.setWordWrap(True)
+        self.state.setObjectName("dim")
+        self.said.setWordWrap(True)
+        self.said.setObjectName("banner")
+        self.said.hide()
+        self.robot = QComboBox()
+        self.robot.setAccessibleName("For which robot")
+        self.promote, self.back = QPushButton("Promote…"), QPushButton("Roll back…")
+        self.new = QPushButton("Train a model")
+        self.confirm, self.compare = Confirm(models), Compare(theme)
+        self.form = TrainForm(models, theme)
+        self.form.hide()
+        self._build()
+        self._connect()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        direction = QBoxLayout.Direction
+        is_narrow = self.width() < self._theme.px(NARROW)
+        self._actions.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+
+    def refresh(self) -> None:
+        """Look again where it is time, and show how it is."""
+        self._frame += 1
+        if self._frame % SLOW != 1:
+            return
+        models = self._models
+        models.look()
+        if models.revision != self._revision:
+            self._revision = models.revision
+            self.rows.take(models.found.entries)
+            if models.found.entries and not self.table.selectionModel().hasSelection():
+                self.table.selectRow(0)
+        for offered in (self.robot, self.form.robot):
+            offer_robots(offered, models.robots())
+        self._show_state()
+        entry = self.chosen
+        self.compare.show_entry(entry, models.found)
+        self.confirm.refresh()
+        self.form.refresh()
+        self._show_actions(entry)
+
+    @property
+    def chosen(self) -> Entry | None:
+        """The model that is chosen in the list."""
+        places = self.table.selectionModel().selectedRows()
+        source = [self.table.model().mapToSource(place).row() for place in places]  # type: ignore[attr-defined]
+        return self.rows.rows[source[0]] if source and source[0] < len(self.rows.rows) else None
+
+    # --- inside
+
+    def _build(self) -> None:
+        self.promote.setToolTip("Let the chosen model serve; what changes is said first")
+        self.back.setToolTip("Let that serve which did before; what changes is said first")
+        self.new.setCheckable(True)
+        words = PlainLabel("for")
+        words.setObjectName("dim")
+        row = QHBoxLayout()
+        row.addStretch(1)
+        for part in (words, self.robot, self.promote, self.back):
+            row.addWidget(part)
+        self._actions = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._actions.addWidget(self.new, 0, Qt.AlignmentFlag.AlignLeft)
+        self._actions.addLayout(row, 1)
+        self._list = Card("Models")
+        self._list.body.addWidget(self.state)
+        self._list.body.addWidget(self.table, 1)
+        self._list.body.addLayout(self._actions)
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 8)
+        everything.addWidget(self._list, 2)
+        everything.addWidget(self.confirm)
+        everything.addWidget(self.said)
+        everything.addWidget(self.form)
+        everything.addWidget(self.compare, 3)
+
+    def _connect(self) -> None:
+        self.new.toggled.connect(self.form.setVisible)
+        self.form.wished.connect(self._train)
+        self.promote.clicked.connect(self._promote)
+        self.back.clicked.connect(self._roll_back)
+
+    def _train(self, wish: TrainingWish) -> None:
+        self._models.train(wish, training)
+
+    def _promote(self) -> None:
+        if (entry := self.chosen) is not None:
+            self._models.ask_promotion(entry.card.id, str(self.robot.currentData()))
+
+    def _roll_back(self) -> None:
+        if (entry := self.chosen) is not None:
+            self._models.ask_rollback(entry.card.task, str(self.robot.currentData()))
+
+    def _show_state(self) -> None:
+        found = self._models.found
+        lines = [f"▲ {found.problem}"] if found.problem else []
+        lines += [f"▲ {each}" for each in found.damaged]
+        if self._models.looked_s is None:
+            lines.append(LOOKING)
+        elif not found.entries and not found.problem:
+            lines.append(EMPTY)
+        set_text(self.state, "\n".join(lines))
+        self.state.setVisible(bool(lines))
+        set_text(self.said, self._models.said)
+        self.said.setVisible(bool(self._models.said))
+        tone = self._models.tone.value
+        if self.said.property("tone") != tone:
+            self.said.setProperty("tone", tone)
+            self.said.style().polish(self.said)
+
+    def _show_actions(self, entry: Entry | None) -> None:
+        asked = self._models.change is not None
+        for button in (self.promote, self.back):
+            button.setEnabled(entry is not None and not asked)
+        training_now = " · training" if self._models.is_training else ""
+        self._list.set_note(f"{len(self._models.found.entries)} models{training_now}")

@@ -1,0 +1,88 @@
+"""What is to be trained, and the trainings under way with how far they are."""
+
+from collections.abc import Iterable
+from typing import Final
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QAbstractItemView, QComboBox, QGridLayout, QLineEdit, QPushButton, QSizePolicy
+
+from server_gui.core.models.models import Models
+from server_gui.core.models.names import EVERY, TASKS
+from server_gui.core.models.training import TrainingWish
+from server_gui.views.cloud.jobs_table import JobsTable
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.plain import PlainLabel
+
+ABOUT: Final = (
+    "It learns from every session with labels, in a process of its own, and is judged by wearers whom it has "
+    "not seen: that takes labels of three wearers, or sessions, at least. It is listed afterwards; nothing "
+    "serves another model before you promote it."
+)
+
+
+class TrainForm(Card):
+    """`wished` brings what is to be trained."""
+
+    wished = Signal(object)
+
+    def __init__(self, models: Models, theme: Theme) -> None:
+        super().__init__("Train")
+        about = PlainLabel(ABOUT)
+        about.setObjectName("dim")
+        about.setWordWrap(True)
+        self.task, self.robot, self.held_out = QComboBox(), QComboBox(), QLineEdit()
+        for task, name in TASKS.items():
+            self.task.addItem(name, task)
+        self.held_out.setPlaceholderText("a quarter of them, by their names")
+        self.held_out.setToolTip(
+            "Wearers, or sessions, with commas between them; the same ones stay held out"
+        )
+        self.begin = QPushButton("Start training")
+        self.begin.setObjectName("primary")
+        self.begin.clicked.connect(self._begin)
+        self.jobs = JobsTable(models.jobs, theme)
+        self.jobs.setAccessibleName("Trainings")
+        self.jobs.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.jobs.setSizeAdjustPolicy(QAbstractItemView.SizeAdjustPolicy.AdjustToContents)
+        grid = QGridLayout()
+        grid.setColumnStretch(1, 1)
+        names = {"What it predicts": self.task, "For": self.robot, "Judged by": self.held_out}
+        for row, (name, field) in enumerate(names.items()):
+            title = PlainLabel(name)
+            title.setObjectName("dim")
+            field.setAccessibleName(f"Training: {name}")
+            grid.addWidget(title, row, 0)
+            grid.addWidget(field, row, 1)
+        grid.addWidget(self.begin, len(names), 1)
+        self.body.addWidget(about)
+        self.body.addLayout(grid)
+        self.body.addWidget(self.jobs)
+        self._models = models
+        self.offer(())
+
+    def offer(self, robots: Iterable[str]) -> None:
+        """Offer these robots."""
+        offer_robots(self.robot, robots)
+
+    def refresh(self) -> None:
+        """Show how far trainings are."""
+        self.jobs.refresh()
+        self.jobs.setVisible(bool(self._models.jobs.jobs))
+        self.begin.setEnabled(not self._models.is_training)
+
+    def _begin(self) -> None:
+        names = tuple(name.strip() for name in self.held_out.text().split(",") if name.strip())
+        self.wished.emit(TrainingWish(str(self.task.currentData()), str(self.robot.currentData()), names))
+
+
+def offer_robots(choice: QComboBox, robots: Iterable[str]) -> None:
+    """Offer every robot, and each of these; what was chosen stays."""
+    wanted = ["", *sorted(robots)]
+    if [choice.itemData(place) for place in range(choice.count())] == wanted:
+        return
+    chosen = choice.currentData()
+    choice.clear()
+    for robot in wanted:
+        choice.addItem(robot or EVERY, robot)
+    choice.setCurrentIndex(max(0, choice.findData(chosen)))

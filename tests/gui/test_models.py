@@ -1,0 +1,223 @@
+"""The page of models: listed by names, compared, trained, and promoted only when that is confirmed."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QPushButton, QTreeWidgetItem
+
+from ml.registry.card import Bin, Card, ClassScore, Metrics
+from ml.registry.registry import Registry
+from server_gui.core.archive.archive import Archive
+from server_gui.core.cloud.jobs import Job, JobState
+from server_gui.core.models.models import Tone
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.models.panel import ModelsPage
+from tests.gui.archives import Shown
+from tests.unit.registry.models import card, learned
+from tests.unit.registry.test_registry import NOWHERE
+from tests.unit.training.walkers import day, put
+
+
+def metrics(f1: float, right: float) -> Metrics:
+    return Metrics(
+        figures={"macro_f1": f1},
+        per_class={"steady": ClassScore(1.0, 1.0, f1, 40), "fall": ClassScore(0.0, 0.0, 0.0, 0)},
+        per_subject={"Ada": f1},
+        calibration=(Bin(0.9, right, 40),),
+        calibration_error=0.1,
+    )
+
+
+@pytest.fixture
+def registry(store_libraries: None, settings: ServerSettings, monkeypatch: pytest.MonkeyPatch) -> Registry:
+    monkeypatch.setattr(Registry.__init__, "__defaults__", (NOWHERE,))
+    return Registry(settings.store.url)
+
+
+def publish(registry: Registry, seed: int, f1: float) -> Card:
+    model = learned(seed=seed)
+    made = card(model, metrics=metrics(f1, f1), held_out=("mon",))
+    return registry.card(registry.publish(model.state(), made))
+
+
+@pytest.fixture
+def both(registry: Registry) -> tuple[Card, Card]:
+    """One that serves, and a newer and better one that serves nobody."""
+    one, other = publish(registry, 0, 0.8), publish(registry, 1, 0.9)
+    registry.promote(one.id, who="Ada", why="first")
+    return one, other
+
+
+def opened(whole: Shown) -> ModelsPage:
+    whole.open("Models")
+    page = whole.window.models  # type: ignore[union-attr]
+    whole.until(lambda: page.rows.rows, "listed the models")
+    whole.draw()
+    return page
+
+
+def choose(whole: Shown, page: ModelsPage, model: Card) -> None:
+    for row in range(page.table.model().rowCount()):
+        page.table.selectRow(row)
+        if page.chosen is not None and page.chosen.card.id == model.id:
+            whole.draw()
+            return
+    raise AssertionError(model.id)
+
+
+def click(button: QPushButton) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def figures(page: ModelsPage) -> dict[str, list[str]]:
+    """What stands beside each name of the comparison."""
+    found: dict[str, list[str]] = {}
+
+    def take(item: QTreeWidgetItem) -> None:
+        found[item.text(0)] = [item.text(column) for column in range(1, item.columnCount())]
+        for place in range(item.childCount()):
+            below = item.child(place)
+            assert below is not None
+            take(below)
+
+    for place in range(page.compare.table.topLevelItemCount()):
+        top = page.compare.table.topLevelItem(place)
+        assert top is not None
+        take(top)
+    return found
+
+
+def test_models_are_listed_and_compared_by_names_instead_of_hashes(
+    whole: Shown, both: tuple[Card, Card]
+) -> None:
+    page = opened(whole)
+    one, other = both
+    choose(whole, page, other)
+    shown = [
+        str(page.rows.index(row, column).data())
+        for row in range(page.rows.rowCount())
+        for column in range(page.rows.columnCount())
+    ]
+    words = " ".join([*shown, page.compare.said.text(), page.compare.other.currentText()])
+    assert all(model.id not in words for model in both)
+    assert "Falling of" in words
+    assert page.compare.other.currentData() == one.id
+    assert page.compare.other.currentText().endswith("(serves)")
+    found = figures(page)
+    assert found["F1, mean over classes"][:4] == ["90.0 %", "80.0 %", "+10.0", "▲ better"]
+    assert found["Ada"][:4] == ["90.0 %", "80.0 %", "+10.0", "▲ better"]
+    assert found["fall"] == ["–", "–", "–", "", "0"]
+    assert "90 % said 90 % right" in page.compare.plot.accessibleDescription()
+    assert "not known" in page.compare.week.text()
+
+
+def test_a_model_serves_only_once_that_was_confirmed(
+    whole: Shown, both: tuple[Card, Card], registry: Registry, archive: Archive
+) -> None:
+    page, (one, other) = opened(whole), both
+    choose(whole, page, other)
+    click(page.promote)
+    whole.until(page.confirm.isVisible, "asked")
+    assert "Serves now: Falling of" in page.confirm.words.text()
+    assert not page.promote.isEnabled()
+    assert registry.serving("falling") == one.id
+    click(page.confirm.no)
+    whole.until(lambda: not page.confirm.isVisible(), "changed nothing")
+    click(page.promote)
+    whole.until(page.confirm.isVisible, "asked again")
+    page.confirm.why.setText("judged better")
+    click(page.confirm.yes)
+    whole.until(lambda: archive.models.tone is Tone.GOOD, "promoted it")
+    assert [each.model for each in registry.history("falling")] == [one.id, other.id]
+    assert registry.history("falling")[-1].why == "judged better"
+    click(page.back)
+    whole.until(page.confirm.isVisible, "asked before it went back")
+    assert page.confirm.yes.text() == "Roll back"
+    click(page.confirm.yes)
+    whole.until(lambda: registry.serving("falling") == one.id, "rolled back")
+
+
+def test_what_serves_already_is_said_and_a_refusal_is_a_sentence(
+    whole: Shown, both: tuple[Card, Card], archive: Archive
+) -> None:
+    page, (one, _) = opened(whole), both
+    choose(whole, page, one)
+    click(page.promote)
+    whole.until(lambda: "nothing changes" in page.said.text(), "said that it serves")
+    assert not page.confirm.isVisible()
+    page.robot.setCurrentIndex(page.robot.findData("exo-01"))
+    click(page.back)
+    whole.until(lambda: page.said.property("tone") == "bad", "refused")
+    assert "exo-01: falling has no model of its own" in page.said.text()
+
+
+def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody(
+    whole: Shown, settings: ServerSettings, archive: Archive, registry: Registry, tmp_path: Path
+) -> None:
+    put(settings.store.url, tmp_path / "walks", [day(f"s{n}", n, each_s=5.0) for n in range(4)])
+    whole.open("Models")
+    page = whole.window.models  # type: ignore[union-attr]
+    click(page.new)
+    page.form.held_out.setText("s3")
+    click(page.form.begin)
+    (job,) = archive.models.jobs.jobs
+    whole.draw()
+    assert not page.form.begin.isEnabled()
+    assert page.form.jobs.isVisible()
+    whole.until(lambda: job.done > 0, "said how far it is")
+    whole.until(lambda: job.is_over, "ended")
+    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Better")
+    whole.until(lambda: page.rows.rows, "listed it")
+    assert registry.history("activity") == []
+
+
+def test_too_few_wearers_are_said_in_words(
+    whole: Shown, settings: ServerSettings, archive: Archive, registry: Registry, tmp_path: Path
+) -> None:
+    put(settings.store.url, tmp_path / "walks", [day("s0", 0, each_s=5.0)])
+    whole.open("Models")
+    page = whole.window.models  # type: ignore[union-attr]
+    click(page.new)
+    click(page.form.begin)
+    whole.until(lambda: archive.models.jobs.jobs[0].is_over, "gave up")
+    whole.until(lambda: "it takes two to learn from and one to judge by" in page.said.text(), "said why")
+    assert page.said.property("tone") == "bad"
+
+
+def test_a_store_that_is_gone_is_a_sentence_above_the_list(
+    whole: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = opened(whole)
+
+    def away(self: Registry, task: str | None = None) -> list[Card]:
+        raise OSError("s3://lab cannot be reached: Connection refused")
+
+    monkeypatch.setattr(Registry, "entries", away)
+    archive.models.look(now=True)
+    whole.until(lambda: "Connection refused" in page.state.text(), "said so")
+    assert page.state.isVisible()
+    assert page.chosen is None
+    assert not page.promote.isEnabled()
+
+
+def test_every_control_of_the_page_fits_into_its_width_at_large_text(
+    whole: Shown, both: tuple[Card, Card]
+) -> None:
+    page = opened(whole)
+    page.new.setChecked(True)
+    for width, scale in ((1024, 1.5), (1366, 1.0), (1024, 1.0)):
+        whole.window.resize(width, 700)
+        page._theme.set(scale=scale)
+        whole.draw()
+        whole.draw()
+        for control in (page.new, page.robot, page.promote, page.back, page.compare.other, page.form.begin):
+            corner = control.mapTo(page, control.rect().bottomRight())
+            assert corner.x() <= page.visibleRegion().boundingRect().right(), (control, width, scale)
+            assert control.height() >= control.minimumSizeHint().height(), (control, width, scale)
+
+
+def test_the_jobs_of_training_hold_up_no_other(archive: Archive) -> None:
+    assert archive.models.jobs is not archive.jobs
+    assert isinstance(archive.models.jobs.add("Train", lambda job: "done"), Job)

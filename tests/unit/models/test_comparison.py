@@ -1,0 +1,133 @@
+"""Models beside one another: what is better is said, and what is not known is never a number."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+
+from ml.registry.card import Bin, Card, ClassScore, Metrics, Source
+from server_gui.core.models.catalogue import Catalogue, Entry
+from server_gui.core.models.comparison import (
+    Row,
+    headline,
+    last_week,
+    notes,
+    percent,
+    rows,
+    signed,
+    usual_other,
+    week_short,
+)
+from server_gui.core.models.names import model_names
+from server_gui.core.prediction.state import Quality
+
+MADE = datetime(2026, 11, 3, 14, 20, tzinfo=UTC)
+
+
+def card(model: str = "activity-0123456789ab", **changes: Any) -> Card:
+    fields: dict[str, Any] = {
+        "id": model,
+        "task": model.rpartition("-")[0],
+        "recipe": "activity/hips",
+        "classes": ("stand", "walk"),
+        "channels": ("left_hip.position",),
+        "units": {"left_hip.position": "rad"},
+        "features_hash": "",
+        "source": Source.RECORDED,
+        "seed": 0,
+        "made": MADE,
+        "versions": {},
+    }
+    return Card(**(fields | changes))
+
+
+def entry(model: str = "activity-0123456789ab", serving: str = "", **changes: Any) -> Entry:
+    made = card(model, **changes)
+    return Entry(made, model, False, (), serving)
+
+
+def judged(f1: float, ada: float, error: float | None = 0.04) -> Metrics:
+    return Metrics(
+        figures={"macro_f1": f1, "abstained": 0.1},
+        per_class={"walk": ClassScore(1.0, 1.0, f1, 40), "fall": ClassScore(0.0, 0.0, 0.0, 0)},
+        per_subject={"Ada": ada},
+        calibration=(Bin(0.9, 0.8, 40),),
+        calibration_error=error,
+    )
+
+
+def found(one: Metrics, other: Metrics | None) -> dict[tuple[str, str], Row]:
+    second = None if other is None else card(metrics=other)
+    return {(row.group, row.name): row for row in rows(card(metrics=one), second)}
+
+
+def test_more_f1_is_better_and_more_error_worse() -> None:
+    both = found(judged(0.9, 0.9, 0.06), judged(0.8, 0.95, 0.04))
+    assert both["On people never seen", "F1, mean over classes"].verdict == "better"
+    assert both["By class, F1", "walk"].verdict == "better"
+    assert both["By wearer, F1", "Ada"].verdict == "worse"
+    assert both["On people never seen", "Probabilities are off by"].verdict == "worse"
+    assert both["On people never seen", "Says “unknown”"].verdict == "alike"
+
+
+def test_a_class_that_nobody_showed_has_no_figure_instead_of_zero() -> None:
+    row = found(judged(0.9, 0.9), None)["By class, F1", "fall"]
+    assert (row.one, row.other, row.decisions) == (None, None, 0)
+    assert (percent(row.one), signed(row.difference), row.verdict) == ("–", "–", "")
+
+
+def test_the_error_of_a_phase_is_less_when_it_is_better() -> None:
+    one, other = (
+        Metrics(figures={"rmse_percent": value}, per_subject={"Ada": value}) for value in (2.0, 3.0)
+    )
+    both = {row.name: row for row in rows(card(metrics=one), card(metrics=other))}
+    assert both["Error, of the gait cycle"].verdict == "better"
+    assert both["Ada"].verdict == "better"
+    assert (both["Ada"].one, headline(card(metrics=one))) == (2.0, "error 2.0 %")
+
+
+def test_last_week_is_not_known_where_nobody_has_labelled_it() -> None:
+    unknown = entry()
+    assert last_week(unknown) == "not known: nothing that it said within 7 days was labelled"
+    assert week_short(unknown) == "not labelled"
+    quality = Quality(200, 192, 6, 2, {})
+    known = Entry(card(), "a", False, (), "", {"exo-01": quality})
+    assert last_week(known) == "exo-01: 96.0 % right, 3.0 % wrong, 1.0 % not said of 200 labelled"
+    assert week_short(known) == "exo-01 96.0 %"
+
+
+def test_judges_that_differ_or_are_known_already_are_pointed_out() -> None:
+    one = entry(held_out=("mon",))
+    other = entry("activity-ba9876543210", held_out=("tue",), learned=("mon", "wed"))
+    assert [note.split(",")[0] for note in notes(one, other)] == [
+        "Each was judged on sessions of its own",
+        "activity-ba9876543210 has learned from 1 session that judged the other.",
+    ]
+    assert list(notes(one, entry("activity-1", held_out=("mon",)))) == []
+
+
+@pytest.mark.parametrize(
+    ("serving", "expected"),
+    [("activity-b", "activity-b"), ("activity-a", "activity-c"), ("", "activity-c"), ("gone", None)],
+)
+def test_a_model_is_compared_with_what_serves_else_with_the_newest_of_its_task(
+    serving: str, expected: str | None
+) -> None:
+    chosen = entry("activity-a", serving)
+    entries = (entry("falling-x"), entry("activity-c"), chosen, entry("activity-b"))
+    other = usual_other(chosen, Catalogue(entries))
+    assert (None if other is None else other.card.id) == expected
+
+
+def test_names_are_words_and_two_that_are_alike_are_told_apart() -> None:
+    one, twin = card("activity-5f0c00000000"), card("activity-77aa00000000")
+    own = card("gait_phase-1", robot="exo-01")
+    shipped = card("falling-2")
+    names = model_names((one, twin, own, shipped), {"falling-2"})
+    day = f"{MADE.astimezone():%d %b %Y %H:%M}".lstrip("0")
+    assert list(names.values()) == [
+        f"Activity of {day} (5f0c)",
+        f"Activity of {day} (77aa)",
+        f"Gait phase of {day}, for exo-01",
+        "Falling, came with GWRMS",
+    ]
