@@ -304,18 +304,19 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
         return words(controls.note, style=WARN)
     if writing.state in NOT_WRITTEN:
         return words(f"✕ {writing.state.value}: {writing.text}", style=BAD)
-    active = station.alarms.active
-    if active:
+    active, newest = station.alarms.active, next(iter(station.news.items), None)
+    if newest is not None and newest.kind is NewsKind.STOP and time.time() - newest.utc_s < SAID_S:
+        return words(newest.text, style=WARN)
+    if active and active[0].alarm.mark.colour in ("bad", "warn"):
         return _alarm(active)
     if robot.last_failure is not None:
         return words(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
     if controls.writing:
         return words(controls.note, style=DIM)
-    newest = next(iter(station.news.items), None)
-    if newest is not None and newest.kind is NewsKind.STOP and time.time() - newest.utc_s < SAID_S:
-        return words(newest.text, style=WARN)
     if writing.state is WriteState.DONE:
         return words(f"✓ {writing.text}", style=GOOD)
+    if active:
+        return _alarm(active)
     hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
     return words(controls.note or hint, style=DIM)
 

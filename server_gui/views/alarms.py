@@ -15,7 +15,7 @@ from server_gui.core.desk.station import Station
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.whole import WholeLabel
 
 WIDE: Final = 760  # at text of 100 %: then the buttons stand beside the words
 MOST: Final = 4  # rows before the others are asked for
@@ -37,12 +37,7 @@ class AlarmRow(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._icon = MarkIcon(theme, 13)
-        self.headline, self.details = PlainLabel(), PlainLabel()
-        for label in (self.headline, self.details):
-            label.setWordWrap(True)
-            label.setMinimumWidth(1)
-            label.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
-        self.details.setObjectName("dim")
+        self.headline, self.details = WholeLabel(), WholeLabel("dim")
         words = QVBoxLayout()
         words.setSpacing(1)
         words.addWidget(self.headline)

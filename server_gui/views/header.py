@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
@@ -27,7 +27,8 @@ STOP_MARKS: Final = {
 }
 STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
 LEAST: Final = 84  # wide, at text of 100 %: a chip with less says nothing
-SPARE: Final = ("status", "robot", "link")  # left out in this order where there is less room
+# Left out in this order where there is less room; alarms stand below the header too.
+SPARE: Final = ("status", "robot", "link", "drives", "warnings")
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +145,12 @@ class Header(QWidget):
         """What became of the STOP, as it is shown; empty while nothing is."""
         return self._outcome.main_text if not self._outcome.isHidden() else ""
 
+    def minimumSizeHint(self) -> QSize:
+        """Of what is never left out."""
+        return QSize(
+            self.width() - self._room(has_outcome=self._has_outcome), super().minimumSizeHint().height()
+        )
+
     def be_short(self, is_short: bool) -> None:
         """Leave out what stands elsewhere too, where there is little room: STOP names the robot."""
         self._is_short = is_short
@@ -176,8 +183,7 @@ class Header(QWidget):
         station = self._desk.selected
         self.stop.most = max(round(self.width() * STOP_SHARE), self._theme.px(150))
         self._empty.setVisible(station is None)
-        stopping = None if station is None else station.stopping
-        has_outcome = stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
+        has_outcome = self._has_outcome
         shown = [] if station is None else [name for name in self._chips if self._is_wanted(name)]
         room = self._room(has_outcome=has_outcome)
         for name in SPARE:
@@ -185,10 +191,17 @@ class Header(QWidget):
                 shown.remove(name)
         for name, chip in self._chips.items():
             chip.setVisible(name in shown)
+            chip.setMinimumWidth(chip.needs if name in shown else 0)
             self._row.setStretchFactor(chip, chip.wants if name in shown else 0)
         self._outcome.setVisible(has_outcome)
         self._outcome.setMinimumWidth(self._outcome.needs if has_outcome else 0)
         self._row.setStretchFactor(self._outcome, self._outcome.wants if has_outcome else 0)
+
+    @property
+    def _has_outcome(self) -> bool:
+        station = self._desk.selected
+        stopping = None if station is None else station.stopping
+        return stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
 
     def _is_wanted(self, name: str) -> bool:
         return not (self._is_short and name == "robot")

@@ -23,6 +23,7 @@ from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
+from server_gui.views.widgets.whole import WholeLabel
 
 
 class RobotCard(QFrame):
@@ -38,14 +39,12 @@ class RobotCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), PlainLabel(), ElidedLabel("dim")
-        self._state.setObjectName("dim")
-        self._state.setWordWrap(True)
+        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), ElidedLabel("dim")
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
         self.remove.setText("✕")
         self.remove.setToolTip("Remove it from this window: nothing of it is stopped")
-        self.remove.setObjectName("flat")
+        self.remove.setStyleSheet("padding: 1px 3px; border: none;")
         self.remove.clicked.connect(self.removed)
         words = QVBoxLayout()
         words.setSpacing(1)
@@ -94,7 +93,7 @@ class RobotCard(QFrame):
 
 
 class RobotsPanel(QWidget):
-    """`added` brings the address of a robot, `removed` the station of one to leave; `stop_all` is STOP ALL."""
+    """`added` brings an address, `removed` the station of a robot to leave; `stop_all` is STOP ALL."""
 
     added = Signal(str)
     removed = Signal(object)
@@ -126,7 +125,7 @@ class RobotsPanel(QWidget):
         self.said.setWordWrap(True)
         self.said.hide()
         self.all_stop = StopButton()
-        self.all_stop.setText("STOP ALL")
+        self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
         self.all_stop.stopped.connect(self.stop_all)
         everything = QVBoxLayout(self)

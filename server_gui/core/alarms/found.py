@@ -67,17 +67,18 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
 
 def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
-        now = _after_unconfirmed(robot)
+        now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
+        what = f"still moving: STOP again; {stopping.why}" if moving else stopping.why
         check = (
             "use the hardware stop, now" if not _is_live(robot) or _moving(robot) else "STOP again to be sure"
         )
-        yield Alarm(Kind.NOT_STOPPED, "", stopping.why, did=now, check=check, since_s=stopping.since_s)
+        yield Alarm(Kind.NOT_STOPPED, "", what, did=now, check=check, since_s=stopping.since_s)
     elif stopping.held:
         yield Alarm(
             Kind.STOPPED,
             "",
             stopping.said,
-            did="; ".join(filter(None, (stopping.proof, _drives_did(robot)))),
+            did=_after_stop(robot, stopping),
             check=check_of(Kind.STOPPED),
             since_s=stopping.since_s,
         )
@@ -87,13 +88,19 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
         )
 
 
+def _after_stop(robot: Robot, stopping: StopProgress) -> str:
+    """What the drives' states have shown; where not all have shown it, how they are."""
+    shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
+    return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+
+
 def _after_unconfirmed(robot: Robot) -> str:
     """What the robot does after a STOP that nobody has confirmed."""
     if not _is_live(robot):
         return "what it does now is not known"
     moving = _moving(robot)
     if moving:
-        return f"still moving: STOP again ({_listed(moving)})"
+        return f"enabled or moving: {_listed(moving)}"
     return _drives_did(robot)
 
 
@@ -157,7 +164,10 @@ def _of_link(robot: Robot, address: str) -> Iterator[Alarm]:
         what = "linked, but no value has come"
         yield Alarm(Kind.NO_DATA, "", what, check=check_of(Kind.NO_DATA), since_s=since_s)
     elif robot.is_stale():
-        yield Alarm(Kind.STALE, "", "nothing new comes", did=shown, check=check_of(Kind.STALE))
+        since_s = robot.now_s() - (robot.age_s() or 0.0)
+        yield Alarm(
+            Kind.STALE, "", "nothing new comes", did=shown, check=check_of(Kind.STALE), since_s=since_s
+        )
 
 
 # --- drives and sensors

@@ -16,12 +16,12 @@ class Kind(Enum):
     NOT_STOPPED = "STOP NOT CONFIRMED"
     NEVER_REACHED = "never reached"
     NO_LINK = "no link"
-    NO_DATA = "no data yet"
-    STALE = "stale"
     FAULT = "fault"
     GUARD = "guard tripped"
     IMPLAUSIBLE = "not to be believed"
     LOST = "lost"
+    NO_DATA = "no data yet"
+    STALE = "stale"
     STOPPED = "STOPPED"
     PART_STALE = "sensor stale"
     UNKNOWN = "state not known"
@@ -58,7 +58,7 @@ TEXTS: Final = dict(
             Kind.NO_LINK,
             "cross",
             "bad",
-            "what it does now is not known: look at the robot; check its power, network and gateway",
+            "look at the robot itself; check its power, network and gateway",
         ),
         _text(Kind.NO_DATA, "ring", "old", "it takes a few seconds; else look whether its devices answer"),
         _text(

@@ -36,7 +36,8 @@ class StopButton(QPushButton):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._fit()
+        if self._robot is not None:
+            self._fit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Return presses it too."""
