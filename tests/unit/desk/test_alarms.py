@@ -1,4 +1,4 @@
-"""What is wrong with a robot: named by its cause, from when on, with what to check; the unknown is never good."""
+"""What is wrong with a robot: its cause, since when, what to check; the unknown is never good."""
 
 import time
 from collections.abc import Callable
