@@ -326,7 +326,7 @@ def _alarm(active: Sequence[Active]) -> Text:
     alarm, more = active[0].alarm, len(active) - 1
     others = f"  (+{more} more)" if more else ""
     key = "  r r clears it" if alarm.clears else ""
-    check = f"  check: {alarm.check}" if alarm.check else ""
+    check = f"  → {alarm.check}" if alarm.check else ""
     style = COLOURS[alarm.mark.colour]
     return words(f"{GLYPHS[alarm.mark.shape]} {alarm.line}{others}{key}{check}", style=style)
 

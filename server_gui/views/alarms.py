@@ -238,7 +238,7 @@ def details(station: Station, one: Active) -> str:
     for_s = max(0.0, station.robot.now_s() - one.since_s)
     lines = [f"since {since:%H:%M:%S}, for {lasting(for_s)}"]
     lines += [f"robot: {alarm.did}"] if alarm.did else []
-    lines += [f"check: {alarm.check}"] if alarm.check else []
+    lines += [f"→ {alarm.check}"] if alarm.check else []
     return "\n".join((" · ".join(lines[:2]), *lines[2:]))
 
 

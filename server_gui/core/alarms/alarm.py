@@ -106,4 +106,4 @@ def _order(one: Active) -> tuple[bool, int, float]:
 
 
 _RANK = {kind: place for place, kind in enumerate(Kind)}
-_NOT_ITS_STATE = frozenset({Kind.RECORDER, Kind.RECORDER_WARNING, Kind.RESET})
+_NOT_ITS_STATE = frozenset({Kind.RESET})

@@ -286,7 +286,8 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
         what = "; ".join(dict.fromkeys(one.words for one in told)) or bus.problem
         if what:
             checks = "; ".join(dict.fromkeys(one.check for one in told)) or check_of(Kind.BUS)
-            yield Alarm(Kind.BUS, f"bus.{bus.name}", what, f"bus {bus.name}", check=checks)
+            # Told once a link: whether it is so still is not known.
+            yield Alarm(Kind.BUS, f"bus.{bus.name}", what, f"bus {bus.name}", check=checks, is_now=False)
 
 
 # --- small things

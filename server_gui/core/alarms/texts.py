@@ -28,8 +28,6 @@ class Kind(Enum):
     BUS = "bus"
     BLIND = "guard blind"
     REPORTS = "warning"
-    RECORDER = "not recording"
-    RECORDER_WARNING = "recorder"
     RESET = "stop reset"
 
 
@@ -97,8 +95,6 @@ TEXTS: Final = dict(
             Kind.BLIND, "triangle", "warn", "the guard does not see what it is to watch: check that component"
         ),
         _text(Kind.REPORTS, "triangle", "warn", "look into the device's manual"),
-        _text(Kind.RECORDER, "square", "bad", "make room on the disk, or record into another folder"),
-        _text(Kind.RECORDER_WARNING, "triangle", "warn", "see the status bar's tool tip"),
         _text(
             Kind.RESET,
             "ring",
