@@ -49,6 +49,7 @@ FOLLOWING: Final = FollowSettings(
     resources=ResourceSnapshotParams(processes=False),
     journal_s=2.0,
 )
+OWN: Final = "simulated"  # what the window's own robot is called before it has told its name
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs
 
@@ -119,6 +120,7 @@ class App:
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
         self.window.added.connect(lambda where: self.follow(name_of(where), Address.parse(where)))
+        self.window.removed.connect(self.leave)
         self.window.simulator.connect(self._own.start)
         self.window.closed.connect(qt.quit)
         self._keys = StopKeys(qt)
@@ -153,13 +155,25 @@ class App:
         mailbox = Mailbox()
         network = self.feeds.network
         link = Link(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
-        station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
+        is_named = name not in (name_of(str(address)), OWN)
+        station = Station(name, str(address), link, self._poster.deliver, self.desk.news, is_named=is_named)
         station.predictions.off = not self._predicts
         self._mailboxes[name], self._stations[name] = mailbox, station
         self._followed.append(Followed(station, mailbox, network.run(link.run()), Ticks()))
         self.feeds.follow(name, address)
         self.desk.add(station)
         return station
+
+    def leave(self, station: Station) -> None:
+        """Follow a robot no more; it goes on as it is."""
+        followed = next((one for one in self._followed if one.station is station), None)
+        if followed is None:
+            return
+        self.feeds.leave(station.name)
+        followed.link.cancel()
+        self._followed.remove(followed)
+        del self._mailboxes[station.name], self._stations[station.name]
+        self.desk.remove(station)
 
     def stop(self, reason: str) -> None:
         """STOP the robot that is looked at; from any thread."""
@@ -181,7 +195,8 @@ class App:
             if followed.link.done():
                 followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
         for news in [self._predicted.popleft() for _ in range(len(self._predicted))]:
-            self._stations[news.robot].take_prediction(news)
+            if news.robot in self._stations:
+                self._stations[news.robot].take_prediction(news)
         self.feeds.look(self.desk.recording)
         self._look_at_own()
         self.window.refresh()
@@ -193,7 +208,9 @@ class App:
 
     def _show(self, robot: str, event: Event) -> None:
         """What has come; in the network's thread."""
-        self._mailboxes[robot].put(event)
+        mailbox = self._mailboxes.get(robot)  # of one that was left a last event may come
+        if mailbox is not None:
+            mailbox.put(event)
 
     # --- the simulated robot
 
@@ -209,7 +226,7 @@ class App:
             self._opening.look(self.desk.selected, window=self.window.isVisible())
 
     def _follow_own(self, address: Address) -> None:
-        station = self.follow("simulated", address)
+        station = self.follow(OWN, address)
         self.desk.select(station)
         if self._own.folder is not None:
             control = SimControl(self._own.folder)

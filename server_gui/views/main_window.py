@@ -28,6 +28,8 @@ from PySide6.QtWidgets import (
 from gateway.units import UNITS, Units
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.views.alarms import AlarmStrip
 from server_gui.views.audit import Audit
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.docks import Area, Docks
@@ -39,6 +41,7 @@ from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.recordings.panel import Recordings
+from server_gui.views.reset import ask_clear, ask_reset
 from server_gui.views.resources import Resources
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.signals import Signals
@@ -71,11 +74,12 @@ class View(Protocol):
 
 
 class MainWindow(QMainWindow):
-    """`stopped` and `stop_all` ask for a STOP, `added` for another robot, `simulator` for a simulated one."""
+    """`stopped` and `stop_all` ask for a STOP, `added`, `removed` bring a robot, `simulator` asks for one."""
 
     stopped = Signal()
     stop_all = Signal()
     added = Signal(str)
+    removed = Signal(object)
     simulator = Signal()
     closed = Signal()
 
@@ -92,12 +96,17 @@ class MainWindow(QMainWindow):
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
-        self.header.reset.connect(lambda: desk.selected.reset() if desk.selected else None)
+        self.header.reset.connect(lambda station: ask_reset(self, station))
+        self.alarms = AlarmStrip(desk, theme)
+        self.alarms.cleared.connect(lambda station: ask_clear(self, station))
+        self.alarms.shown.connect(self.show_around)
         self.robots = RobotsPanel(desk, theme)
         self.robots.stop_all.connect(self.stop_all)
         self.robots.added.connect(self.added)
+        self.robots.removed.connect(self.removed)
         self.parameters = ParametersPanel(desk, theme)
         self.events = EventsPanel(desk, theme)
+        self.events.shown.connect(self.show_around)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
         self.resources = Resources(desk, theme)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
@@ -141,6 +150,7 @@ class MainWindow(QMainWindow):
             return
         self._pages.setCurrentIndex(1 if shown else 0)
         self.header.refresh()
+        self.alarms.refresh()
         self.robots.refresh()
         self.parameters.refresh()
         self.events.refresh()
@@ -150,6 +160,13 @@ class MainWindow(QMainWindow):
         """Begin with these channels in sight."""
         self.signals.usual = globs
         self.tabs.setCurrentIndex(self._views.index(self.signals))
+
+    def show_around(self, station: Station, channel: str, at_ns: int) -> None:
+        """Show a channel some seconds before and after an instant of a robot's signals."""
+        self._desk.select(station)
+        self.tabs.setCurrentIndex(self._views.index(self.signals))
+        self.signals.refresh()
+        self.signals.show_around((channel,), at_ns)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.kept.setValue("geometry", self.saveGeometry())
@@ -192,6 +209,7 @@ class MainWindow(QMainWindow):
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
+        column.addWidget(self.alarms)
         column.addWidget(self._pages, 1)
         self.setCentralWidget(middle)
         self.setMenuWidget(self.header)

@@ -38,6 +38,7 @@ from server_gui.views.widgets.plain import PlainLabel
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
+AROUND_S: Final = 5.0  # before and after an instant that is looked at
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
@@ -149,6 +150,21 @@ class Signals(QWidget):
             item.setCheckState(0, Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
         self.channels.blockSignals(False)
         self._rebuild()
+
+    def show_around(self, names: Sequence[str], at_ns: int) -> None:
+        """Choose these, and stand still with the seconds around an instant of the robot's clock in sight."""
+        self.choose(names)
+        station = self._desk.selected
+        if station is None or station.rings.newest_ns is None or not self.plots:
+            return
+        before_s = (station.rings.newest_ns - at_ns) / 1e9
+        spans = [place for place, span in enumerate(SPANS_S) if span >= before_s + AROUND_S]
+        self._span.setCurrentIndex(spans[0] if spans else len(SPANS_S) - 1)
+        self.pause.setChecked(False)  # else it would be what was seen before
+        self.pause.setChecked(True)
+        right = min(AROUND_S - before_s, 0.0)
+        for plot in self.plots:
+            plot.plot.show_window(-before_s - AROUND_S, right)
 
     def save_csv(self, path: Path) -> None:
         """Save what is on screen, in SI units, a row a time."""

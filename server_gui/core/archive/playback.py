@@ -61,6 +61,10 @@ class PlayedRobot(Robot):
     row_ns: int | None = None  # UTC of the newest row
     stamp_ns: int | None = None  # and on the robot's clock
     rows_per_s: float = 0.0
+    is_recording: bool = True
+
+    def now_s(self) -> float:
+        return self.shown_ns / 1e9
 
     def age_s(self, now_ns: int | None = None) -> float | None:  # noqa: ARG002 - a recording has its own now
         return None if self.row_ns is None else max(0, self.shown_ns - self.row_ns) / 1e9

@@ -45,6 +45,12 @@ class Desk:
         if self.selected is None:
             self.select(station)
 
+    def remove(self, station: Station) -> None:
+        """Look at it no more; another one is selected where it was."""
+        self.stations.remove(station)
+        if self.selected is station:
+            self.select(self.stations[0] if self.stations else None)
+
     def select(self, station: Station | None) -> None:
         """Look at another robot. Staged edits belong to their robot and stay with it."""
         self.selected = station

@@ -64,6 +64,7 @@ class Robot:
     resources: ResourceSnapshot | None = None
     resources_at_ns: int | None = None
     last_failure: Failed | None = None
+    is_recording: bool = False  # then there is nobody whose state could be good
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(
         default_factory=lambda: collections.deque(maxlen=4096)
@@ -107,6 +108,10 @@ class Robot:
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)
 
+    def now_s(self) -> float:
+        """Return the instant that is shown, UTC."""
+        return time.time()
+
     def names(self, kind: str) -> list[str]:
         """Return the components of one kind, in the robot's order."""
         return [part.name for part in self.parts.values() if part.kind == kind]
@@ -117,7 +122,10 @@ class Robot:
 
     def word(self, channel: str) -> str | None:
         """Return a state's word, None where there is none."""
-        value = self.values.get(channel)
+        return self.word_of(channel, self.values.get(channel))
+
+    def word_of(self, channel: str, value: float | None) -> str | None:
+        """Return the word of a state's number, None where there is none."""
         words = self._words.get(channel)
         if value is None or words is None:
             return None
