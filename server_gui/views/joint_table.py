@@ -50,6 +50,9 @@ GLYPHS: Final = {"disc": "●", "ring": "○", "half": "◐", "cross": "✕", "s
 FAR_RAD: Final = 0.175  # 10°: the end of the bar of how far a joint is from its target
 NEAR_LIMIT: Final = 0.8  # of a limit
 CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
+ENABLED: Final = "operation enabled"  # only then it is to be where its target is
+NONE: Final = "–"
+MOST_ERROR: Final = 280  # wide, in words
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
@@ -101,6 +104,10 @@ class JointModel(QAbstractTableModel):
         texts = [row[column].text for row in self._cells]
         texts.append(str(self.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.DisplayRole)))
         return max(metrics.horizontalAdvance(text) for text in texts)
+
+    def empty(self) -> set[int]:
+        """Return the columns that say nothing yet: no stop was sent."""
+        return {STOP} if all(row[STOP].text == NONE for row in self._cells) else set()
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
         return 0 if parent.isValid() else len(self._cells)
@@ -170,7 +177,7 @@ class JointTable(QTableView):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
-        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        self.setTextElideMode(Qt.TextElideMode.ElideRight)  # of an error the code stays
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.verticalHeader().hide()
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
@@ -195,14 +202,14 @@ class JointTable(QTableView):
         self._fit()
 
     def _restyle(self) -> None:
-        self.verticalHeader().setDefaultSectionSize(self._theme.px(22))
+        self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
         self.setFixedHeight(self.sizeHint().height())
         self._fit()
 
     def _fit(self) -> None:
         """Every column as wide as what is in it; what has no room is left out whole."""
         widths = [self._width(column) for column in range(len(COLUMNS))]
-        shown = set(range(len(COLUMNS)))
+        shown = set(range(len(COLUMNS))) - self._model.empty()
         for column in SPARE:
             if sum(widths[known] for known in shown) > self.viewport().width():
                 shown.discard(column)
@@ -214,11 +221,10 @@ class JointTable(QTableView):
                 self.setColumnWidth(column, wanted)
 
     def _width(self, column: int) -> int:
-        if column == ERROR:
-            return self._theme.px(90)
         numbers = ANGLE <= column <= TEMPERATURE
         metrics = QFontMetrics(self._theme.number_font() if numbers else self._theme.text_font())
-        return self._model.widest(column, metrics) + self._theme.px(16)
+        widest = self._model.widest(column, metrics) + self._theme.px(16)
+        return min(widest, self._theme.px(MOST_ERROR)) if column == ERROR else widest
 
 
 def _unit(desk: Desk, quantity: str) -> Unit:
@@ -265,7 +271,8 @@ def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
     if position is None or target is None:
         return Cell(text, "old" if stale or position is None else "text")
     off = position - target
-    bar = None if stale else Bar(off / FAR_RAD, "warn" if abs(off) > FAR_RAD / 2 else "accent")
+    follows = not stale and station.robot.word(f"{joint}.state") == ENABLED
+    bar = None if not follows else Bar(off / FAR_RAD, "warn" if abs(off) > FAR_RAD / 2 else "accent")
     return Cell(
         text, "old" if stale else "text", bar, f"{_text(unit, 'position', off)} {unit.symbol} from its target"
     )
@@ -322,5 +329,5 @@ def _stop(station: Station, joint: str) -> Cell:
         said = f"{proof.after_ms:.0f} ms" if proof.after_ms > 0 else "before"
         return Cell(said, "good" if station.is_live else "old", None, f"{proof.state}, {said} after the STOP")
     if stopping.state is StopState.IDLE:
-        return Cell("–", "dim", None, "no stop was sent since the window began")
+        return Cell(NONE, "dim", None, "no stop was sent since the window began")
     return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

@@ -129,4 +129,4 @@ class KeyPlot(Card):
         return self._desk.shown.units.unit("", self._kind.si)
 
     def _resize(self) -> None:
-        self.plot.setMinimumHeight(self._theme.px(84))
+        self.plot.setMinimumHeight(self._theme.px(58))

@@ -1,6 +1,7 @@
 """The overview: what is so now, gait phase, posture, pressure of both feet, three plots, and the joints."""
 
 import time
+from collections.abc import Collection
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt, Signal
@@ -25,16 +26,14 @@ from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.gait_ring import GaitRing
 from server_gui.views.widgets.lines import Lines
-from server_gui.views.widgets.plot import PlacedFlag, css
+from server_gui.views.widgets.plot import PlacedFlag
 from server_gui.views.widgets.pressure_map import PressureMap
-from server_gui.views.widgets.wrapped import Wrapped
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
 STATUS_LINES: Final = 4
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
-BOTH: Final = (("left", "left"), ("right", "right"))  # colour and word
 PLOTS: Final = (
     Kind("Knee angle", "rad", 0.2, tuple((f"{side}_knee.position", side, side) for side in SIDES)),
     Kind(
@@ -65,10 +64,8 @@ class Overview(QWidget):
         self.setObjectName("page")
         self.now = NowLine(desk, theme)
         self._status, self._ring = Card("Wearer"), GaitRing(theme)
-        self._meaning = Wrapped("What the rings mean")
         self.status_lines = Lines(theme, "What is predicted, and what devices say", STATUS_LINES)
         self._status.body.addWidget(self._ring, 1)
-        self._status.body.addWidget(self._meaning)
         self._status.body.addWidget(self.status_lines)
         self._posture, self._figure = Card("Posture"), StickFigure(theme)
         self._posture.body.addWidget(self._figure)
@@ -80,8 +77,8 @@ class Overview(QWidget):
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
         self._joints.body.addWidget(JointTable(self._model, theme))
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(8, 8, 8, 8)
-        self._grid.setSpacing(8)
+        self._grid.setContentsMargins(6, 6, 6, 6)
+        self._grid.setSpacing(6)
         self._columns = 0
         self._arrange(len(SHARES))
 
@@ -184,25 +181,15 @@ class Overview(QWidget):
         self._ring.show_phases(phases, modelled, word, below, live=live)
         if slow:
             sources = {one.value.replace("_", " ") for one in derived.sources.values() if one is not None}
-            steps = f"steps by {', '.join(sorted(sources))}"
-            self._status.set_note(
-                *((steps, "") if live and sources else ("",) if live else old_text(station))
-            )
-            self._say_meaning(steps=any(phases.values()), model=any(modelled.values()))
+            model = any(modelled.values())
+            self._status.set_note(*(_meaning(sources, model=model) if live else old_text(station)))
             self.status_lines.show_lines(list(lines(station)))
-
-    def _say_meaning(self, *, steps: bool, model: bool) -> None:
-        colours = [css(self._theme, name) for name in ("left", "right", "text")]
-        said = [(colours[0], "◯", "outer: left leg"), (colours[1], "○", "inner: right leg")]
-        said += [(colours[2], "┃", "steps seen")] if steps else []
-        said += [(colours[2], "●", "model")] if model else []
-        self._meaning.say(said)
 
     def _words(self, station: Station) -> tuple[str, str]:
         """What the wearer does, and how fast."""
         line, gait = activity(station), station.processing.derived().gait
         walks = station.is_live and gait.walking and gait.cadence_spm is not None
-        word = line.text if station.is_live else "Not known"
+        word = line.short_text if station.is_live else "Not known"
         return word, f"{gait.cadence_spm:.0f} steps/min" if walks else ""
 
     def _refresh_posture(self, station: Station, *, slow: bool) -> None:
@@ -241,7 +228,7 @@ class Overview(QWidget):
             if known != self._soles[side]:
                 self._soles[side] = known
                 self._maps[side].set_cells(known.cells)
-            self._maps[side].say(carried[side].problem)
+            self._maps[side].say(carried[side].problem or ("" if known.count else "no data"))
             self._loads[side].say(*_load_texts(side, carried[side], force))
             share = carried[side].share
             said = "–" if share is None else f"{100 * share:.0f} %"
@@ -266,6 +253,14 @@ def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
         return f"{side.upper()}  {load.problem or 'not known'}", f"{side[0].upper()}  –"
     said = f"{force.text(load.force)} {force.symbol}"
     return f"{side.upper()}  {said}", f"{side[0].upper()}  {said}"
+
+
+def _meaning(sources: Collection[str], *, model: bool) -> tuple[str, ...]:
+    """What the rings mean, the fullest wording first."""
+    rings, short = "outer ring left, inner right", "outer left, inner right"
+    told = [f"line: steps by {', '.join(sorted(sources))}"] if sources else []
+    told += ["dot: model"] if model else []
+    return tuple(dict.fromkeys((" · ".join([rings, *told]), rings, short, "outer L, inner R")))
 
 
 def _age(station: Station) -> tuple[str, ...]:

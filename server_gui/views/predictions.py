@@ -32,6 +32,11 @@ class Line:
     tip: str = ""
 
     @property
+    def short_text(self) -> str:
+        """Without what is said elsewhere."""
+        return "Stopped" if self.mark.word == "stopped" else self.text
+
+    @property
     def wordings(self) -> tuple[str, ...]:
         """As one line, the fullest first."""
         details = (self.detail, self.short, "")
@@ -93,8 +98,9 @@ def lines(station: Station) -> Iterator[Line]:
     """Yield the overview's lines: balance and stride, rules that hold, devices in trouble."""
     predictions, stopped = station.predictions, is_stopped(station)
     for task, title in TITLES.items():
-        if task in predictions.told:
-            line = said(predictions.told[task], stopped=stopped)
+        shown = predictions.told.get(task)
+        if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
+            line = said(shown, stopped=stopped)
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
             yield replace(line, text=f"{title}: {line.text}")

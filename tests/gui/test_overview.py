@@ -69,23 +69,23 @@ def test_phases_end_where_the_literature_says(percent: float, name: str) -> None
 def test_the_joint_table_shows_degrees_and_the_drive_state_in_words(theme: Theme, bench: Bench) -> None:
     bench.station.take([looked(), telemetry([1], {"left_knee.position": [0.5], "left_knee.state": [4.0]})])
     left_knee = cells(JointModel(bench.desk, theme), 1)
-    assert left_knee[:3] == ["left knee", "● operation enabled", "+28.6"]
+    assert left_knee[:3] == ["left knee", "● operation enabled", "+28.6 / –"]
 
 
 def test_another_unit_is_shown_at_once(theme: Theme, bench: Bench) -> None:
     bench.station.take([telemetry([1], {"left_knee.position": [0.5]})])
     bench.desk.shown.change(Units(by_si={"rad": "rad"}))
     model = JointModel(bench.desk, theme)
-    assert cells(model, 1)[2] == "+0.500"
-    assert model.headerData(2, Qt.Orientation.Horizontal) == "Angle rad"
+    assert cells(model, 1)[2] == "+0.500 / –"
+    assert model.headerData(2, Qt.Orientation.Horizontal) == "Angle / target rad"
 
 
 def test_a_missing_value_is_a_dash_and_never_the_old_one(theme: Theme, bench: Bench) -> None:
     model = JointModel(bench.desk, theme)
     bench.station.take([telemetry([1], {"left_knee.position": [0.5]})])
-    assert cells(model, 1)[2] == "+28.6"
+    assert cells(model, 1)[2] == "+28.6 / –"
     bench.station.take([telemetry([2], {"left_knee.position": [None]})])
-    assert cells(model, 1)[2] == "–"
+    assert cells(model, 1)[2] == "– / –"
 
 
 def test_a_lost_joint_is_named_lost_with_its_age(theme: Theme, bench: Bench) -> None:

@@ -27,7 +27,7 @@ class Card(QFrame):
         self.body.setContentsMargins(0, 0, 0, 0)
         self.body.setSpacing(4)
         everything = QVBoxLayout(self)
-        everything.setContentsMargins(10, 7, 10, 8)
+        everything.setContentsMargins(10, 5, 10, 6)
         everything.setSpacing(4)
         everything.addLayout(head)
         everything.addLayout(self.body, 1)

@@ -69,7 +69,15 @@ class StickFigure(QWidget):
         painter = QPainter(self)
         painter.fillRect(self.rect(), self._theme.colour("card"))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        above = 3 * self._theme.px(13) if self.width() < self.height() else 0  # the words, beside or above
+        if not self._is_known():
+            painter.setPen(self._theme.colour("dim"))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "posture not known")
+            painter.end()
+            return
+        painter.setFont(self._theme.number_font(0.95))
+        metrics = painter.fontMetrics()
+        beside = self.width() / 2 - metrics.horizontalAdvance(" " * 19) > self.height() * 0.1
+        above = 0 if beside else 3 * metrics.height()  # the words
         unit = min((self.height() - above) * 0.94 / REACH, self.width() * 1.25)
         lean = self._tilt or 0.0
         chains = {
@@ -91,6 +99,10 @@ class StickFigure(QWidget):
                     self._name_joint(painter, f"{side} {joint}", hip + point * unit, unit)
         self._draw_angles(painter)
         painter.end()
+
+    def _is_known(self) -> bool:
+        angles = [angle for leg in self._legs.values() for angle in (leg.hip, leg.knee, leg.ankle)]
+        return any(angle is not None for angle in [*angles, self._tilt])
 
     def _is_wrong(self, side: str) -> bool:
         return any(joint.startswith(side) for joint in self._wrong)

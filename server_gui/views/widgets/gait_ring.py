@@ -132,9 +132,10 @@ class GaitRing(QWidget):
         size = max(0.45, min(1.6, box.width() / theme.px(140)))
         is_short = size < SMALL
         if is_short:  # fewer words that can be read, rather than all of them
-            size = min(1.7 * size, 1.0)
-        rows = [(self._word, "text" if self._live else "old", 1.5 * size, True)]
-        rows += [(self._below.partition(" · ")[0] if is_short else self._below, "dim", 0.95 * size, False)]
+            size = min(1.9 * size, 1.0)
+        word = self._word if self._is_read(self._word, box) else ""
+        rows = [(word, "text" if self._live else "old", 1.5 * size, True)]
+        rows += [("" if is_short else self._below, "dim", 0.95 * size, False)]
         for leg in Leg:
             now = self._phases[leg] or self._modelled[leg]
             said = "" if now is None else self._phase_text(leg, now, box.width(), is_short=is_short)
@@ -152,9 +153,15 @@ class GaitRing(QWidget):
         """With the phase's name where that has room in letters that are read."""
         letter = leg.value[0].upper()
         full = f"{letter}  {now.phase} {now.percent:.0f} %"
-        metrics = QFontMetricsF(self._theme.text_font(READ))
-        fits = not is_short and metrics.horizontalAdvance(full) <= room + 24
+        fits = not is_short and self._width(full) <= room + 24
         return full if fits else f"{letter}  {now.percent:.0f} %"
+
+    def _is_read(self, text: str, box: QRectF) -> bool:
+        """Whether it has room in letters that are read; it stands above the cards, too."""
+        return self._width(text) <= box.width()
+
+    def _width(self, text: str) -> float:
+        return QFontMetricsF(self._theme.text_font(READ)).horizontalAdvance(text)
 
     def _fitting(self, text: str, factor: float, place: QRectF, *, bold: bool) -> QFont:
         """As large as wanted, or as there is room for."""

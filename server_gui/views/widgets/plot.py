@@ -144,14 +144,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             item.getAxis(name).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setFrameShape(pg.QtWidgets.QFrame.Shape.NoFrame)
-        item.layout.setContentsMargins(0, 6, 16, 0)  # for what stands beside the ends of the axes
         self.set_seconds(seconds)
         theme.changed.connect(self._restyle)
         self._restyle()
 
     def sizeHint(self) -> QSize:
         """As small as a plot may be; layouts give it more."""
-        return QSize(200, 80)
+        return QSize(140, 58)
 
     def set_seconds(self, seconds: float) -> None:
         """Set how much of the past is shown."""
@@ -354,12 +353,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def _restyle(self) -> None:
         theme = self._theme
         self.setBackground(theme.colour("card"))
+        room = theme.px(16)  # for what stands beside the ends of the axes
+        self.getPlotItem().layout.setContentsMargins(0, theme.px(6), room, 0)
         for name, width in (("left", 44), ("bottom", None)):
             axis = self.getPlotItem().getAxis(name)
             axis.setPen(theme.colour("border"))
             axis.setTextPen(theme.colour("dim"))
             axis.setTickFont(theme.text_font(0.85))
             axis.setStyle(tickLength=-4)
+            axis.setTickDensity(0.6)
             if width is not None:
                 axis.setWidth(theme.px(width))
             else:

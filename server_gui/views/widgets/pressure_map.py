@@ -57,11 +57,11 @@ class PressureMap(QWidget):
         self._template_made = QPixmap()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(60, 120)
+        self.setMinimumSize(60, 100)
         self.setAccessibleName(f"Pressure under the {side} foot")
 
     def sizeHint(self) -> QSize:
-        return QSize(70, 120)
+        return QSize(70, 100)
 
     def set_cells(self, cells: tuple[Cell, ...] | None) -> None:
         """Set where the cells are (m), None where nobody knows. A larger foot is drawn as large as this."""
