@@ -44,7 +44,7 @@ ONCE: Final = math.inf  # a period: once on every link
 AGAIN_S: Final = 5.0  # before a look that failed is tried again
 DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
 WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
-UNKNOWN_METHOD: Final = "unknown_method"  # a refusal's kind
+METHOD_NOT_FOUND: Final = -32601  # JSON-RPC 2.0 §5.1: a gateway of before
 COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
 
 
@@ -184,10 +184,10 @@ class Feed:
             try:
                 seen = await self._client.buses()
             except RemoteError as error:
-                if error.kind != UNKNOWN_METHOD:
-                    raise
                 self._tell(BusesSeen(None, time.monotonic_ns()))
-                return
+                if error.code == METHOD_NOT_FOUND:
+                    return
+                self._tell(Failed("a look at its buses", str(error)))
             except (CallTimeout, ProtocolError) as error:
                 self._tell(Failed("a look at its buses", str(error)))
             else:
