@@ -67,6 +67,7 @@ class NowLine(QFrame):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.drives, self.activity = Fact(theme, "Drives"), Fact(theme, "Activity")
         self.trial = Fact(theme, "Trial")
+        self.trial.setParent(self)  # also while it has no place, so that it is no window of its own
         self.keep, self.take_back = QPushButton("Keep"), QPushButton("Take back")
         self.keep.setObjectName("primary")
         self.keep.setToolTip("What is on trial stays")
@@ -122,13 +123,13 @@ class NowLine(QFrame):
         if (columns, on_trial) == self._placed:
             return
         self._placed = columns, on_trial
-        self.trial.setVisible(on_trial)
         facts = [self.drives, self.activity, *([self.trial] if on_trial else [])]
         for place, fact in enumerate(facts):
             row, column = divmod(place, columns)
             is_last = place == len(facts) - 1
             span = columns - column if is_last else 1
             self._grid.addWidget(fact, row, column, 1, span, Qt.AlignmentFlag.AlignVCenter)
+        self.trial.setVisible(on_trial)
         for column in range(3):
             self._grid.setColumnStretch(column, 1 if column < columns else 0)
 

@@ -4,8 +4,8 @@ import collections
 import time
 from typing import Final
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QStatusBar
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication, QStatusBar
 
 from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
@@ -55,6 +55,13 @@ class StatusBar(QStatusBar):
         self.addWidget(stop, 1)
         self.addPermanentWidget(self._window)
         self.setSizeGripEnabled(False)
+        theme.changed.connect(self._restyle)
+
+    def _restyle(self) -> None:
+        """As high as its words at once: else what is around is laid out twice."""
+        for label in (self.computer, self.bus, self.recording, self._window):
+            label.ensurePolished()
+        QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)
 
     def frame(self) -> None:
         """Count a frame that was drawn."""
