@@ -57,6 +57,7 @@ TITLES: Final = (
     "Unanswered",
     "PDOs missing",
 )
+SPARE: Final = (4, 5, 6, 3)  # left out in this order where there is less room; kinds stand above, too
 NUMBERS: Final = (2, 3, 5, 6, 7)
 NOBODY: Final = "no node"
 TOO_OLD: Final = "The robot's gateway does not tell how its buses are now: it is of an older version."
@@ -125,7 +126,7 @@ class BusCard(Card):
         self.table.verticalHeader().hide()
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-        self.table.horizontalHeader().setSectionResizeMode(4, QHeaderView.ResizeMode.Stretch)
+        self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         head = QGridLayout()
         head.setColumnStretch(2, 1)
         head.addWidget(self._icon, 0, 0)
@@ -141,8 +142,8 @@ class BusCard(Card):
         bad, mark = level(bus), LEVELS[level(bus)]
         self._icon.show_mark(mark)
         rate = "" if bus.bitrate is None else f" of {bus.bitrate / 1e6:g} Mbit/s"
-        word = "full" if bad is Level.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else "load"
-        self.load.say(f"{load_text(bus)} {word}{rate}", load_text(bus))
+        word = "FULL: " if bad is Level.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
+        self.load.say(f"{word}{load_text(bus)}{rate}", f"{word}{load_text(bus)}")
         self._bar.show_load(bus.load_percent, "accent" if mark.colour == "good" else mark.colour)
         self.set_title(f"Bus {bus.name}")
         self.set_note(bus.state)
@@ -177,6 +178,21 @@ class BusCard(Card):
             good = node is None or node_level(node) is Level.GOOD
             for column, said in enumerate(_texts(node_id, node, talk)):
                 self._set(row, column, said, "text" if good else "warn")
+        self._fit()
+
+    def _fit(self) -> None:
+        """What has no room is left out whole: no number is cut."""
+        header = self.table.horizontalHeader()
+        widths = [
+            max(self.table.sizeHintForColumn(column), header.sectionSizeHint(column))
+            for column in range(len(TITLES))
+        ]
+        shown = set(range(len(TITLES)))
+        for column in SPARE:
+            if sum(widths[known] for known in shown) > self.table.viewport().width():
+                shown.discard(column)
+        for column in range(len(TITLES)):
+            self.table.setColumnHidden(column, column not in shown)
 
     def _set(self, row: int, column: int, text: str, colour: str) -> None:
         item = self.table.item(row, column)

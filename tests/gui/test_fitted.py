@@ -2,6 +2,7 @@
 
 import pytest
 from PySide6.QtGui import QFontMetrics
+from PySide6.QtWidgets import QApplication
 
 from server_gui.views.joint_table import ERROR, TORQUE, JointModel, JointTable
 from server_gui.views.theme import Theme
@@ -32,7 +33,7 @@ def test_in_a_narrow_card_the_name_gives_way_to_the_number(theme: Theme) -> None
     card.show()
     for width in (110, 150, 250, 500):
         card.resize(width, 100)
-        card.layout().activate()
+        QApplication.processEvents()
         assert card._note.is_whole, width
     destroy(card)
 

@@ -132,7 +132,7 @@ class GaitRing(QWidget):
         size = max(0.45, min(1.6, box.width() / theme.px(140)))
         is_short = size < SMALL
         if is_short:  # fewer words that can be read, rather than all of them
-            size = min(1.9 * size, 1.0)
+            size = 1.0
         word = self._word if self._is_read(self._word, box) else ""
         rows = [(word, "text" if self._live else "old", 1.5 * size, True)]
         rows += [("" if is_short else self._below, "dim", 0.95 * size, False)]
@@ -143,7 +143,8 @@ class GaitRing(QWidget):
         rows = [row for row in rows if row[0]]
         top = box.center().y() - line * len(rows) / 2
         for text, colour, factor, bold in rows:
-            place = QRectF(box.left() - 12, top, box.width() + 24, line)
+            spare = 0.0 if is_short else 12.0
+            place = QRectF(box.left() - spare, top, box.width() + 2 * spare, line)
             painter.setFont(self._fitting(text, factor, place, bold=bold))
             painter.setPen(theme.colour(colour))
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)

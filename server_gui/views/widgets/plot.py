@@ -257,6 +257,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._lines.setGeometry(self.mapFromScene(field).boundingRect())
         self._marks.setGeometry(self._lines.geometry())
         self._marks.raise_()
+        self.viewport().update()  # also where words stood beside an axis that was longer
 
     def _zoomed(self, axes: Sequence[bool]) -> None:
         """Somebody has; one axis alone leaves the other as it was."""

@@ -25,7 +25,8 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def boundingRect(self) -> QRectF:
         """With room for the words at its ends."""
-        return super().boundingRect().adjusted(-self._label_px, 0, self._label_px, 0)
+        box = QRectF(super().boundingRect())
+        return box.adjusted(-self._label_px, 0, self._label_px, 0)
 
     def tickSpacing(self, low: float, high: float, size: float) -> list[tuple[float, float]]:
         """Return how far places are apart: as near as there is room for what stands there."""
