@@ -140,8 +140,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         item.getViewBox().sigResized.connect(self._place)
         self._lines = Curves(self.viewport())
         self._marks = Cursors(theme, self.viewport())
-        for name in ("left", "bottom"):
-            item.getAxis(name).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
+        self._cache_axes()
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setFrameShape(pg.QtWidgets.QFrame.Shape.NoFrame)
         self.set_seconds(seconds)
@@ -257,7 +256,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._lines.setGeometry(self.mapFromScene(field).boundingRect())
         self._marks.setGeometry(self._lines.geometry())
         self._marks.raise_()
-        self.viewport().update()  # also where words stood beside an axis that was longer
+        self._cache_axes()
+
+    def _cache_axes(self) -> None:
+        """Anew: of an axis that had another length the words at its old end would stay."""
+        for name in ("left", "bottom"):
+            axis = self.getPlotItem().getAxis(name)
+            axis.setCacheMode(QGraphicsItem.CacheMode.NoCache)
+            axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     def _zoomed(self, axes: Sequence[bool]) -> None:
         """Somebody has; one axis alone leaves the other as it was."""
