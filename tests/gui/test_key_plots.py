@@ -123,7 +123,7 @@ def test_a_limit_is_a_line_where_it_is_in_sight(overview: Overview, bench: Bench
     bench.station.take([telemetry(stamps_ns, columns, received_ns)])
     draw(overview)
     draw(overview)
-    shares = list(torque.plot._marks._shown.limits)
+    shares: list[float] = list(torque.plot._marks._shown.limits)
     assert len(shares) == 1
     assert 0.0 < shares[0] < 0.5
 
