@@ -48,6 +48,7 @@ FOLLOWING: Final = FollowSettings(
     look_s=1.0,
     resources=ResourceSnapshotParams(processes=False),
     journal_s=2.0,
+    buses_s=1.0,
 )
 OWN: Final = "simulated"  # what the window's own robot is called before it has told its name
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end

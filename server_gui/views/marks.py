@@ -4,8 +4,17 @@ from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QBrush, QColor, QPainter, QPen, QPolygonF
 
 from server_gui.core.alarms.marks import NEWS, STATES, Mark, age_text, drives_mark, state_mark
+from server_gui.core.desk.station import Station
 
 __all__ = ["NEWS", "STATES", "Mark", "age_text", "draw", "drives_mark", "state_mark"]
+
+
+def old_text(station: Station) -> tuple[str, ...]:
+    """Return how old what is shown is, the fullest wording first."""
+    age_s = station.robot.age_s()
+    if age_s is None:
+        return ("no data yet",)
+    return f"STALE, {age_text(age_s)} old", f"{age_text(age_s)} old"
 
 
 def draw(painter: QPainter, mark: Mark, colour: QColor, box: QRectF) -> None:

@@ -23,6 +23,7 @@ from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.alarms.worst import worst
 from server_gui.core.audit.journal import Audit
+from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
 from server_gui.core.desk.rings import Rings
 from server_gui.core.follow.events import (
     Costs,
@@ -73,6 +74,7 @@ class Station:
         self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
+        self.flags = Flags()  # on the robot's clock, as the rows of `rings`
         self.processing = RobotProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
@@ -91,6 +93,7 @@ class Station:
         self._alarms = Alarms()
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
+        self._states = StateWatch()
 
     @property
     def called(self) -> str:
@@ -144,6 +147,11 @@ class Station:
         """Note something about this robot."""
         self.news.add(kind, self.title, text)
 
+    def flag(self, text: str) -> None:
+        """Flag this instant, which somebody has marked."""
+        if self.rings.newest_ns is not None:
+            self.flags.add(Flag(self.rings.newest_ns, text or "mark", FlagKind.MARK))
+
     # --- what has come
 
     def take(self, events: Iterable[Event]) -> None:
@@ -158,6 +166,9 @@ class Station:
             match event:
                 case Telemetry():
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
+                    self.flags.add(
+                        *self._states.take(event.batch.stamps_ns, event.batch.columns, self.robot.state_words)
+                    )
                     self.flash.clock = event.clock
                     self._show_stop(event)
                 case Looked():
@@ -165,6 +176,8 @@ class Station:
                 case Journalled():
                     self.audit.take(event.journal.entries)
                     self.stopping.read(event.journal.entries)
+                    if before is not None:
+                        self.flags.add(*of_journal(event.journal.entries, before.boot_id))
                 case Described():
                     self._described(event.description, before)
                 case Costs():
@@ -183,6 +196,8 @@ class Station:
     def _described(self, description: Description, before: Description | None) -> None:
         if before is not None and before.boot_id != description.boot_id:
             self.rings.clear()
+            self.flags.clear()
+            self._states = StateWatch()
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
         self.stopping.described(description.stop.held, description.stop.reason)
         if self.has_twin and not self.is_named and (before is None or before.robot != description.robot):
