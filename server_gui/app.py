@@ -15,7 +15,6 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
-from gateway.units import Units
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
@@ -30,6 +29,7 @@ from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.settings.server_file import ServerSettings, name_of
 from server_gui.core.tuning.link import Link
 from server_gui.processes.own_robot import OwnRobot
+from server_gui.views.kept import kept_look, kept_scale, kept_units
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look, Theme
@@ -102,10 +102,8 @@ class App:
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self._predicts = settings.prediction.enabled
         self._own = OwnRobot(self._own_ready, self._own_failed)
-        self._desk_units(kept)
-        self.theme = Theme(
-            qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100
-        )
+        self.desk.shown.units = kept_units(kept)
+        self.theme = Theme(qt, kept_look(kept), kept_scale(kept))
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
         self._ended = True
@@ -191,11 +189,6 @@ class App:
 
     def _own_failed(self, why: str) -> None:
         self._poster.deliver(lambda: self.window.empty.say(why, again=True))
-
-    def _desk_units(self, kept: QSettings) -> None:
-        by_si = kept.value("units")
-        if isinstance(by_si, dict):
-            self.desk.shown.units = Units(by_si=by_si)
 
 
 def run(

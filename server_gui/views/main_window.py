@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
-from PySide6.QtCore import QByteArray, QSettings, QSize, QTimer, Signal
+from PySide6.QtCore import QPoint, QSettings, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -35,6 +35,7 @@ from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.help import Help
+from server_gui.views.kept import keep_bytes, kept_bytes
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.recordings.panel import Recordings
@@ -57,7 +58,7 @@ CHOICES: Final = (
     "A",
 )  # quantities with more than one unit worth choosing
 
-
+LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
 
 
@@ -124,6 +125,7 @@ class MainWindow(QMainWindow):
         self._offer_help()
         menu.setMenu(self._view_menu())
         self._restore()
+        self._opened_as = self.size()
         theme.scaled.connect(self._scaled)
 
     def refresh(self) -> None:
@@ -137,6 +139,7 @@ class MainWindow(QMainWindow):
             return
         self._pages.setCurrentIndex(1 if shown else 0)
         self.header.refresh()
+        self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
         self.events.refresh()
@@ -148,9 +151,9 @@ class MainWindow(QMainWindow):
         self.tabs.setCurrentIndex(self._views.index(self.signals))
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self.kept.setValue("geometry", self.saveGeometry())
+        keep_bytes(self.kept, "geometry", self.saveGeometry())
         if self._is_arranged:
-            self.kept.setValue("state", self._panels.state)
+            keep_bytes(self.kept, "state", self._panels.state)
         self.kept.setValue("look", self._theme.look.value)
         self.kept.setValue("scale", round(self._theme.scale * 100))
         self.kept.setValue("units", dict(self._desk.shown.units.by_si))
@@ -164,8 +167,14 @@ class MainWindow(QMainWindow):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
+        QTimer.singleShot(0, self, self._settle)
+
+    def _settle(self) -> None:
+        """Once it is shown, with the frame that the screen's manager has given it."""
         if not self._is_arranged:
-            QTimer.singleShot(0, self, self._arrange)
+            self._arrange()
+        if self.size() == self._opened_as:
+            self._onto_screen()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -198,7 +207,7 @@ class MainWindow(QMainWindow):
             "Events": (self.events, below),
             "Help": (self.help, right),
         }
-        self._panels = Docks(self, self._theme, panels)
+        self._panels = Docks(self, self._theme, panels, self.header)
         *self.docks, self._manual = self._panels.all
 
     def _scaled(self) -> None:
@@ -214,6 +223,11 @@ class MainWindow(QMainWindow):
                 part.be_short(is_narrow)
             self.panels_button.setVisible(is_narrow)
         self._panels.fit(scaled=scaled)
+
+    def _hold_header(self) -> None:
+        """Never narrower than the header, which Qt does not see to; and never larger than the screen for it."""
+        needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
+        self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 
     def _offer_help(self) -> None:
         self.help_button.setAccessibleName("Help")
@@ -265,9 +279,10 @@ class MainWindow(QMainWindow):
         return choose
 
     def _restore(self) -> None:
-        geometry = self.kept.value("geometry")
-        if isinstance(geometry, QByteArray):
+        geometry = kept_bytes(self.kept, "geometry")
+        if geometry is not None:
             self.restoreGeometry(geometry)
+            self._onto_screen()
         if not self.isMaximized():
             self._arrange()
 
@@ -278,11 +293,23 @@ class MainWindow(QMainWindow):
         arranged anew (QMainWindowLayout::restoreState, Qt 6.11).
         """
         self._is_arranged = True
-        state = self.kept.value("state")
-        if isinstance(state, QByteArray):
+        state = kept_bytes(self.kept, "state")
+        if state is not None:
             self._panels.restore(state)
         if self.isVisible():
             self._fit(scaled=True)
+
+    def _onto_screen(self) -> None:
+        """Whole on the screen that it is on: of another one it may be too large, or beside this one."""
+        if self.windowState() & (Qt.WindowState.WindowMaximized | Qt.WindowState.WindowFullScreen):
+            return
+        room, frame = self.screen().availableGeometry(), self.frameGeometry()
+        self.resize(self.size().boundedTo(room.size() - frame.size() + self.size()))
+        frame = self.frameGeometry()
+        left = min(max(frame.left(), room.left()), room.right() + 1 - frame.width())
+        top = min(max(frame.top(), room.top()), room.bottom() + 1 - frame.height())
+        if frame.topLeft() != QPoint(left, top):
+            self.move(left, top)
 
 
 def _within(panel: QWidget) -> bool:
