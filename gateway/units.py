@@ -49,7 +49,7 @@ class Unit:
 
     def text(self, value: float | None) -> str:
         """For reading: rounded, without the unit; a dash where there is none."""
-        return "–" if value is None else f"{value * self.scale:.{self.digits}f}"
+        return "–" if value is None else f"{value * self.scale:z.{self.digits}f}"  # z: no −0
 
     def editable(self, value: float) -> str:
         """For editing: the fewest digits that lead back to exactly this value."""

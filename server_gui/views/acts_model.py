@@ -52,7 +52,7 @@ class ActsModel(RowsModel[Line]):
     """Each robot's lines, oldest first."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(TITLES, lambda line: line.key)
+        super().__init__(TITLES, lambda line: line.key, (TIME,))
         self._theme = theme
 
     def data(self, index: Index, role: int = 0) -> Any:

@@ -10,6 +10,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.scrolled import Scrolled
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
+WIDE: Final = 1600  # wide, at text of 100 %: from here on parameters are shown with range and default
 ROOMY: Final = 1100  # wide, at text of 100 %: what is narrower has no room for everything at once
 STACK: Final = 340  # wide, likewise: panels that are one behind the other
 MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
@@ -72,6 +73,11 @@ class Docks(QObject):
             dock.setVisible(not in_sight)
         self._put_away = in_sight
 
+    def bring(self, dock: QDockWidget) -> None:
+        """Show this one, in front of those that are at its place."""
+        dock.show()
+        dock.raise_()
+
     @property
     def has_room(self) -> bool:
         """Whether all of them have room beside the tabs."""
@@ -111,7 +117,8 @@ class Docks(QObject):
             dock.move(frame.x(), above.bottom() + 1)
 
     def _size(self) -> None:
-        widths, px = (225, 400), self._theme.px
+        px = self._theme.px
+        widths = (225, 400 if self._window.width() < px(WIDE) else 600)
         if self.is_narrow:
             self._window.resizeDocks(self.all[:1], [px(STACK)], Qt.Orientation.Horizontal)
             return

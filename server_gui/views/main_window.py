@@ -35,9 +35,11 @@ from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.help import Help
+from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.kept import keep_bytes, kept_bytes
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
+from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.resources import Resources
 from server_gui.views.robots_panel import RobotsPanel
@@ -58,6 +60,7 @@ CHOICES: Final = (
     "A",
 )  # quantities with more than one unit worth choosing
 
+ROBOTS: Final = 9  # that have a key
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
 
@@ -97,6 +100,9 @@ class MainWindow(QMainWindow):
         self.robots.stop_all.connect(self.stop_all)
         self.robots.added.connect(self.added)
         self.parameters = ParametersPanel(desk, theme)
+        self.trial = TrialBar(desk)
+        self.trial.keep.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
+        self.trial.take_back.connect(lambda: desk.selected.end_trial() if desk.selected else None)
         self.events = EventsPanel(desk, theme)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
         self.resources = Resources(desk, theme)
@@ -142,6 +148,7 @@ class MainWindow(QMainWindow):
         self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
+        self.trial.refresh(shown=not _is_seen(self.parameters.trial))
         self.events.refresh()
         self._bar.refresh()
 
@@ -190,6 +197,15 @@ class MainWindow(QMainWindow):
     def _look_at_recordings(self) -> None:
         self.tabs.setCurrentIndex(self._live)
 
+    def _find(self) -> None:
+        """Words that are typed are seen, also where the panel was hidden."""
+        self._panels.bring(self.docks[1])
+        self.parameters.find()
+
+    def _choose_robot(self, place: int) -> None:
+        if place < len(self._desk.stations):
+            self._desk.select(self._desk.stations[place])
+
     # --- how it is put together
 
     def _build(self) -> None:
@@ -197,7 +213,9 @@ class MainWindow(QMainWindow):
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
+        column.addWidget(self.trial)
         column.addWidget(self._pages, 1)
+        self.keys = KeysSheet(self._theme, middle)
         self.setCentralWidget(middle)
         self.setMenuWidget(self.header)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
@@ -245,6 +263,10 @@ class MainWindow(QMainWindow):
         row.addWidget(self.help_button)
         self.tabs.setCornerWidget(corner)
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
+        QShortcut(QKeySequence.StandardKey.Find, self, self._find)
+        QShortcut(QKeySequence("?"), self, self.keys.turn)
+        for place in range(ROBOTS):
+            QShortcut(QKeySequence(f"Ctrl+{place + 1}"), self, lambda place=place: self._choose_robot(place))
 
     def _view_menu(self) -> QMenu:
         menu = QMenu(self)
@@ -254,6 +276,7 @@ class MainWindow(QMainWindow):
         hide = menu.addAction("Hide panels, or show them")
         hide.setShortcut(QKeySequence("F9"))
         hide.triggered.connect(self._panels.put_away)
+        menu.addAction("Keys").triggered.connect(self.keys.turn)
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
         looks = {look.value.capitalize(): look for look in Look}
@@ -316,6 +339,11 @@ def _within(panel: QWidget) -> bool:
     """Whether the keyboard is in it."""
     focused = QApplication.focusWidget()
     return focused is not None and panel.isAncestorOf(focused)
+
+
+def _is_seen(widget: QWidget) -> bool:
+    """Whether any of it is on the screen: not behind another panel, and not scrolled away."""
+    return widget.isVisible() and not widget.visibleRegion().isEmpty()
 
 
 def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:

@@ -64,7 +64,7 @@ class Resources(QWidget):
         computer.body.addStretch(1)
         self.table = ProcessTable(theme)
         self.words = QLineEdit()
-        self.words.setPlaceholderText("Filter processes by name")
+        self.words.setPlaceholderText("Filter processes by name or command")
         self.words.setClearButtonEnabled(True)
         self.words.setAccessibleName("Filter of the processes")
         self.words.textChanged.connect(self.table.sorted.setFilterFixedString)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence, QShortcut
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
@@ -116,6 +116,12 @@ class ParametersPanel(QWidget):
             self.review.show_changes(station.difference(self._desk.shown.units))
             self.pages.setCurrentWidget(self.review)
 
+    def find(self) -> None:
+        """Let words be typed that filter the parameters."""
+        self.pages.setCurrentIndex(0)
+        self.filters.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.filters.words.selectAll()
+
     def open_file(self, path: Path) -> None:
         """Compare with a file from now on; nothing is staged and nothing is sent."""
         station = self._desk.selected
@@ -197,7 +203,6 @@ class ParametersPanel(QWidget):
         return self.more
 
     def _connect(self) -> None:
-        QShortcut(QKeySequence.StandardKey.Find, self, self.filters.words.setFocus)
         self.filters.changed.connect(self._filter)
         self.tree.typed.connect(self.stage_text)
         self.tree.chosen.connect(self.detail.choose)
@@ -276,7 +281,7 @@ class ParametersPanel(QWidget):
     # --- what is shown
 
     def _filter(self) -> None:
-        self.tree.filter.show(self.filters.words.text(), self.filters.refresh())
+        self.tree.show_only(self.filters.words.text(), self.filters.refresh())
 
     def _refresh_review(self, station: Station) -> None:
         now = station.difference(self._desk.shown.units)
@@ -285,8 +290,14 @@ class ParametersPanel(QWidget):
         if not now:
             self.pages.setCurrentIndex(0)
 
+    def _refused(self, station: Station | None) -> str:
+        """What of the staged the robot would refuse, as it stands now."""
+        changes = () if station is None else station.difference(self._desk.shown.units)
+        said = [f"{change.name}: {change.problem}" for change in changes if change.problem]
+        return "\n".join(said)
+
     def _refresh_banner(self, station: Station | None, staged: int) -> None:
-        text, tone = _banner(station, staged, self._problem)
+        text, tone = _banner(station, staged, self._problem or self._refused(station))
         if (self.banner.text(), self.banner.property("tone")) != (text, tone):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
