@@ -35,8 +35,8 @@ from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.help import Help
-from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.kept import keep_bytes, kept_bytes
+from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
@@ -174,6 +174,8 @@ class MainWindow(QMainWindow):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
+        self.header.refresh()  # what it has no robot for takes room from STOP
+        self._hold_header()
         QTimer.singleShot(0, self, self._settle)
 
     def _settle(self) -> None:
@@ -200,7 +202,7 @@ class MainWindow(QMainWindow):
     def _find(self) -> None:
         """Words that are typed are seen, also where the panel was hidden."""
         self._panels.bring(self.docks[1])
-        self.parameters.find()
+        self.parameters.find_parameter()
 
     def _choose_robot(self, place: int) -> None:
         if place < len(self._desk.stations):
@@ -243,7 +245,7 @@ class MainWindow(QMainWindow):
         self._panels.fit(scaled=scaled)
 
     def _hold_header(self) -> None:
-        """Never narrower than the header, which Qt does not see to; and never larger than the screen for it."""
+        """Never narrower than the header, which Qt does not see to, nor larger than the screen."""
         needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
         self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 

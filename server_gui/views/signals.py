@@ -1,6 +1,7 @@
 """Signals: chosen channels over time, one plot a unit; pause, zoom, measure, export while data go on."""
 
 import csv
+import datetime
 import fnmatch
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -22,7 +24,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.units import Unit
+from gateway.units import Unit, Units
 from gateway.wire.component import ChannelInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest
@@ -196,6 +198,9 @@ class Signals(QWidget):
         self.cursors.setToolTip("Two cursors with their difference, and every curve over what is in sight")
         self.cursors.toggled.connect(self._show_cursors)
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
+        as_csv.setAccessibleName("Save what is on screen as CSV")
+        as_png.setAccessibleName("Save what is on screen as a picture")
+        self._keys(as_csv)
         as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         as_png.clicked.connect(lambda: self._ask("png", self.save_png))
         self.said = ElidedLabel("dim")
@@ -205,6 +210,30 @@ class Signals(QWidget):
         row.addWidget(self.said, 1)
         return row
 
+    def _keys(self, as_csv: QPushButton) -> None:
+        """Keys of this page; the sheet of keys tells them."""
+        buttons = {"Ctrl+Shift+P": self.pause, "Ctrl+0": self.fit, "Ctrl+D": self.cursors, "Ctrl+E": as_csv}
+        for key, button in buttons.items():
+            button.setShortcut(key)
+            button.setToolTip(" ".join(filter(None, (button.toolTip(), f"({key})"))))
+        moves: dict[str, Callable[[], None]] = {
+            "Ctrl++": lambda: self._look(0.5),
+            "Ctrl+-": lambda: self._look(2.0),
+            "Ctrl+Left": lambda: self._look(1.0, -0.25),
+            "Ctrl+Right": lambda: self._look(1.0, 0.25),
+        }
+        for key, move in moves.items():
+            shortcut = QShortcut(QKeySequence(key), self, move)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+
+    def _look(self, wider: float, later: float = 0.0) -> None:
+        """See so many times of the time, moved by a share of it."""
+        left, right = self._window
+        span = min((right - left) * wider, float(SPANS_S[self._span.currentIndex()]))
+        end = min(right + later * span, 0.0)
+        begin = max(end - span, -float(SPANS_S[self._span.currentIndex()]))
+        self._zoomed(begin, min(begin + span, 0.0))
+
     def _list_channels(self, station: Station) -> None:
         infos = _infos(station)
         described = (station, self._desk.shown.revision, *(info.name for info in infos))
@@ -213,6 +242,7 @@ class Signals(QWidget):
         usual = [info.name for info in infos if any(fnmatch.fnmatchcase(info.name, g) for g in self.usual)]
         before = self.chosen if self._items() else usual[:MOST_CURVES]
         self._described = described
+        units = self._desk.shown.units
         self.channels.blockSignals(True)
         self.channels.clear()
         groups: dict[str, QTreeWidgetItem] = {}
@@ -220,7 +250,7 @@ class Signals(QWidget):
             if info.component not in groups:
                 groups[info.component] = QTreeWidgetItem(self.channels, [info.component.replace("_", " ")])
                 groups[info.component].setFlags(Qt.ItemFlag.ItemIsEnabled)
-            item = QTreeWidgetItem(groups[info.component], [f"{info.quantity}  {info.unit}".rstrip()])
+            item = QTreeWidgetItem(groups[info.component], [_title(info, units)])
             item.setData(0, NAME_ROLE, info.name)
             item.setCheckState(0, Qt.CheckState.Unchecked)
         self.channels.blockSignals(False)
@@ -340,7 +370,10 @@ class Signals(QWidget):
         self.measuring.show_readings(float(times[a]), float(times[b]), self._active, rows)
 
     def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
-        ask_save(self, f"Export as {kind.upper()}", kind, lambda path: self.export(save, path))
+        station = self._desk.selected
+        robot = "signals" if station is None else station.title
+        name = f"{robot}-{datetime.datetime.now().astimezone():%Y%m%d-%H%M%S}"
+        ask_save(self, f"Export as {kind.upper()}", kind, lambda path: self.export(save, path), name)
 
     def export(self, save: Callable[[Path], None], path: Path) -> None:
         """Save what is on screen, and say what came of it."""
@@ -393,6 +426,12 @@ def _infos(station: Station) -> list[ChannelInfo]:
     return (
         [] if description is None else [info for info in description.channels if info.component != "resource"]
     )
+
+
+def _title(info: ChannelInfo, units: Units) -> str:
+    """Return what a channel is called below its component, in the unit that its plot has."""
+    symbol = units.unit(info.quantity, info.unit).symbol
+    return f"{info.quantity.replace('_', ' ')}  {symbol}".rstrip()
 
 
 def _open_group(item: QTreeWidgetItem) -> None:

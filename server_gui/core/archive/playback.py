@@ -4,7 +4,7 @@ import time
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final, cast
 
@@ -33,6 +33,23 @@ LEAD_NS: Final = 12_000_000_000  # of the past that are shown after a jump
 LATE_S: Final = 0.5  # a frame that took longer does not make the recording jump
 SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 NOT_PREDICTED: Final = "nothing was said then: gwrms predict --session says it now"
+FAULTS: Final = ("fault", "fault reaction active")
+# CiA 402-2, "state coding", as a gateway numbers them: recordings hold numbers, and no robot need be there.
+DRIVE_STATES: Final = {
+    str(number): word
+    for number, word in enumerate(
+        (
+            "not ready to switch on",
+            "switch on disabled",
+            "ready to switch on",
+            "switched on",
+            "operation enabled",
+            "quick stop active",
+            "fault reaction active",
+            "fault",
+        )
+    )
+}
 KINDS: Final = {"cell_0": "insole", "force": "insole", "tilt_forward": "imu", "position": "joint"}
 
 
@@ -70,6 +87,19 @@ class PlayedRobot(Robot):
 
     def rate_hz(self, now_ns: int | None = None) -> float:  # noqa: ARG002 - a recording has its own now
         return self.rows_per_s
+
+    def judge(self) -> None:
+        """What each component was then, as far as its channels tell: nobody has recorded more."""
+        described = () if self.description is None else self.description.channels
+        held = {info.component for info in described if self.values.get(info.name) is not None}
+        for part in self.parts.values():
+            state, problem = "ok", None
+            if self.word(f"{part.name}.state") in FAULTS:
+                code = self.values.get(f"{part.name}.error_code")
+                state, problem = "fault", "" if code is None else f"error code 0x{int(code):04X}"
+            elif part.name not in held and part.kind != "device":
+                state, problem = "lost", "the recording has no value of it here"
+            self.parts[part.name] = replace(part, state=state, problem=problem)
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +257,7 @@ class Playback:
         batch = Batch(rows.stamps_ns.tolist(), columns, 0, 0, 0, 1, time.monotonic_ns())
         self.desk.stations[0].take([Telemetry(1, batch, None)])
         self._robot.row_ns, self._robot.stamp_ns = int(rows.utc_ns[-1]), int(rows.stamps_ns[-1])
+        self._robot.judge()
 
     # --- what is read
 
@@ -271,7 +302,9 @@ def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) ->
     channels = []
     for name, unit in tape.units.items():
         component, _, quantity = name.rpartition(".")
-        channels.append(ChannelInfo(name, unit, component, quantity, words.get(name, UNSET)))
+        is_joint = f"{component}.position" in tape.units
+        usual = DRIVE_STATES if is_joint and quantity == "state" else UNSET
+        channels.append(ChannelInfo(name, unit, component, quantity, words.get(name, usual)))
     components: dict[str, str] = {}
     for quantity, kind in KINDS.items():
         for channel in channels:

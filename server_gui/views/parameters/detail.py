@@ -181,7 +181,9 @@ def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | 
     staged = station.edits.staged.get(info.name)
     problem = (
         (None if staged is None else refusal(staged.value, current, info, unit))
-        or station.writing.rows.get(info.name) or info.problem or (held.problem if held is not None else None)
+        or station.writing.rows.get(info.name)
+        or info.problem
+        or (held.problem if held is not None else None)
     )
     said = f"\n✕ {problem}" if problem else ""
     stored = f"stored: {'yes' if station.is_stored(info.name) else 'unknown'}"

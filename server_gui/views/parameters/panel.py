@@ -116,7 +116,7 @@ class ParametersPanel(QWidget):
             self.review.show_changes(station.difference(self._desk.shown.units))
             self.pages.setCurrentWidget(self.review)
 
-    def find(self) -> None:
+    def find_parameter(self) -> None:
         """Let words be typed that filter the parameters."""
         self.pages.setCurrentIndex(0)
         self.filters.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -167,6 +167,8 @@ class ParametersPanel(QWidget):
         self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
         self.review_button = QPushButton("Review …")
         self.review_button.setObjectName("primary")
+        self.review_button.setShortcut("Ctrl+Return")
+        self.undo.setShortcut("Ctrl+Z")
         self._compare, self._save = QPushButton("Compare …"), QPushButton("Save …")
         self._compare.setToolTip(
             "Compare with a .toml or .dcf file, and load edits from it. Nothing is written"
@@ -223,11 +225,18 @@ class ParametersPanel(QWidget):
         self.review.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.review.write.connect(self._write)
         self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
-        self._save.clicked.connect(lambda: ask_save(self, "Save parameters", "toml", self.save_file))
+        self._save.clicked.connect(
+            lambda: ask_save(self, "Save parameters", "toml", self.save_file, self._title)
+        )
         self.store_button.clicked.connect(self._begin_store)
         self.storing.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.storing.store.connect(self._store)
         self._desk.on_select.append(self._selected)
+
+    @property
+    def _title(self) -> str:
+        """What the robot is called."""
+        return "parameters" if self._desk.selected is None else self._desk.selected.title
 
     # --- what people do
 

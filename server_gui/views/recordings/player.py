@@ -173,7 +173,9 @@ class Player(QWidget):
         self.left.emit()
 
     def _ask(self, kind: str) -> None:
-        ask_save(self, f"Export as {kind.upper()}", kind, lambda file: self.export_to(kind, file))
+        tape = self._playback.tape
+        name = "recording" if tape is None else tape.session.session
+        ask_save(self, f"Export as {kind.upper()}", kind, lambda file: self.export_to(kind, file), name)
 
     def export_to(self, kind: str, file: Path) -> None:
         """Export the chosen span, or all of it, in the background."""

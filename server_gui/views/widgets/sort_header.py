@@ -89,8 +89,9 @@ class SortHeader(QHeaderView):
 
     def _name(self) -> None:
         """For who hears it read."""
-        model, order = self.model(), ""
-        title = None if model is None else model.headerData(self._at, Qt.Orientation.Horizontal)
+        order, title = "", ""
+        if self.count():
+            title = str(self.model().headerData(self._at, Qt.Orientation.Horizontal) or "")
         if self._at == self.sortIndicatorSection():
             up = self.sortIndicatorOrder() is Qt.SortOrder.AscendingOrder
             order = ", lowest first" if up else ", highest first"
