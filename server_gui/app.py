@@ -44,6 +44,7 @@ FOLLOWING: Final = FollowSettings(
     look_s=1.0,
     resources=ResourceSnapshotParams(processes=False),
     journal_s=2.0,
+    buses_s=1.0,
 )
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs

@@ -29,6 +29,7 @@ from gateway.units import UNITS, Units
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
 from server_gui.views.audit import Audit
+from server_gui.views.bus_health import BusHealthView
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.docks import Area, Docks
 from server_gui.views.empty import EmptyView
@@ -105,15 +106,25 @@ class MainWindow(QMainWindow):
         self.trial.take_back.connect(lambda: desk.selected.end_trial() if desk.selected else None)
         self.events = EventsPanel(desk, theme)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
+        self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
+        self.buses = BusHealthView(desk, theme)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()
-        self._views: tuple[View, ...] = (self.overview, self.signals, self.resources, self.audit)
-        for title, view in zip(("&Overview", "&Signals", "&Resources", "&Audit"), self._views, strict=True):
+        self._views: tuple[View, ...] = (
+            self.overview,
+            self.signals,
+            self.resources,
+            self.buses,
+            self.audit,
+        )
+        for title, view in zip(
+            ("&Overview", "&Signals", "&Resources", "&Bus", "&Audit"), self._views, strict=True
+        ):
             self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at
         if archive is not None:
@@ -195,6 +206,11 @@ class MainWindow(QMainWindow):
         self.help.show_section("Parameters" if _within(self.parameters) else tab)
         self._manual.show()
         self._manual.raise_()
+
+    def _open_in_signals(self, channels: Sequence[str]) -> None:
+        self.tabs.setCurrentIndex(self._views.index(self.signals))
+        self.signals.refresh()
+        self.signals.choose(channels)
 
     def _look_at_recordings(self) -> None:
         self.tabs.setCurrentIndex(self._live)

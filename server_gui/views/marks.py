@@ -63,6 +63,14 @@ def age_text(age_s: float | None) -> str:
     return f"{age_s / 60:.0f} min" if age_s < 7200 else f"{age_s / 3600:.1f} h"
 
 
+def old_text(station: Station) -> tuple[str, ...]:
+    """Return how old what is shown is, the fullest wording first."""
+    age_s = station.robot.age_s()
+    if age_s is None:
+        return ("no data yet",)
+    return f"STALE, {age_text(age_s)} old", f"{age_text(age_s)} old"
+
+
 def drives_mark(robot: Robot) -> Mark:
     """Return all drives in one: enabled only where every one is, the worst otherwise."""
     joints = robot.names("joint")

@@ -283,6 +283,7 @@ class Signals(QWidget):
             self._stack.addWidget(plot, 1)
             plot.plot.zoomed.connect(self._zoomed)
             plot.plot.moved.connect(self._move)
+            plot.plot.fitted.connect(self._follow)
         self._choose_by_box(self.box.isChecked())
         self._mark()
         self.empty.setVisible(not self.plots)

@@ -31,12 +31,26 @@ class Desk:
         self.selected: Station | None = None
         self.news = News()
         self.shown = Shown()
-        self.recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
+        self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
         self.pins = Pins()
         self.on_select: list[Callable[[Station | None], None]] = []
 
     def __iter__(self) -> Iterator[Station]:
         return iter(self.stations)
+
+    @property
+    def recording(self) -> Recording:
+        """What is recorded of the robots; what is marked there is flagged at each of them."""
+        return self._recording
+
+    @recording.setter
+    def recording(self, recording: Recording) -> None:
+        self._recording = recording
+        recording.on_mark.append(self._marked)
+
+    def _marked(self, text: str) -> None:
+        for station in self.stations:
+            station.mark(text)
 
     def add(self, station: Station) -> None:
         """Another robot; the first is selected."""

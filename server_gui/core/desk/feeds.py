@@ -199,4 +199,5 @@ def shown_and_recorded(shown: FollowSettings, recorder: RecordingSettings) -> Fo
         look_s=shown.look_s,
         resources_s=min(recorder.resources_s, RESOURCES_S),
         journal_s=shown.journal_s,
+        buses_s=shown.buses_s,
     )

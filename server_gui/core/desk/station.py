@@ -17,6 +17,7 @@ from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
 from server_gui.core.audit.journal import Audit
+from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
 from server_gui.core.desk.rings import Rings
 from server_gui.core.follow.events import (
     Costs,
@@ -57,6 +58,7 @@ class Station:
         self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
+        self.flags = Flags()  # on the robot's clock, as the rows of `rings`
         self.processing = RobotProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
@@ -74,6 +76,7 @@ class Station:
         self.news = news
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
+        self._states = StateWatch()
 
     @property
     def called(self) -> str:
@@ -110,6 +113,11 @@ class Station:
         """Note something about this robot."""
         self.news.add(kind, self.title, text)
 
+    def mark(self, text: str) -> None:
+        """Flag this instant, which somebody has marked."""
+        if self.rings.newest_ns is not None:
+            self.flags.add(Flag(self.rings.newest_ns, text or "mark", FlagKind.MARK))
+
     # --- what has come
 
     def take(self, events: Iterable[Event]) -> None:
@@ -124,11 +132,16 @@ class Station:
             match event:
                 case Telemetry():
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
+                    self.flags.add(
+                        *self._states.take(event.batch.stamps_ns, event.batch.columns, self.robot.state_words)
+                    )
                     self.flash.clock = event.clock
                 case Looked():
                     self.flash.look(event.quality.quality, event.at_ns)
                 case Journalled():
                     self.audit.take(event.journal.entries)
+                    if before is not None:
+                        self.flags.add(*of_journal(event.journal.entries, before.boot_id))
                 case Described():
                     self._described(event.description, before)
                 case Costs():
@@ -146,6 +159,8 @@ class Station:
     def _described(self, description: Description, before: Description | None) -> None:
         if before is not None and before.boot_id != description.boot_id:
             self.rings.clear()
+            self.flags.clear()
+            self._states = StateWatch()
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
         self.stopping.held = description.stop.held
         if self.has_twin and (before is None or before.robot != description.robot):

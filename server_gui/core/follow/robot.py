@@ -2,14 +2,17 @@
 
 import collections
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gateway.client import ConnectionState
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo
 from gateway.wire.parameter import ParameterValue
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
+    BusesSeen,
     Described,
     Event,
     Failed,
@@ -63,6 +66,8 @@ class Robot:
     parameters_at_ns: int | None = None
     resources: ResourceSnapshot | None = None
     resources_at_ns: int | None = None
+    buses: tuple[BusInfo, ...] | None = None  # None: not known
+    buses_at_ns: int | None = None
     last_failure: Failed | None = None
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(
@@ -81,6 +86,8 @@ class Robot:
             case Resources():
                 self.resources, self.resources_at_ns = event.snapshot, event.at_ns
                 self.link.round_trip_ns = event.round_trip_ns
+            case BusesSeen():
+                self.buses, self.buses_at_ns = event.buses, event.at_ns
             case LinkChanged():
                 self._link_changed(event)
             case Described():
@@ -122,6 +129,11 @@ class Robot:
         if value is None or words is None:
             return None
         return words.get(str(int(value)), str(int(value)))
+
+    @property
+    def state_words(self) -> Mapping[str, Mapping[str, str]]:
+        """What the numbers of each channel that is a state mean."""
+        return self._words
 
     # --- what events do
 

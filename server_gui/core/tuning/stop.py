@@ -1,7 +1,7 @@
 """What became of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from gateway.wire.stop import Stopped
@@ -16,6 +16,14 @@ class StopState(Enum):
     NOT_CONFIRMED = "NOT CONFIRMED"
 
 
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """A drive's first state that is not enabled, and how long after the STOP it came; 0: it was so before."""
+
+    after_ms: float
+    state: str
+
+
 @dataclass(slots=True)
 class StopProgress:
     """One robot's latest STOP; a newer one counts, whatever an older one is answered with."""
@@ -25,6 +33,7 @@ class StopProgress:
     held: bool = False
     at_ns: int | None = None
     number: int = 0
+    proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
 
     def sent(self) -> int:
         """Note that a STOP has gone out, and return its number."""
