@@ -37,9 +37,11 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plot import PlacedFlag
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
+AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
@@ -52,6 +54,7 @@ class Frozen:
 
     times: Floats
     columns: dict[str, Floats]
+    newest_ns: int  # of its rows, on the robot's clock
 
     def times_of(self, seconds: float) -> Floats:
         """Return those of the last `seconds`."""
@@ -72,6 +75,7 @@ class Signals(QWidget):
         self.plots: list[UnitPlot] = []
         self._frozen: Frozen | None = None
         self._frame = 0
+        self._jumped_ns: int | None = None  # on the robot's clock
         self._exported = ""  # what came of the latest export
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._active = 0
@@ -131,6 +135,7 @@ class Signals(QWidget):
         self._frame += 1
         if self._frame % SLOW == 1:
             set_text(self.said, self._state(station) + self._exported)
+            self._flag(station)
             for plot in self.plots:
                 plot.show_values([self._newest(station, name) for name in plot.channels])
             if self.cursors.isChecked():
@@ -200,19 +205,32 @@ class Signals(QWidget):
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
         as_csv.setAccessibleName("Save what is on screen as CSV")
         as_png.setAccessibleName("Save what is on screen as a picture")
+        self._before, self._next = QPushButton("◀"), QPushButton("▶")
+        for button, way, which in ((self._before, -1, "before"), (self._next, 1, "after")):
+            button.setAccessibleName(f"To the event {which}")
+            button.setToolTip(f"To the event {which}: a stop, fault, write, trial or mark")
+            button.clicked.connect(lambda _=False, way=way: self._turn(way))
         self._keys(as_csv)
         as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         as_png.clicked.connect(lambda: self._ask("png", self.save_png))
         self.said = ElidedLabel("dim")
         row = QHBoxLayout()
-        for widget in (self._span, self.pause, self.fit, self.box, self.cursors, as_csv, as_png):
+        tools = (self._span, self.pause, self.fit, self.box, self.cursors, self._before, self._next)
+        for widget in (*tools, as_csv, as_png):
             row.addWidget(widget)
         row.addWidget(self.said, 1)
         return row
 
     def _keys(self, as_csv: QPushButton) -> None:
         """Keys of this page; the sheet of keys tells them."""
-        buttons = {"Ctrl+Shift+P": self.pause, "Ctrl+0": self.fit, "Ctrl+D": self.cursors, "Ctrl+E": as_csv}
+        buttons = {
+            "Ctrl+Shift+P": self.pause,
+            "Ctrl+0": self.fit,
+            "Ctrl+D": self.cursors,
+            "Ctrl+E": as_csv,
+            "Ctrl+Up": self._before,
+            "Ctrl+Down": self._next,
+        }
         for key, button in buttons.items():
             button.setShortcut(key)
             button.setToolTip(" ".join(filter(None, (button.toolTip(), f"({key})"))))
@@ -305,13 +323,13 @@ class Signals(QWidget):
             plot.plot.set_seconds(float(SPANS_S[place]))
 
     def _paused(self, on: bool) -> None:
-        self._frozen = None
+        self._frozen, self._jumped_ns = None, None
         if on and self._desk.selected is not None:
             self._freeze(self._desk.selected)
 
     def _freeze(self, station: Station) -> None:
         times, columns = self._live(station, float(SPANS_S[-1]))
-        self._frozen = Frozen(times, columns)
+        self._frozen = Frozen(times, columns, station.rings.newest_ns or 0)
 
     def _follow(self) -> None:
         for plot in self.plots:
@@ -326,6 +344,53 @@ class Signals(QWidget):
     def _choose_by_box(self, on: bool) -> None:
         for plot in self.plots:
             plot.plot.choose_by_box(on)
+
+    # --- what happened
+
+    def show_at(self, stamp_ns: int, around_s: float = AROUND_S) -> bool:
+        """Stand still with this instant of the robot's clock in the middle; False where it is gone by now."""
+        station = self._desk.selected
+        if station is None:
+            return False
+        self.pause.setChecked(True)
+        frozen = self._frozen
+        if frozen is None or not len(frozen.times):
+            return False
+        at = (stamp_ns - frozen.newest_ns) / 1e9
+        if not frozen.times[0] - frozen.times[-1] <= at <= 0.0:
+            return False
+        wanted = next((place for place, span in enumerate(SPANS_S) if span >= around_s - at), -1)
+        self._span.setCurrentIndex(wanted % len(SPANS_S))
+        self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
+        self._jumped_ns = stamp_ns
+        self._frame = 0
+        return True
+
+    def _turn(self, way: int) -> None:
+        """To the next event, or the one before: of where one has jumped to, else of the newest."""
+        station = self._desk.selected
+        if station is None:
+            return
+        newest_ns = station.rings.newest_ns or 0
+        here_ns = newest_ns + 1 if self._jumped_ns is None else self._jumped_ns
+        flags = [flag for flag in station.flags if (flag.at_ns - here_ns) * way > 0]
+        if flags:
+            flag = flags[0] if way > 0 else flags[-1]
+            found = self.show_at(flag.at_ns)
+            self._exported = f" · {flag.kind.value}: {flag.text}" if found else " · that is too long ago"
+
+    def _flag(self, station: Station) -> None:
+        """Every plot shows what happened in its time."""
+        newest_ns = station.rings.newest_ns if self._frozen is None else self._frozen.newest_ns
+        if newest_ns is None:
+            return
+        begin_ns = newest_ns - round(SPANS_S[-1] * 1e9)
+        found = station.flags.between(begin_ns, newest_ns + 1)
+        placed = [PlacedFlag((flag.at_ns - newest_ns) / 1e9, flag.kind, flag.text) for flag in found]
+        for plot in self.plots:
+            plot.plot.show_flags(placed)
+        for button in (self._before, self._next):
+            button.setEnabled(bool(len(station.flags)))
 
     # --- cursors
 

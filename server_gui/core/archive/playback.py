@@ -2,7 +2,7 @@
 
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -15,9 +15,11 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
+from server_gui.core.archive.happened import Happened
 from server_gui.core.archive.recorded_predictions import Said
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
+from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.follow.events import Described, LinkChanged, Telemetry
@@ -144,6 +146,7 @@ class Playback:
         self._robot = PlayedRobot()
         self._words: Mapping[str, dict[str, str]] = {}
         self._recall: Recall = nothing_said
+        self.happened = Happened(read, deliver)
         self._said: dict[str, Said] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
@@ -159,7 +162,7 @@ class Playback:
     ) -> None:
         """Show this one from its beginning; `words` are those of the channels that are states."""
         self.close()
-        self.tape, self._words, self._recall = tape, words, recall
+        self.tape, self._words, self._recall = tape, _words(tape, words), recall
         station = Station(
             tape.session.robot, "a recording", cast("Commands", NoRobot()), self._deliver, self.desk.news
         )
@@ -167,6 +170,7 @@ class Playback:
         station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns())])
         self.desk.stations = [station]
         self.desk.select(station)
+        self.happened.open(tape, _words(tape, words))
         self.seek(tape.first_ns)
 
     def close(self) -> None:
@@ -255,9 +259,18 @@ class Playback:
             return
         columns = {name: nullable(column) for name, column in rows.columns.items()}
         batch = Batch(rows.stamps_ns.tolist(), columns, 0, 0, 0, 1, time.monotonic_ns())
-        self.desk.stations[0].take([Telemetry(1, batch, None)])
+        station = self.desk.stations[0]
+        station.take([Telemetry(1, batch, None)])
+        station.flags.add(*self._flags(rows))
         self._robot.row_ns, self._robot.stamp_ns = int(rows.utc_ns[-1]), int(rows.stamps_ns[-1])
         self._robot.judge()
+
+    def _flags(self, rows: Rows) -> Iterator[Flag]:
+        """Yield what happened meanwhile, on the clock of the rows."""
+        behind_ns = int(rows.stamps_ns[-1] - rows.utc_ns[-1])
+        for flag in self.happened.flags.between(int(rows.utc_ns[0]), int(rows.utc_ns[-1]) + 1):
+            if flag.kind not in (FlagKind.FAULT, FlagKind.STOP):  # these the rows tell themselves
+                yield replace(flag, at_ns=flag.at_ns + behind_ns)
 
     # --- what is read
 
@@ -297,14 +310,19 @@ def _rate(tape: Tape) -> float:
     return tape.session.rows / seconds if seconds else 0.0
 
 
+def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str, str]]:
+    """Those that are told, and those of drives."""
+    joints = [name.rpartition(".")[0] for name in tape.units if name.endswith(".position")]
+    usual = {f"{joint}.state": DRIVE_STATES for joint in joints if f"{joint}.state" in tape.units}
+    return usual | dict(told)
+
+
 def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:
     """What the robot said it was made of, as far as its channels tell."""
     channels = []
     for name, unit in tape.units.items():
         component, _, quantity = name.rpartition(".")
-        is_joint = f"{component}.position" in tape.units
-        usual = DRIVE_STATES if is_joint and quantity == "state" else UNSET
-        channels.append(ChannelInfo(name, unit, component, quantity, words.get(name, usual)))
+        channels.append(ChannelInfo(name, unit, component, quantity, words.get(name, UNSET)))
     components: dict[str, str] = {}
     for quantity, kind in KINDS.items():
         for channel in channels:
