@@ -115,6 +115,7 @@ class MainWindow(QMainWindow):
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()
+        self.tabs.setAccessibleName("Views")
         self._views: tuple[View, ...] = (
             self.overview,
             self.signals,

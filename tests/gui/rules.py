@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.views.main_window import MainWindow
+from server_gui.views.robots_panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
@@ -55,7 +56,7 @@ def halved_numbers(window: QWidget) -> list[str]:
     """Every number of which a digit is missing for want of room."""
     found = []
     for widget in seen(window):
-        if isinstance(widget, QLabel) and DIGIT.search(widget.text()) and _is_cut(widget):
+        if isinstance(widget, QLabel) and _has_number(widget) and _is_cut(widget):
             found.append(f"{_path(widget)}: {widget.text()}")
         if isinstance(widget, QAbstractButton) and DIGIT.search(widget.text()):
             if widget.width() < widget.fontMetrics().horizontalAdvance(widget.text()):
@@ -91,6 +92,12 @@ def nameless(window: QWidget) -> list[str]:
             continue
         found.append(_path(widget))
     return found
+
+
+def _has_number(label: QLabel) -> bool:
+    """Names may have digits, too, and are elided in their middle."""
+    is_name = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
+    return bool(DIGIT.search(label.text())) and not is_name
 
 
 def _is_cut(label: QLabel) -> bool:

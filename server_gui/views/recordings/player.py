@@ -54,6 +54,7 @@ class Player(QWidget):
             self._stack.addWidget(Scrolled(view))
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
+        self.banner.setWordWrap(True)
         self.banner.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.timeline = Timeline(theme)
         self.timeline.moved.connect(self._playback.seek)
