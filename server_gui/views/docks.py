@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabWidget, QWidget
 
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.scrolled import Scrolled
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 WIDE: Final = 1600  # wide, at text of 100 %: from here on parameters are shown with range and default
@@ -37,6 +36,7 @@ class Docks(QObject):
         self._uncovered = uncovered
         self._theme = theme
         self.is_narrow = False
+        self._is_wide = False
         window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
         window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
         window.setTabPosition(Area.AllDockWidgetAreas, QTabWidget.TabPosition.North)
@@ -92,13 +92,15 @@ class Docks(QObject):
                 self._stack()
             else:
                 self._unstack()
-        if scaled:
+        is_wide = self._window.width() >= self._theme.px(WIDE)
+        if scaled or (is_wide is not self._is_wide and not self.is_narrow):
             self._size()
+        self._is_wide = is_wide
 
     def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
         dock = QDockWidget(title)
         dock.setObjectName(title)
-        dock.setWidget(Scrolled(widget))
+        dock.setWidget(_scrolled(widget))
         dock.installEventFilter(self)
         self._window.addDockWidget(area, dock)
         return dock
@@ -144,3 +146,12 @@ class Docks(QObject):
             if bar is not None:
                 bar.deleteLater()
         self.restore(self._roomy)
+
+
+def _scrolled(widget: QWidget) -> QScrollArea:
+    """Where a panel has less room than it needs."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setWidget(widget)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    return area

@@ -52,7 +52,7 @@ KEYS: Final[dict[str, dict[str, str]]] = {
     "Tables and lists": {
         "Tab": "From one control to the next; with Shift back",
         "Arrows": "From row to row; in a tree → opens and ← closes",
-        "Shift+F10": "The titles: ← → chooses one, Return sorts by it, Esc goes back",
+        "Return": "On a table's titles, which Tab leads to: ← → chooses one, Return sorts by it",
         "Space": "Tick a channel; press a button",
     },
 }

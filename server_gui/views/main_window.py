@@ -221,6 +221,11 @@ class MainWindow(QMainWindow):
         self._panels.bring(self.docks[1])
         self.parameters.find_parameter()
 
+    def _end_trial(self, *, keep: bool) -> None:
+        station = self._desk.selected
+        if station is not None and station.writing.trial is not None:
+            (station.keep_trial if keep else station.end_trial)()
+
     def _choose_robot(self, place: int) -> None:
         if place < len(self._desk.stations):
             self._desk.select(self._desk.stations[place])
@@ -284,6 +289,8 @@ class MainWindow(QMainWindow):
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
         QShortcut(QKeySequence.StandardKey.Find, self, self._find)
         QShortcut(QKeySequence("?"), self, self.keys.turn)
+        QShortcut(QKeySequence("Ctrl+K"), self, lambda: self._end_trial(keep=True))
+        QShortcut(QKeySequence("Ctrl+T"), self, lambda: self._end_trial(keep=False))
         for place in range(ROBOTS):
             QShortcut(QKeySequence(f"Ctrl+{place + 1}"), self, lambda place=place: self._choose_robot(place))
 

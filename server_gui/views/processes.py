@@ -4,6 +4,7 @@ from typing import Any, Final
 
 from msgspec import UNSET
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
 from gateway.plain import plain
@@ -15,6 +16,7 @@ from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel,
 TITLES: Final = ("Name", "Command", "PID", "CPU %", "Memory MiB")
 NAME, COMMAND, PID, CPU, MEMORY = range(5)
 MIB: Final = 1 << 20
+NARROW: Final = 460  # at text of 100 %
 
 
 class ProcessModel(RowsModel[ProcessUse]):
@@ -56,10 +58,19 @@ class ProcessTable(RowsTable):
         theme.changed.connect(self._restyle)
         self._restyle()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """The command has the name, where both have no room."""
+        self.setColumnHidden(NAME, self.width() < self._theme.px(NARROW))
+
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
         for column, width in ((NAME, 96), (PID, 62), (CPU, 68), (MEMORY, 104)):
             self.setColumnWidth(column, self._theme.px(width))
+        self._make_room()
 
 
 def command_of(process: ProcessUse) -> str:

@@ -11,8 +11,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QComboBox,
     QHBoxLayout,
     QLineEdit,
@@ -41,6 +42,7 @@ from server_gui.views.widgets.plot import PlacedFlag
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
+NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in two rows; the channels at least
 AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
@@ -101,11 +103,10 @@ class Signals(QWidget):
         self._stack.addWidget(self.empty)
         left, right = QWidget(), QWidget()
         left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
-        left_box.setContentsMargins(8, 8, 0, 8)
-        right_box.setContentsMargins(0, 8, 8, 8)
+        left_box.setContentsMargins(0, 0, 0, 8)
+        right_box.setContentsMargins(0, 0, 0, 8)
         left_box.addWidget(self._words)
         left_box.addWidget(self.channels, 1)
-        right_box.addLayout(self._tools())
         right_box.addLayout(self._stack, 1)
         right_box.addWidget(self.measuring)
         splitter = QSplitter()
@@ -114,9 +115,11 @@ class Signals(QWidget):
         splitter.setStretchFactor(1, 1)
         splitter.setSizes([theme.px(190), theme.px(700)])
         everything = QVBoxLayout(self)
-        everything.setContentsMargins(0, 0, 0, 0)
-        everything.addWidget(splitter)
-        theme.changed.connect(self._rebuild)
+        everything.setContentsMargins(8, 8, 8, 0)
+        everything.addLayout(self._tools())
+        everything.addWidget(splitter, 1)
+        self._restyle()
+        theme.changed.connect(self._restyle)
 
     def refresh(self) -> None:
         """Draw what is chosen; while paused, what was there then."""
@@ -181,7 +184,7 @@ class Signals(QWidget):
 
     # --- how it is put together
 
-    def _tools(self) -> QHBoxLayout:
+    def _tools(self) -> QBoxLayout:
         self._span = QComboBox()
         self._span.addItems([f"{seconds} s" for seconds in SPANS_S])
         self._span.setCurrentIndex(SPANS_S.index(10))
@@ -214,12 +217,21 @@ class Signals(QWidget):
         as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         as_png.clicked.connect(lambda: self._ask("png", self.save_png))
         self.said = ElidedLabel("dim")
-        row = QHBoxLayout()
-        tools = (self._span, self.pause, self.fit, self.box, self.cursors, self._before, self._next)
-        for widget in (*tools, as_csv, as_png):
-            row.addWidget(widget)
-        row.addWidget(self.said, 1)
-        return row
+        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        often = (self._span, self.pause, self.fit, self.box, self.cursors)
+        for widgets in (often, (self._before, self._next, as_csv, as_png, self.said)):
+            row = QHBoxLayout()
+            for widget in widgets:
+                row.addWidget(widget, int(widget is self.said))
+            if widgets is often:
+                row.addStretch(1)
+            self._rows.addLayout(row, int(widgets is not often))
+        return self._rows
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        direction, is_narrow = QBoxLayout.Direction, self.width() < self._theme.px(NARROW)
+        self._rows.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
 
     def _keys(self, as_csv: QPushButton) -> None:
         """Keys of this page; the sheet of keys tells them."""
@@ -286,6 +298,7 @@ class Signals(QWidget):
         """A plot for each unit of the chosen channels."""
         for plot in self.plots:
             self._stack.removeWidget(plot)
+            plot.hide()
             plot.deleteLater()
         station = self._desk.selected
         chosen = self.chosen[:MOST_CURVES]
@@ -307,6 +320,11 @@ class Signals(QWidget):
         self.empty.setVisible(not self.plots)
         if self._frozen is not None and station is not None:
             self._freeze(station)
+
+    def _restyle(self) -> None:
+        self.channels.setIndentation(self._theme.px(10))
+        self.channels.setMinimumWidth(self._theme.px(LIST))
+        self._rebuild()
 
     def _filter(self, words: str) -> None:
         wanted = words.lower().split()

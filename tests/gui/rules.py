@@ -12,8 +12,8 @@ from PySide6.QtWidgets import (
     QApplication,
     QLabel,
     QScrollArea,
-    QTableView,
     QTabBar,
+    QTableView,
     QWidget,
 )
 
@@ -21,6 +21,7 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 
 DIGIT = re.compile(r"\d")
@@ -58,6 +59,8 @@ def halved_numbers(window: QWidget) -> list[str]:
     for widget in seen(window):
         if isinstance(widget, QLabel) and _has_number(widget) and _is_cut(widget):
             found.append(f"{_path(widget)}: {widget.text()}")
+        if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
+            found.append(f"{_path(widget)}: {widget.shown}")
         if isinstance(widget, QAbstractButton) and DIGIT.search(widget.text()):
             if widget.width() < widget.fontMetrics().horizontalAdvance(widget.text()):
                 found.append(f"{_path(widget)}: {widget.text()}")

@@ -1,4 +1,4 @@
-"""Every view in every state: nothing green that is unknown, no half number, every control in reach and named."""
+"""Every view in every state: no green for the unknown, no half number, controls in reach and named."""
 
 import time
 from collections.abc import Callable

@@ -176,7 +176,7 @@ def _round(value: float, span: float, scale: float, unit: Unit) -> float:
 def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | None) -> str:
     held = station.robot.parameters.get(info.name)
     robot = "–" if current is None else f"{brief(unit, current)} {unit.symbol}".rstrip()
-    step = "" if info.max_step is None else f" · one write moves it by at most {unit.text(info.max_step)}"
+    step = "" if info.max_step is None else f" · one write moves it by at most {brief(unit, info.max_step)}"
     live = "may be changed while it moves" if info.live else "only while its drive is at rest"
     staged = station.edits.staged.get(info.name)
     problem = (
