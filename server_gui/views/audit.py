@@ -168,7 +168,8 @@ class Audit(QWidget):
         said += [] if problem is None else [f"{AWAY}: {problem}"]
         set_text(self.verdict, "\n".join(said))
         broken = any(one.is_altered for one in asked.values())
-        self.verdict.setProperty("tone", "bad" if broken else "good")
+        known = bool(asked) and all(one.is_known for one in asked.values())
+        self.verdict.setProperty("tone", "bad" if broken else "good" if known else "plain")
         self.verdict.style().polish(self.verdict)
 
     def _restyle(self) -> None:

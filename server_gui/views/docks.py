@@ -95,7 +95,7 @@ class Docks(QObject):
         is_wide = self._window.width() >= self._theme.px(WIDE)
         if scaled or (is_wide is not self._is_wide and not self.is_narrow):
             self._size()
-        self._is_wide = is_wide
+        self._is_wide = self._is_wide if self.is_narrow else is_wide
 
     def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
         dock = QDockWidget(title)

@@ -16,7 +16,7 @@ from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel,
 TITLES: Final = ("Name", "Command", "PID", "CPU %", "Memory MiB")
 NAME, COMMAND, PID, CPU, MEMORY = range(5)
 MIB: Final = 1 << 20
-NARROW: Final = 460  # at text of 100 %
+ROOM: Final = {NAME: 460, PID: 370}  # wide at least, at text of 100 %, for these columns beside the command
 
 
 class ProcessModel(RowsModel[ProcessUse]):
@@ -63,8 +63,9 @@ class ProcessTable(RowsTable):
         self._make_room()
 
     def _make_room(self) -> None:
-        """The command has the name, where both have no room."""
-        self.setColumnHidden(NAME, self.width() < self._theme.px(NARROW))
+        """The command tells processes apart, where not all has room."""
+        for column, least in ROOM.items():
+            self.setColumnHidden(column, self.width() < self._theme.px(least))
 
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(20))

@@ -500,6 +500,8 @@ class Signals(QWidget):
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
         if self._frozen is not None:
             return f"Paused, data go on{many}"
+        if station.robot.age_s() is None:
+            return f"no data yet{many}"
         if station.robot.is_stale():
             return f"STALE, {age_text(station.robot.age_s())} old{many}"
         return f"{station.robot.rate_hz():.0f} rows/s{many}"

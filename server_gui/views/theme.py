@@ -127,6 +127,7 @@ QLabel#dim, QLabel#note {{ color: {dim}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}
+QLabel#banner[tone="plain"] {{ background: {card}; border-color: {border}; }}
 QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
 QLabel#banner[tone="good"] {{ background: {card}; border-color: {good}; }}
 QTabWidget::pane {{ border: none; border-top: 1px solid {border}; }}
@@ -134,6 +135,7 @@ QTabBar {{ background: {panel}; }}
 QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px 14px; border: none;
     border-bottom: 2px solid transparent; }}
 QTabBar::tab:selected {{ color: {text}; border-bottom: 2px solid {accent}; }}
+QTabBar QToolButton {{ padding: 0; border-radius: 0; }}
 QTabBar::tab:focus, QTabBar::tab:hover {{ color: {text}; }}
 QPushButton, QToolButton {{ background: {card}; border: 1px solid {edge}; border-radius: 4px;
     padding: 5px 10px; }}
@@ -153,6 +155,7 @@ QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; b
     border-radius: 4px; padding: 4px 6px; selection-background-color: {accent};
     selection-color: {on_accent}; }}
 QLineEdit:focus, QAbstractSpinBox:focus {{ border-color: {accent}; }}
+QAbstractSpinBox {{ padding-right: 16px; }}
 QAbstractSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
 QComboBox QAbstractItemView, QMenu {{ background: {card}; border: 1px solid {border};
     selection-background-color: {accent}; selection-color: {on_accent}; }}

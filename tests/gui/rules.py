@@ -1,4 +1,4 @@
-"""What no picture of the window may show: green for what is unknown, half a number, a control out of reach."""
+"""What no picture of the window may show: green for the unknown, half a number, a control out of reach."""
 
 import re
 from collections.abc import Iterator
@@ -43,6 +43,11 @@ def green(window: QWidget, theme: Theme) -> list[str]:
         for one in seen(window)
         if isinstance(one, MarkIcon) and one._mark.colour == "good"
     ]
+    found += [
+        f"{_path(one)}: {one.text()}"
+        for one in seen(window)
+        if isinstance(one, QLabel) and one.property("tone") == "good"
+    ]
     for view in seen(window):
         if isinstance(view, QTableView):
             for row, column in _cells(view):
@@ -62,8 +67,8 @@ def halved_numbers(window: QWidget) -> list[str]:
         if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
             found.append(f"{_path(widget)}: {widget.shown}")
         if isinstance(widget, QAbstractButton) and DIGIT.search(widget.text()):
-            if widget.width() < widget.fontMetrics().horizontalAdvance(widget.text()):
-                found.append(f"{_path(widget)}: {widget.text()}")
+            whole = widget.width() >= widget.fontMetrics().horizontalAdvance(widget.text())
+            found += [] if whole else [f"{_path(widget)}: {widget.text()}"]
         if isinstance(widget, QTableView):
             found += _halved_cells(widget)
     return found

@@ -325,7 +325,7 @@ def _close_file(station: Station) -> None:
 def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, str]:
     """What matters most now, and how it is meant."""
     if station is None:
-        return "No robot chosen: there is nothing to change.", "good"
+        return "No robot chosen: there is nothing to change.", "plain"
     if problem:
         return problem, "bad"
     writing = station.writing
@@ -336,5 +336,7 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
     if staged:
         return f"{staged} staged · nothing of it has been sent to the robot", "warn"
     if not station.known:
-        return "This robot lets no parameter be changed, or has not said which yet.", "good"
-    return writing.text or "Double-click a value in the column New to change it.", "good"
+        return "This robot lets no parameter be changed, or has not said which yet.", "plain"
+    if writing.text:
+        return writing.text, "good"
+    return "Double-click a value in the column New to change it.", "plain"
