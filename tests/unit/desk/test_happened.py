@@ -1,4 +1,4 @@
-"""What happened in a recording: found in its marks, its journal, its drives' states; no fault is called ok."""
+"""What happened in a recording: found in its marks, journal and drives' states; no fault is called ok."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
