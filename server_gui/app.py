@@ -15,7 +15,6 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
-from gateway.units import Units
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
@@ -34,6 +33,7 @@ from server_gui.processes.sim_control import SimControl
 from server_gui.views.application import application, kept_settings, kept_theme
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
+from server_gui.views.kept import kept_units
 from server_gui.views.main_window import SLOW, MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look
@@ -112,7 +112,7 @@ class App:
         self._opening = opening
         self._own = OwnRobot() if opening is None else opening.own
         self.demo: DemoBar | None = None  # once a simulated robot of ours is followed
-        self._desk_units(kept)
+        self.desk.shown.units = kept_units(kept)
         self.theme = kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
@@ -233,11 +233,6 @@ class App:
             control = SimControl(self._own.folder)
             deliver = self._poster.deliver
             self.demo = DemoBar(self.window, self._own, control, station, self.theme, deliver)
-
-    def _desk_units(self, kept: QSettings) -> None:
-        by_si = kept.value("units")
-        if isinstance(by_si, dict):
-            self.desk.shown.units = Units(by_si=by_si)
 
 
 def run(

@@ -163,7 +163,7 @@ def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tm
     path, chosen = tmp_path / "walk.csv", list[Path]()
     path.write_text("before", encoding="utf-8")
     dialogs = [
-        ask_save(window, "Export", "csv", chosen.append),
+        ask_save(window, "Export", "csv", chosen.append, "walk"),
         ask_open(window, "Open", ("csv",), chosen.append),
     ]
     assert not any(dialog.isModal() for dialog in dialogs)
