@@ -1,0 +1,87 @@
+"""Robots with keys, and people who have some: key pairs are made once a run, because that takes a moment."""
+
+import functools
+import shutil
+import socket
+import ssl
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from gateway.certificates import der_of, fingerprint
+from gateway.key_making import make
+from gateway.wire.role import Role
+from tests.support.waiting import WAIT_S
+from tests.unit.gateway.harness import Client
+
+ROBOT: Final = "robot"
+PEOPLE: Final = {role.value: role for role in Role}  # each called as what they are
+
+
+@functools.cache
+def _folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="gwrms-keys-"))
+
+
+@functools.cache
+def pair(name: str) -> tuple[Path, Path]:
+    """A key and its certificate."""
+    key, certificate = _folder() / f"{name}.key", _folder() / f"{name}.crt"
+    make(name, key, certificate)
+    return key, certificate
+
+
+def pin(name: str) -> str:
+    return fingerprint(der_of(pair(name)[1].read_bytes()))
+
+
+def keyed(folder: Path, people: dict[str, Role] = PEOPLE, more: str = "") -> Path:
+    """Give the robot of that folder a key, and make these people known."""
+    keys, clients = folder / "keys", folder / "clients"
+    keys.mkdir(mode=0o700, exist_ok=True)
+    clients.mkdir(exist_ok=True)
+    for file, suffix in zip(pair(ROBOT), ("key", "crt"), strict=True):
+        shutil.copy(file, keys / f"robot.{suffix}")
+    lines = "".join(f'{name} = "{role.value}"\n' for name, role in people.items())
+    (folder / "access.toml").write_text(f"[clients]\n{lines}{more}", encoding="utf-8")
+    for name in people:
+        shutil.copy(pair(name)[1], clients / f"{name}.crt")
+    return folder
+
+
+def context(name: str | None) -> ssl.SSLContext:
+    """As a client of somebody's own has it; `None` has no key."""
+    made = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    made.check_hostname = False
+    made.verify_mode = ssl.CERT_NONE
+    if name is not None:
+        key, certificate = pair(name)
+        made.load_cert_chain(certificate, key)
+    return made
+
+
+class KeyedClient(Client):
+    """One connection by TLS, of somebody."""
+
+    def __init__(self, address: tuple[str, int], name: str | None) -> None:
+        super().__init__(address)
+        self._reader.close()
+        self.socket = context(name).wrap_socket(self.socket)
+        self.socket.settimeout(WAIT_S)
+        self._reader = self.socket.makefile("rb")
+
+
+def raw(address: tuple[str, int]) -> socket.socket:
+    """A bare connection, which has said nothing."""
+    return socket.create_connection(address, timeout=WAIT_S)
+
+
+def said(bare: socket.socket) -> bytes:
+    """All that it is told, until it is closed."""
+    found = b""
+    try:
+        while more := bare.recv(4096):
+            found += more
+    except ConnectionResetError:
+        pass
+    return found
