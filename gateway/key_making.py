@@ -51,15 +51,16 @@ def _make(name: str, key: Path, certificate: Path) -> None:
     if not any(key.parent.iterdir()):
         key.parent.chmod(0o700)
     key_pem, certificate_pem = _made(name)
-    write_private(key, key_pem)
-    write_private(certificate, certificate_pem)
+    write_file(certificate, certificate_pem, 0o644)
+    write_file(key, key_pem, 0o600)
 
 
-def write_private(file: Path, content: bytes) -> None:
-    """A new file that only its owner can read, there whole or not at all."""
+def write_file(file: Path, content: bytes, mode: int) -> None:
+    """There whole, in the place of what was there, or not at all; never readable for more than `mode`."""
     draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
     descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
+        os.fchmod(descriptor, mode)
         with open(descriptor, "wb") as out:  # noqa: PTH123 - of a descriptor
             out.write(content)
             out.flush()

@@ -87,9 +87,14 @@ class Connection(asyncio.Protocol):
             raise Unreachable(
                 f"nothing answers at {address} within {timeout_s:g} s; is the robot on?"
             ) from error
+        except ClientError:
+            raise
         except OSError as error:
-            if pin is not None and isinstance(error, ConnectionResetError):
-                raise NotPaired(_not_let_in(address)) from error
+            if pin is not None and not isinstance(error, ConnectionRefusedError):
+                raise Unreachable(
+                    f"{address} is paired, and what answers there ended the handshake ({_reason(error)}): it "
+                    "is another program, or is busy. Nothing was sent"
+                ) from error
             raise Unreachable(f"no gateway at {address} ({_reason(error)}); is it running there?") from error
         if connection.closed.done():
             raise connection.closed.result()
@@ -212,7 +217,9 @@ class Connection(asyncio.Protocol):
         for answer, _ in self._waiting.values():
             if not answer.done():
                 answer.set_exception(
-                    LinkLost(f"{reason}; a request was under way, and whether it was done is unknown")
+                    reason  # it was never let in, and nothing was done
+                    if isinstance(reason, NotConnected)
+                    else LinkLost(f"{reason}; a request was under way, and whether it was done is unknown")
                 )
 
 

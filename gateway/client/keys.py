@@ -87,9 +87,9 @@ def check_pin(address: Address, pin: str, der: bytes | None) -> None:
     if found == pin.lower():
         return
     raise WrongRobot(
-        f"ANOTHER ROBOT ANSWERS AT {address}, or somebody in between: its key is {found or 'none'}, and that of "
-        f"the robot that was paired is {pin.lower()}. Nothing was sent. Where its keys were made anew, look at "
-        f"them on the robot (gwrms keys list), remove the pin from {server_file()}, and pair again"
+        f"ANOTHER ROBOT ANSWERS AT {address}, or somebody in between: its key is {found or 'none'}, and that "
+        f"of the robot that was paired is {pin.lower()}. Nothing was sent. Where its keys were made anew, "
+        f"look at them there (gwrms keys list), remove the pin from {server_file()}, and pair again"
     )
 
 
