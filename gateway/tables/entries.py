@@ -66,7 +66,11 @@ def _without(text: str, table: str, key: str) -> tuple[list[str], int | None]:
 
 def _checked(lines: list[str], wanted: dict[str, Any], what: str) -> str:
     text = "\n".join(lines) + "\n"
-    if _parsed(text) != wanted:
+    try:
+        is_meant = tomllib.loads(text) == wanted
+    except ValueError:
+        is_meant = False
+    if not is_meant:
         raise NoSuchLine(f"{what} stands there in another way than as one line: change it by hand")
     return text
 

@@ -1,5 +1,6 @@
 """Robots with keys, and people who have some: key pairs are made once a run, because that takes a moment."""
 
+import atexit
 import functools
 import shutil
 import socket
@@ -41,7 +42,9 @@ PEOPLE: Final = {role.value: role for role in Role}  # each called as what they 
 
 @functools.cache
 def _folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix="gwrms-keys-"))
+    made = Path(tempfile.mkdtemp(prefix="gwrms-keys-"))
+    atexit.register(shutil.rmtree, made)
+    return made
 
 
 @functools.cache
@@ -116,11 +119,16 @@ class KeyedClient(Client):
     """One connection by TLS, of somebody."""
 
     def __init__(self, address: tuple[str, int], whose: "str | tuple[Path, Path] | None") -> None:
+        self._context = context(pair(whose) if isinstance(whose, str) else whose)
         super().__init__(address)
-        self._reader.close()
-        self.socket = context(pair(whose) if isinstance(whose, str) else whose).wrap_socket(self.socket)
-        self.socket.settimeout(WAIT_S)
-        self._reader = self.socket.makefile("rb")
+
+    def _connected(self, address: tuple[str, int]) -> socket.socket:
+        plain = super()._connected(address)
+        try:
+            return self._context.wrap_socket(plain)
+        except OSError:
+            plain.close()
+            raise
 
 
 def raw(address: tuple[str, int]) -> socket.socket:

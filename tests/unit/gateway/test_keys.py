@@ -20,6 +20,7 @@ from gateway.connections import handshakes
 from gateway.connections.listeners import listen
 from gateway.connections.tls import RECORD
 from gateway.daemon import Daemon
+from gateway.key_making import make
 from gateway.wire.limits import HANDSHAKES
 from tests.support.waiting import until
 from tests.unit.gateway import keyed as keys
@@ -263,10 +264,10 @@ def test_the_service_manager_s_credentials_come_first(tmp_path: Path) -> None:
 
 def test_keys_are_made_for_their_owner_alone(tmp_path: Path) -> None:
     key, certificate = tmp_path / "own" / "desk.key", tmp_path / "own" / "desk.crt"
-    keys.make("anna", key, certificate)
+    make("anna", key, certificate)
     assert [stat.S_IMODE(one.stat().st_mode) for one in (key.parent, key)] == [0o700, 0o600]
     with pytest.raises(KeyProblem, match="made once"):
-        keys.make("anna", key, certificate)
+        make("anna", key, certificate)
 
 
 def test_a_gateway_that_rests_wakes_for_who_has_a_key_and_rests_again(tmp_path: Path) -> None:

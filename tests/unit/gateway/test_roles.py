@@ -27,7 +27,10 @@ OPERATORS = VIEWERS | {
 }  # fmt: skip
 MAINTAINERS = OPERATORS | {"parameter.store", "parameter.restore", "robot.reset", "robot.enable"}
 MAY = {Role.VIEWER: VIEWERS, Role.OPERATOR: OPERATORS, Role.MAINTAINER: MAINTAINERS}
-BEYOND = {"resource.snapshot": {"include": ["cmdline"]}, "control.acquire": {"ttl_s": 10, "take_over": True}}
+BEYOND: dict[str, dict[str, Any]] = {
+    "resource.snapshot": {"include": ["cmdline"]},
+    "control.acquire": {"ttl_s": 10, "take_over": True},
+}
 LOOKS = VIEWERS - {"robot.stop"}  # what changes nothing of the state that it is asked in
 # A trial without a lease there is none: it ends with it.
 STATES = [
