@@ -115,7 +115,8 @@ class Daemon:
         try:
             self._loop.run()
         finally:
-            self._entrance.end()
+            self._intake.shut()  # nobody comes to the entrance any more …
+            self._entrance.end()  # … and nobody from there to the intake
             self._intake.end()
             self._service.close()
             if self._told:

@@ -417,8 +417,14 @@ class Intake:
 
         self._front.post(change)
 
+    def shut(self) -> None:
+        """Accept nobody more, from now on: returns when that is so."""
+        shut = threading.Event()
+        self._front.post(lambda: self._shut(shut))
+        shut.wait()
+
     def end(self) -> None:
-        """Close every connection, and join the thread; the listening socket stays open."""
+        """Close every connection, and join the thread; the listening sockets stay open."""
         self._front.post(self._finish)
         self._thread.join()
         self._front.close()
@@ -426,6 +432,11 @@ class Intake:
     def _run(self) -> None:
         make_urgent()
         self._front.run()
+
+    def _shut(self, shut: threading.Event) -> None:
+        for one in self._acceptors:
+            one.end()
+        shut.set()
 
     def _finish(self) -> None:
         for one in self._acceptors:

@@ -23,10 +23,11 @@ BY_HAND: Final[Mapping[str, tuple[str, ...]]] = {
         "a CAN adapter with real drives",
     ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
-    "how-to/first-robot.md": ("the package index, and leave to write into /opt",),
+    "how-to/first-robot.md": ("the package index, and leave to write into /opt", "two computers, and root"),
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),
+    "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
     "how-to/install.md": ("the package index",),
     "how-to/record.md": ("root, and systemd",),
