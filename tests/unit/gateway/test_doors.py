@@ -147,14 +147,14 @@ def test_a_stranger_s_uid_is_told_so_and_may_not_even_stop(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr("gateway.access.users.peer_of", lambda _connection: SOMEBODY)
-        client = LocalClient(local)
-        with contextlib.suppress(OSError):
+        with LocalClient(local) as client, contextlib.suppress(OSError):
             client.send(STOP % b"from a stranger")
-        error = (client.line() or {})["error"]
-        assert error["data"]["kind"] == "not_allowed"
-        assert "uid 12345 is a user whom this robot does not know" in error["message"]
-        assert client.line() is None
-        client.close()
+            assert "result" not in (client.line() or {})
+        with LocalClient(local) as client:
+            error = (client.line() or {})["error"]
+            assert error["data"]["kind"] == "not_allowed"
+            assert "uid 12345 is a user whom this robot does not know" in error["message"]
+            assert client.line() is None
     with LocalClient(local) as client:
         assert client.call("robot.describe")["stop"]["held"] is False
 
