@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         LinkLost,
         LinkSettings,
         NotConnected,
+        NotPaired,
         ProtocolError,
         RemoteError,
         Robot,
@@ -48,12 +49,14 @@ __all__ = [
     "LinkLost",
     "LinkSettings",
     "NotConnected",
+    "NotPaired",
     "ProtocolError",
     "RemoteError",
     "Robot",
     "StreamCounters",
     "Subscription",
     "Unreachable",
+    "WrongRobot",
     "__version__",
 ]
 _HOME: Final = Path(__file__).resolve().parents[1]  # of all that was installed with this
