@@ -4,6 +4,7 @@ from msgspec import Struct
 
 from gateway.wire.finding import FindingInfo
 from gateway.wire.method import Method, Params
+from gateway.wire.role import Role
 
 CLOSED = "closed"  # a bus's state that is not open
 
@@ -61,5 +62,5 @@ class Buses(Struct, frozen=True):
     buses: list[BusInfo]
 
 
-BUS_SNAPSHOT = Method("bus.snapshot", Params, Buses, module="component")
+BUS_SNAPSHOT = Method("bus.snapshot", Params, Buses, module="component", role=Role.VIEWER)
 METHODS = (BUS_SNAPSHOT,)

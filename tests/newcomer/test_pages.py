@@ -29,9 +29,11 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
         "a CAN adapter with real drives",
     ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
+    "how-to/first-robot.md": ("two computers, and root",),
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),
+    "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
