@@ -45,7 +45,7 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 def _vendors_file(newcomer: Newcomer) -> None:
-    shutil.copy(EDS / "schunk_prl.eds", newcomer.home / "my_drive.eds")
+    shutil.copy(EDS / "trinamic_tmcm_1270.eds", newcomer.home / "my_drive.eds")
 
 
 def _a_sensor(newcomer: Newcomer) -> None:
@@ -104,7 +104,7 @@ def _a_clone_and_an_index(newcomer: Newcomer) -> None:
 
 def _a_clone_and_a_vendors_file(newcomer: Newcomer) -> None:
     _a_clone_and_an_index(newcomer)
-    shutil.copy(EDS / "schunk_prl.eds", newcomer.folder / "my_drive.eds")
+    shutil.copy(EDS / "trinamic_tmcm_1270.eds", newcomer.folder / "my_drive.eds")
 
 
 # What a page takes for granted.
