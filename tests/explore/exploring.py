@@ -4,6 +4,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -68,7 +69,9 @@ def _explore(options: Options, scenes: Sequence[Scene]) -> int:
         left_s = (options.seconds or FOR_EVER_S) - (time.time() - options.begun)
         until = time.monotonic() + left_s / (len(scenes) - number)
         for worker in [_spawn(worker, scene, options, shared, until) for worker in range(options.workers)]:
-            os.waitpid(worker, 0)
+            if os.waitpid(worker, 0)[1]:
+                say(f"the search could not be made in the scene {scene.name}: see above")
+                return 2
         if options.ended:
             break
     seconds = time.time() - options.begun
@@ -89,6 +92,8 @@ def _spawn(worker: int, scene: Scene, options: Options, shared: Shared, until: f
     try:
         Search(scene, options, shared, until).run()
         code = 0
+    except BaseException:  # noqa: BLE001 - whatever it is: a search that did not take place has found nothing
+        traceback.print_exc()
     finally:
         os._exit(code)
 

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import socket
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -11,6 +12,8 @@ from tests.explore.system import READ, WRITE, Channel, System
 
 class Connection(Channel):
     """The gateway's end of one; `told` is the client, and hears whatever is sent to it, `cut` its end."""
+
+    family = socket.AF_INET
 
     def __init__(
         self, system: System, told: Callable[[bytes], object], cut: Callable[[], object] = bool
@@ -67,6 +70,8 @@ class Connection(Channel):
 
 class Listener(Channel):
     """Where clients come in."""
+
+    family = socket.AF_INET
 
     def __init__(self, system: System) -> None:
         super().__init__(system)

@@ -53,3 +53,17 @@ def test_a_search_is_the_same_each_time() -> None:
     said = [re.sub(r"\d+ s,", "", _explore(*options).stdout) for _ in range(2)]
     assert said[0] == said[1]
     assert "orders tried" in said[0]
+
+
+def test_a_search_that_could_not_be_made_is_no_clean_one() -> None:
+    fails = (
+        "import sys, tests.explore.exploring as e; e.Search = lambda *_: 1 / 0; "
+        "sys.exit(e.explore(seconds=1, seed=1, depth=1, workers=1, scenes=['resting'], events=[], "
+        "judged=None, first=False))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", fails]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "ZeroDivisionError" in done.stderr
+    assert "could not be made in the scene resting" in done.stdout
