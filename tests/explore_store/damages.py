@@ -107,11 +107,25 @@ def do(store: Store, which: int, spools: Sequence[Path], proven: Set[int], *, al
         rows = table.to_pyarrow_table()
         numbers = rows[COUNT].to_pylist() if COUNT in rows.column_names else []
         number = next((int(each) for each in numbers if each in proven), None)
-        added = '"txn"' in max((store.folder / location / "_delta_log").glob("*.json")).read_text()
-        if number is not None and ((added and all_proven) or DAMAGES[which] is not _rolled_back):
+        if DAMAGES[which] is _rolled_back:
+            number = next(iter(_newest(table, store.folder / location) & proven if all_proven else ()), None)
+        if number is not None:
             DAMAGES[which](table, store.folder / location, number)
             return True
     return False
+
+
+def _newest(table: DeltaTable, folder: Path) -> set[int]:
+    """The rows of the table's newest commit, where it has added some."""
+    if '"txn"' not in max((folder / "_delta_log").glob("*.json")).read_text():
+        return set()
+    before = DeltaTable(folder, version=table.version() - 1)
+    return _numbers(table) - _numbers(before)
+
+
+def _numbers(table: DeltaTable) -> set[int]:
+    rows = table.to_pyarrow_table()
+    return set(rows[COUNT].to_pylist()) if COUNT in rows.column_names else set()
 
 
 def _files(table: DeltaTable, folder: Path) -> list[Path]:

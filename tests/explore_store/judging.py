@@ -159,11 +159,14 @@ def _damage(world: World, problems: Mapping[str, Sequence[str]]) -> None:
 def _proven(world: World) -> set[int]:
     """The rows of which verify knows that they must be there.
 
-    Of a batch's stream of which retention may have removed rows it does not count the others.
+    Of a batch's stream of which retention may have removed rows it does not count the others; of a batch that
+    was damaged before it had its receipt it tells the loss, and what had arrived of it stands nowhere.
     """
     rows, until_ns = list(world.ledger.rows()), world.retained_ns or 0
     cut = {(row.link, row.stream, row.batch) for row in rows if row.utc_ns(min(row.walls_ns)) < until_ns}
-    return {row.number for row in rows if row.batch and (row.link, row.stream, row.batch) not in cut}
+    return {
+        row.number for row in rows if row.sure and row.batch and (row.link, row.stream, row.batch) not in cut
+    }
 
 
 def rows_of_version(store: Store, location: str, version: int) -> int:
