@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 SECTOR: Final = 512
+DATABASE: Final = ".db"
 WRITING: Final = ("INSERT", "UPDATE", "DELETE", "CREATE", "ALTER")
 INDEX: Final = "-shm"  # of a log: SQLite writes into it what it has synchronised, and never synchronises it
 
@@ -214,7 +215,8 @@ class Disk:
             node = self._named(name, now.nodes.get(name), self._names.get(name), has_come, kept)
             if node is not None and (not above or above in left.folders):
                 new = node.synced if name.endswith(INDEX) else contents.get(node, node.synced)
-                left.files[name] = _mixed(node.synced, new, chance)
+                mixed = _overwritten if name.endswith(DATABASE) else _mixed
+                left.files[name] = mixed(node.synced, new, chance)
         return left
 
     @staticmethod
@@ -251,6 +253,19 @@ def _mixed(old: bytes, new: bytes, chance: random.Random) -> bytes:
     return b"".join(
         padded[chance.randrange(2)][begin : min(begin + SECTOR, length)] for begin in range(0, length, SECTOR)
     )
+
+
+def _overwritten(old: bytes, new: bytes, chance: random.Random) -> bytes:
+    """The same of a database, which is overwritten in place: a sector that was there is the old or the new.
+
+    SQLite relies on that too ("powersafe overwrite"); what it appends may be anything.
+    """
+    if old == new:
+        return old
+    both = min(len(old), len(new))
+    sectors = ((begin, min(begin + SECTOR, both)) for begin in range(0, both, SECTOR))
+    there = b"".join(chance.choice((old, new))[begin:end] for begin, end in sectors)
+    return there + _mixed(old[both:], new[both:], chance)
 
 
 class Watched(sqlite3.Connection):
