@@ -117,6 +117,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run(argv)
     except KeyboardInterrupt:
         return 130
+    except ModuleNotFoundError as error:  # of those without which none is told in words of its command's
+        sys.stderr.write(
+            f"gwrms: {error.name} is not installed, which every command needs: pip install gwrms\n"
+        )
+        return 1
     except OSError as error:
         # The reader left, or the disk is full: let the interpreter's own flush at exit go nowhere.
         if not isinstance(error, BrokenPipeError):
