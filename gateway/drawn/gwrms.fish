@@ -169,7 +169,7 @@ complete -c gwrms -n '_shtab_gwrms_using restore' -l json -d 'one JSON object a 
 complete -c gwrms -n '_shtab_gwrms_using restore' -l yes -d 'do not ask'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a journal -d 'who did what to the robot; is the record whole'
 complete -c gwrms -n '_shtab_gwrms_using journal' -s h -l help -d 'show this help message and exit'
-complete -c gwrms -n '_shtab_gwrms_using journal; and test $_shtab_gwrms_npos -eq 0' -a tail -d 'The newest entries: who did what, when, and what came of it.'
+complete -c gwrms -n '_shtab_gwrms_using journal; and test $_shtab_gwrms_npos -eq 0' -a tail -d 'The newest entries: who did what, when, and what came of it. WHO is the program, by the name that'
 complete -c gwrms -n '_shtab_gwrms_using journal tail' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using journal tail' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using journal tail' -l json -d 'one JSON object a line, for machines'

@@ -79,7 +79,7 @@ _shtab_gwrms_cloud_commands() {
 
 _shtab_gwrms_journal_commands() {
   local _commands=(
-    tail:'The newest entries: who did what, when, and what came of it.'
+    tail:'The newest entries: who did what, when, and what came of it. WHO is the program, by the name that'
     verify:'Check every entry of a journal'"'"'s file. Exit status 0: intact; 1: not; 2: not there.'
   )
   _describe 'gwrms journal commands' _commands
