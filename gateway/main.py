@@ -96,6 +96,8 @@ def explain(error: Exception, command: str) -> str:
 
         return missing.explained(error.name, command)
     ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
+    if isinstance(error, OSError) and not ours and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     if ours or isinstance(error, OSError):
         return str(error)
     return f"internal error, {type(error).__name__}: {error} (run again with --debug and report it)"
@@ -117,8 +119,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run(argv)
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:
-        # The reader left: let the interpreter's own flush at exit go nowhere.
+    except ModuleNotFoundError as error:  # of those without which none is told in words of its command's
+        sys.stderr.write(
+            f"gwrms: {error.name} is not installed, which every command needs: pip install gwrms\n"
+        )
+        return 1
+    except OSError as error:
+        # The reader left, or the disk is full: let the interpreter's own flush at exit go nowhere.
+        if not isinstance(error, BrokenPipeError):
+            sys.stderr.write(f"gwrms: what it says cannot be written: {error.strerror}\n")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterator
 
 from drivers.bus.interfaces.opening import obstacle as bus_obstacle
 from drivers.port import obstacle as port_obstacle
+from gateway.coding import CodingError
 from gateway.config.robot import RobotConfig, header
 from gateway.modules.component.assembly import Robot, assemble
 from gateway.modules.control.catalogue import resolve
-from gateway.modules.control.parameters import Parameter
+from gateway.modules.control.parameters import WRITABLE, Parameter
+from gateway.modules.stop.controllers import write_of
 from gateway.tables.finding import Finding, warning
 
 
@@ -26,6 +28,7 @@ def beside(config: RobotConfig) -> Iterator[Finding]:
     for parameter in resolve(config, robot.descriptions, absent).values():
         if parameter.component not in absent:
             yield from _about_parameter(config, robot, parameter)
+    yield from _about_controllers(config, robot)
 
 
 def here(config: RobotConfig) -> Iterator[Finding]:
@@ -49,6 +52,24 @@ def _about_parameter(config: RobotConfig, robot: Robot, parameter: Parameter) ->
         if own is not None and counts is not None and own != counts:
             text = f"{own:g} is beyond {file}, where it is {counts:g}: that counts"
             yield warning(where, key, text)
+
+
+def _about_controllers(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
+    """Else it is first seen when somebody stops the robot."""
+    for number, one in enumerate(config.stop.controller, 1):
+        description = robot.descriptions.get(one.component)
+        if description is None:
+            continue  # why is told of its own table
+        where, file = f"[[stop.controller]] number {number}", description.path.name
+        try:
+            write_of(one, description)
+        except CodingError as error:
+            yield Finding(where, "object", f"{one.object} of {file}: {error}; a stop could not stop it")
+            continue
+        variable = description.variable(*one.address)
+        if variable is not None and variable.access_type.lower() not in WRITABLE:
+            text = f"{one.object} cannot be written, says {file}: a stop would not stop it"
+            yield warning(where, "object", text)
 
 
 def _table(config: RobotConfig, component: str) -> str:
@@ -84,7 +105,9 @@ def _about_buses(config: RobotConfig) -> Iterator[Finding]:
 def _about_records(config: RobotConfig) -> Iterator[Finding]:
     folder = config.records
     there = next(one for one in (folder, *folder.parents) if one.exists())
-    if not os.access(there, os.W_OK):
+    if not there.is_dir():
+        yield warning("[gateway]", "records", f"{there} is no folder: journal and held stop would be lost")
+    elif not os.access(there, os.W_OK):
         text = f"{folder} cannot be written by this user: journal and held stop would be lost"
         yield warning("[gateway]", "records", text)
 

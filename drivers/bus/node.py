@@ -32,6 +32,7 @@ T = TypeVar("T")
 FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
 LAST_RETRY_S = 2.0
 DOUBT_S = 0.1  # how often a node is asked that answers twice, to see when it does so no more
+_COMING_UP = "it was not read yet: look again in a moment"
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 PROBE_S = 1.0  # how often a node is asked that has no heartbeat and says nothing
 SILENT_S = 3.0  # without a word, though it was asked
@@ -68,7 +69,7 @@ class Node(BusUser):
         self._times = times
         self._users: tuple[tuple[NodeUser, str], ...] = ()  # with their names
         self._lock = threading.RLock()
-        self._step = "nothing was tried yet"
+        self._step = _COMING_UP
         self._guard_s = times.guard_time_s if bus.role is Role.MASTER else None
         self._guard_ns = 0
         self._guard_problem: str | None = None
@@ -314,6 +315,7 @@ class Node(BusUser):
             self._generation += 1
             self.ready = False
             self._stranger = _NOT_ASKED
+            self._step = _COMING_UP
             self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
             users = self._users
         self.channel.forget_written()

@@ -46,6 +46,17 @@ def _about_names(config: RobotConfig) -> Iterator[Finding]:
             seen[name] = table
 
 
+def _about_listening(config: RobotConfig) -> Iterator[Finding]:
+    host, port = config.gateway.host, config.gateway.port
+    if "/" in host or host.count(":") == 1:
+        text = f'{host!r} is more than a host: write one such as "127.0.0.1", and its port into the key port'
+        yield Finding("[gateway]", "host", text)
+    if port and config.gateway.classic_port == port:
+        yield Finding(
+            "[gateway]", "classic_port", f"{port} is port already; take another, such as {port + 1}"
+        )
+
+
 def _about_buses(config: RobotConfig) -> Iterator[Finding]:
     for name, bus in config.can.items():
         if not is_interface(bus.interface):
@@ -93,6 +104,9 @@ def _about_nodes(config: RobotConfig) -> Iterator[Finding]:
 def _about_ports(config: RobotConfig) -> Iterator[Finding]:
     insoles: dict[str, tuple[str, InsoleSettings]] = {}
     taken: dict[str, str] = {}
+    for where, sensor in config.on_ports():
+        if not sensor.port:
+            yield Finding(where, "port", "is empty: write the port's path, in /dev/serial/by-id")
     for name, insole in config.insole.items():
         where = header("insole", name)
         other, same = insoles.setdefault(insole.port, (where, insole))
@@ -176,6 +190,7 @@ def _about_stop(config: RobotConfig) -> Iterator[Finding]:
 
 _CHECKS = (
     _about_names,
+    _about_listening,
     _about_buses,
     _about_nodes,
     about_sdo,

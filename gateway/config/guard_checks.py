@@ -19,7 +19,9 @@ from gateway.config.guard_rules import (
 )
 from gateway.config.likelihood import implausible
 from gateway.config.robot import RobotConfig
-from gateway.tables.finding import Finding, meant
+from gateway.tables.finding import Finding, meant, warning
+
+_LONG_S = 60.0  # longer than what goes wrong with a robot may last before anything is done
 
 
 def complaints(config: RobotConfig, guard: GuardSettings) -> Iterator[Finding]:
@@ -41,6 +43,13 @@ def complaints(config: RobotConfig, guard: GuardSettings) -> Iterator[Finding]:
         for key in ("above", "min", "max"):
             if (bound := getattr(rule, key, None)) is not None:
                 yield from implausible(where, key, bound, unit)
+        for key in ("for_s", "silent_s", "settle_s"):
+            if (getattr(rule, key, None) or 0.0) > _LONG_S:
+                yield warning(where, key, _waits(getattr(rule, key)))
+
+
+def _waits(seconds: float) -> str:
+    return f"{seconds:g} s is long for a guard to wait; {seconds:g} ms is {seconds / 1000:g}"
 
 
 def _about_heartbeat(config: RobotConfig) -> Iterator[Finding]:

@@ -16,12 +16,16 @@ BAUDRATES = frozenset(
     {1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 250_000, 460_800, 500_000, 921_600}
     | {1_000_000, 1_500_000, 2_000_000, 3_000_000, 4_000_000}
 )
-# By unit: more than that is no quantity of an exoskeleton, and which one it likely is.
-_LARGEST: Mapping[str, tuple[float, str, float]] = {
-    "rad": (6.2832, "°", math.pi / 180.0),
-    "m": (5.0, " mm", 1e-3),
-    "s": (600.0, " ms", 1e-3),
-    "rad/s": (100.0, "°/s", math.pi / 180.0),
+# By unit: more than that is no quantity of an exoskeleton, which one it likely is, and its factor and offset.
+_LARGEST: Mapping[str, tuple[float, str, float, float]] = {
+    "rad": (6.2832, "°", math.pi / 180.0, 0.0),
+    "m": (5.0, " mm", 1e-3, 0.0),
+    "s": (600.0, " ms", 1e-3, 0.0),
+    "rad/s": (100.0, "°/s", math.pi / 180.0, 0.0),
+    "N·m": (2000.0, " mN·m", 1e-3, 0.0),
+    "A": (500.0, " mA", 1e-3, 0.0),
+    "V": (1500.0, " mV", 1e-3, 0.0),
+    "°C": (250.0, " K", 1.0, -273.15),
 }
 _EVERYWHERE = ("", "0.0.0.0", "::", "*")
 _LOCAL = re.compile(r"localhost$|127\.|::1$")
@@ -35,9 +39,9 @@ def warnings(config: RobotConfig) -> Iterator[Finding]:
 
 def implausible(where: str, key: str, value: float, unit: str) -> Iterator[Finding]:
     """Where a quantity is likely in another unit."""
-    largest, other, factor = _LARGEST.get(unit, (math.inf, "", 1.0))
+    largest, other, factor, offset = _LARGEST.get(unit, (math.inf, "", 1.0, 0.0))
     if largest < abs(value) < math.inf:
-        slip = f"{value:g}{other} is {round(value * factor, 4):g} {unit}"
+        slip = f"{value:g}{other} is {round(value * factor + offset, 4):g} {unit}"
         yield warning(where, key, f"{value:g} {unit} is more than an exoskeleton has: {slip}")
 
 
@@ -101,6 +105,25 @@ def _about_further_keys(where: str, bus: CanSettings) -> Iterator[Finding]:
             yield warning(where, key, f"goes to {bus.interface} as it stands: {hint.rstrip()}")
 
 
+def _about_joints(config: RobotConfig) -> Iterator[Finding]:
+    for name, joint in config.joint.items():
+        where = header("joint", name)
+        for key, rated, unit in (
+            ("rated_torque", joint.rated_torque, "N·m"),
+            ("rated_current", joint.rated_current, "A"),
+        ):
+            if rated is not None:
+                yield from implausible(where, key, rated, unit)
+
+
+def _about_guarding(config: RobotConfig) -> Iterator[Finding]:
+    for table, devices in (("joint", config.joint), ("device", config.device)):
+        for name, device in devices.items():
+            if config.gateway.role is Role.OBSERVER and device.guard_time_s is not None:
+                text = 'is not done by an observer: who leads the bus is [gateway] role = "master"'
+                yield warning(header(table, name), "guard_time_s", text)
+
+
 def _about_serial_ports(config: RobotConfig) -> Iterator[Finding]:
     for where, one in config.on_ports():
         if one.baudrate not in BAUDRATES:
@@ -109,7 +132,10 @@ def _about_serial_ports(config: RobotConfig) -> Iterator[Finding]:
         if fnmatch.fnmatchcase(one.port, "/dev/tty[AU][CS][MB][0-9]*"):
             text = f"{one.port} may be another device next time: take its path in /dev/serial/by-id"
             yield warning(where, "port", text)
-        if "/" not in one.port:
+        if re.fullmatch(r"COM[0-9]+", one.port, re.IGNORECASE):
+            text = f"{one.port!r} is a name of Windows: take its path in /dev/serial/by-id, see gwrms scan"
+            yield warning(where, "port", text)
+        elif one.port and "/" not in one.port:
             text = f"{one.port!r} is looked for where the gateway is started: write /dev/{one.port}"
             yield warning(where, "port", text)
 
@@ -130,6 +156,10 @@ def _about_parameters(config: RobotConfig) -> Iterator[Finding]:
         for key, value in given.items():
             yield from implausible(where, key, value, one.unit)
         span = given["max"] - given["min"] if len(given) == 2 else math.inf
+        if span == 0:
+            yield warning(where, "min, max", f"are both {given['min']:g}: it could never be changed")
+        if one.states == ():
+            yield warning(where, "states", "names none: it could never be changed; leave the key out")
         if one.max_step is not None and 0 < span < one.max_step:
             text = f"{one.max_step:g} is more than from min to max, {span:g}: it limits nothing"
             yield warning(where, "max_step", text)
@@ -141,6 +171,8 @@ _CHECKS = (
     _about_controller,
     _about_stop_times,
     _about_buses,
+    _about_joints,
+    _about_guarding,
     _about_serial_ports,
     _about_feet,
     _about_parameters,

@@ -195,6 +195,11 @@ _shtab_gwrms_sim___scenario_choices=(walk stand sit sit_to_stand stairs_up stair
 _shtab_gwrms_sim___imu_choices=(bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can)
 _shtab_gwrms_sim___insole_choices=(brilliant-star insole-cobs insole-csv insole-frame)
 _shtab_gwrms_sim_record___scenario_choices=(practice walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)
+_shtab_gwrms_sim_fault_pos_0_choices=(node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)
+_shtab_gwrms_sim_fault___on_choices=(left_hip left_knee left_ankle right_hip right_knee right_ankle gait left_insole right_insole trunk)
+_shtab_gwrms_sim_fault___clear_choices=(all node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)
+_shtab_gwrms_sim_fault___activity_choices=(stand walk sit stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall)
+_shtab_gwrms_sim_fault___controller_choices=(start stop)
 _shtab_gwrms_pos_0_choices=(gateway install-service keys pair check describe snapshot cost bench blame watch top plot get set params store restore journal stop reset enable completion docs eds scan sensor calibrate collect sessions label train cloud query models predict gui evaluate demo sim sim-record sim-fault)
 
 _shtab_gwrms_gateway__h_nargs=0

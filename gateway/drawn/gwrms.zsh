@@ -81,7 +81,7 @@ _shtab_gwrms_cloud_commands() {
 
 _shtab_gwrms_journal_commands() {
   local _commands=(
-    tail:'The newest entries: who did what, when, and what came of it.'
+    tail:'The newest entries: who did what, when, and what came of it. WHO is the program, by the name that'
     verify:'Check every entry of a journal'"'"'s file. Exit status 0: intact; 1: not; 2: not there.'
   )
   _describe 'gwrms journal commands' _commands
@@ -948,14 +948,14 @@ _shtab_gwrms_sim_defaults_added=0
 _shtab_gwrms_sim_fault_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--dir[folder of the simulator]:DIR:_files"
-  "--on[the device, where there is more than one]:DEVICE:"
+  "--on[the device, where there is more than one]:DEVICE:(left_hip left_knee left_ankle right_hip right_knee right_ankle gait left_insole right_insole trunk)"
   "--for[end it after S simulated seconds]:S:"
   "--list[explain every fault]"
   "--active[show what is on]"
-  "--clear[end a fault, or all]:NAME:"
-  "--activity[what the wearer does from now on]:WHAT:"
-  "--controller[start or stop the gait controller]:WHAT:"
-  ":the fault:"
+  "--clear[end a fault, or all]:NAME:(all node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)"
+  "--activity[what the wearer does from now on]:WHAT:(stand walk sit stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall)"
+  "--controller[start or stop the gait controller]:WHAT:(start stop)"
+  ":the fault:(node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)"
   "(*)::its parameters:"
 )
 

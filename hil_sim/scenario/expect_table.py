@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from hil_sim.exoskeleton import CONTROLLER, JOINTS, SENSORS
 from hil_sim.scenario.expectation import Condition, Expectation, Seen, Timing, Track, When
 from hil_sim.scenario.table import Table, unknown
-from hil_sim.scenario.truth import names
+from hil_sim.scenario.truth import names, words
 
 TIMINGS = {when.value: when for when in When}
 # subject → the conditions that may be asked of it
@@ -33,6 +33,10 @@ def read(table: Table, rules: Collection[str] = ()) -> list[Expectation]:
     table.only({subject, *SUBJECTS[subject], *TIMINGS})
     glob, timing = table.text(subject), _timing(table)
     _check_name(table, subject, glob, rules)
+    if subject == "truth":
+        _check_truth(table, glob)
+    if table.values.get("missing") is True and ("min" in table or "max" in table):
+        table.complain("missing", "what is missing has no value: leave min and max out")
     found = [
         Expectation(_TRACKS.get(key, Track(subject)), glob, condition, timing)
         for key, condition in _conditions(table, SUBJECTS[subject])
@@ -49,6 +53,18 @@ def _check_name(table: Table, subject: str, glob: str, rules: Collection[str]) -
     if subject == "answer" or asked in ("resource", "guard") or fnmatch.filter(known, asked):
         return
     table.warn(subject, unknown(asked, known) if known else "the scenario has no [guard.rule.NAME]")
+
+
+def _check_truth(table: Table, glob: str) -> None:
+    """What can never be so: a word that none of them says, or a limit of what is words."""
+    fitting = fnmatch.filter(names(), glob)
+    allowed = {word for name in fitting for word in words(name)}
+    if fitting and "is" in table and table.values["is"] not in allowed:
+        said = unknown(str(table.values["is"]), sorted(allowed)) if allowed else "it is a number: min, max"
+        table.complain("is", said)
+    for key in ("min", "max"):
+        if allowed and key in table:
+            table.complain(key, f"{glob} is in words: is = {sorted(allowed)[0]!r}")
 
 
 def _timing(table: Table) -> Timing:

@@ -4,10 +4,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from fnmatch import fnmatchcase
+from itertools import pairwise
 from typing import NamedTuple
 
 Seen = float | str | None  # a number, a word, or nothing
 
+_UNSEEN_S = 1.0  # ten looks
 _TOLD = 4  # changes that a line of the result tells
 
 
@@ -163,10 +165,21 @@ class Expectation:
         right = [(time_s, value) for time_s, value in series if self.condition.holds(value)]
         wrong = [(time_s, value) for time_s, value in series if not self.condition.holds(value)]
         between = self.timing.when is When.BETWEEN
+        unseen = _unseen(series, self.timing.end_s) if between and not wrong else None
+        if unseen is not None:
+            begin_s, end_s = unseen
+            seen = f"nothing was seen of {name} from {begin_s:.2f} to {end_s:.2f} s"
+            return Verdict(False, self.words, seen, end_s)
         deciding = wrong if between else right  # the first of these decides; without any, the end does
         decided_s = deciding[0][0] if deciding else self.timing.over_s
         told = (wrong or right) if between else (right[:1] or series)
         return Verdict(bool(deciding) is not between, self.words, f"{name} was {_story(told)}", decided_s)
+
+
+def _unseen(series: Sequence[tuple[float, Seen]], end_s: float) -> tuple[float, float] | None:
+    """The first time without a look that is too long for `always`, as of a gateway that answers no more."""
+    times = [*(time_s for time_s, _ in series), end_s]
+    return next((gap for gap in pairwise(times) if gap[1] - gap[0] > _UNSEEN_S), None)
 
 
 def _story(series: Sequence[tuple[float, Seen]]) -> str:

@@ -6,6 +6,7 @@ at, what it must be, and when.
 """
 
 import contextlib
+import fnmatch
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import JOINTS, Exoskeleton, Scenario
 from hil_sim.scenario import expect_table
 from hil_sim.scenario.expectation import Expectation
-from hil_sim.scenario.table import Mistake, ScenarioError, Table, Unusable, meant
+from hil_sim.scenario.table import Mistake, ScenarioError, Table, Unusable, is_number, meant
 from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 
 T = TypeVar("T")
@@ -115,6 +116,9 @@ class _Reading:
         rules = frozenset() if guard is None else frozenset(guard.table("rule"))
         lines = tuple(self._each(values, "at", self._line))
         expected = tuple(self._each(values, "expect", lambda table: expect_table.read(table, rules)))
+        if "expect" not in values:
+            top.warn("expect", "nothing is expected: gwrms sim run takes that for passed, whatever happens")
+        _check_answers(lines, values.get("expect"), self._mistakes)
         expectations = tuple(one for some in expected for one in some)
         least_s = _AFTER_S + max(
             [0.0, *(line.time_s for line in lines), *(one.timing.over_s for one in expectations)]
@@ -197,6 +201,23 @@ def _check_gateway_line(table: Table, key: str) -> None:
         table.text(key)
     elif not isinstance(table.values[key], dict) or not table.values[key]:
         table.complain(key, '{"gait.step_length" = 0.45} is what it looks like')
+    else:
+        for name, value in table.values[key].items():
+            if not is_number(value):
+                text = f'{name} = {value!r} is no number: {{"gait.step_length" = 0.45}} is what it looks like'
+                table.complain(key, text)
+
+
+def _check_answers(lines: tuple[Line, ...], entries: object, mistakes: list[Mistake]) -> None:
+    """Only what this file asks for is answered."""
+    asked = {line.for_gateway for line in lines if line.for_gateway is not None}
+    for number, entry in enumerate(entries if isinstance(entries, list) else (), 1):
+        glob = entry.get("answer") if isinstance(entry, dict) else None
+        if isinstance(glob, str) and not fnmatch.filter(asked, glob.partition(".")[0]):
+            text = f"no [[at]] of this file asks for {glob.partition('.')[0]!r}: " + (
+                ", ".join(sorted(asked)) or "none asks"
+            )
+            mistakes.append(Mistake(f"[[expect]] number {number}", "answer", text))
 
 
 def _duration(robot: Table, least_s: float) -> float:

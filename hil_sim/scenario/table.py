@@ -111,7 +111,7 @@ class Table:
 
     def number(self, key: str) -> float:
         value = self.values[key]
-        if not _is_number(value):
+        if not is_number(value):
             self.complain(key, f"{value!r} must be a number")
             return math.nan
         return float(value)
@@ -130,7 +130,7 @@ class Table:
         return value is True
 
     def _seconds(self, key: str, value: object) -> float:
-        if not isinstance(value, int | float) or not _is_number(value) or value < 0:
+        if not isinstance(value, int | float) or not is_number(value) or value < 0:
             self.complain(key, f"{value!r} is no time: give seconds since the robot was switched on")
             return 0.0
         return float(value)
@@ -147,5 +147,5 @@ def unknown(word: str, allowed: Collection[str]) -> str:
     return f"{word!r} is not known: {meant(word, allowed)}allowed are {', '.join(allowed)}"
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

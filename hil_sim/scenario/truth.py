@@ -1,10 +1,14 @@
 """The robot's own truth, as scenarios name it."""
 
 from collections.abc import Callable, Mapping
+from enum import Enum
 
 from hil_sim.controller import objects
 from hil_sim.drive.drive import JointDrive
+from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import JOINTS, Exoskeleton
+from hil_sim.gait.activity import Label
+from hil_sim.node.nmt import NmtState
 from hil_sim.scenario.expectation import Seen
 
 _SHAPE = {
@@ -20,9 +24,10 @@ _DRIVE: Mapping[str, Callable[[JointDrive], Seen]] = {
     "velocity": lambda drive: drive.joint.velocity,
     "torque": lambda drive: drive.servo.torque,
     "temperature": lambda drive: drive.temperature_c,
-    "state": lambda drive: drive.power_state.name.lower().replace("_", " "),
-    "nmt": lambda drive: drive.state.name.lower().replace("_", "-") if drive.powered else "off",
+    "state": lambda drive: _spoken(drive.power_state, " "),
+    "nmt": lambda drive: _spoken(drive.state, "-") if drive.powered else _OFF,
 }
+_OFF = "off"
 _FEET = ("left", "right")
 
 
@@ -33,11 +38,28 @@ def names() -> tuple[str, ...]:
     return ("wearer.activity", "gait.state", *(f"gait.{name}" for name in _SHAPE), *feet, *drives)
 
 
+def words(name: str) -> frozenset[str]:
+    """All that one of them may say; none where it is a number."""
+    return _WORDS.get(name) or _WORDS.get(name.partition(".")[2], frozenset())
+
+
+def _spoken(state: Enum, space: str) -> str:
+    return state.name.lower().replace("_", space)
+
+
+_WORDS: Mapping[str, frozenset[str]] = {
+    "wearer.activity": frozenset(map(str, Label)),
+    "gait.state": frozenset(_spoken(state, " ") for state in objects.ControllerState),
+    "state": frozenset(_spoken(state, " ") for state in PowerState),
+    "nmt": frozenset([_OFF, *(_spoken(state, "-") for state in NmtState)]),
+}
+
+
 def truth(robot: Exoskeleton) -> dict[str, Seen]:
     """Joints (rad, rad/s, N·m, °C), feet (N), the shape of the gait (m, s, rad), and states in words."""
     found: dict[str, Seen] = {
         "wearer.activity": str(robot.controller.generator.label),
-        "gait.state": robot.controller.controller_state.name.lower(),
+        "gait.state": _spoken(robot.controller.controller_state, " "),
     }
     for name, key in _SHAPE.items():
         found[f"gait.{name}"] = robot.controller.dictionary[key].number() / 1000.0

@@ -14,6 +14,10 @@ import shtab
 from gateway import main
 from gateway.cli.completion import SHELLS
 from gateway.missing import DRAWN, Argument, Page
+from hil_sim.exoskeleton import CONTROLLER, JOINTS, SENSORS
+from hil_sim.faults.registry import FAULTS
+from hil_sim.gait.activity import Activity
+from hil_sim.operator import CONTROLLER_COMMANDS, EVERYTHING
 from tools.draw.commands import ALONE, WORDS, commands, parser_of
 
 
@@ -99,6 +103,16 @@ def _argument(action: argparse.Action, parser: argparse.ArgumentParser, group: i
     )
 
 
+# By command and argument: names that the command knows, and tells itself where another is typed.
+_NAMES: Final[Mapping[tuple[str, str], list[str]]] = {
+    ("gwrms sim-fault", "name"): [*FAULTS],
+    ("gwrms sim-fault", "clear"): [EVERYTHING, *FAULTS],
+    ("gwrms sim-fault", "on"): [*JOINTS, CONTROLLER, *SENSORS],
+    ("gwrms sim-fault", "activity"): [one.name.lower() for one in Activity],
+    ("gwrms sim-fault", "controller"): [*CONTROLLER_COMMANDS],
+}
+
+
 def _said(name: str) -> str:
     with contextlib.redirect_stdout(io.StringIO()) as said:
         main.find(name)(["--help"])
@@ -129,8 +143,9 @@ def _add(below: Any, name: str, what: str, parser: argparse.ArgumentParser | Non
 
 
 def _complete(parser: argparse.ArgumentParser) -> None:
-    """Files where a path is wanted."""
+    """Files where a path is wanted, and names where only some are known."""
     for action in parser._actions:  # noqa: SLF001
+        action.choices = _NAMES.get((parser.prog, action.dest), action.choices)
         if action.type is Path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
 

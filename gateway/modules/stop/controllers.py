@@ -101,14 +101,19 @@ def _write(
     where = f"[[stop.controller]] {one.component} {one.object}"
     if one.component not in components or one.component not in descriptions:
         raise CodingError(f"{where}: it is not there")
-    variable = descriptions[one.component].variable(*one.address)
-    known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
-    if variable is None or known is None or known.kind not in NUMBERS:
-        raise CodingError(f"{where}: its EDS has no such number")
     try:
-        return Write(*one.address, Coding(variable.data_type or 0).encode(one.value))
+        return write_of(one, descriptions[one.component])
     except CodingError as error:
         raise CodingError(f"{where}: {error}") from error
+
+
+def write_of(one: ControllerStop, description: Description) -> Write:
+    """What stops it, as its device is told; raises `CodingError` where its EDS has no such number."""
+    variable = description.variable(*one.address)
+    known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
+    if variable is None or known is None or known.kind not in NUMBERS:
+        raise CodingError("its EDS has no such number")
+    return Write(*one.address, Coding(variable.data_type or 0).encode(one.value))
 
 
 def insist(sdo: SdoChannel, writes: tuple[Write, ...]) -> StopOutcome:

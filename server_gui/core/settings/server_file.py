@@ -269,6 +269,10 @@ class _Reading:
 
 def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
     """What can work and is likely not what was meant."""
+    if settings.rules and not settings.prediction.enabled:
+        yield warning(
+            "[prediction]", "enabled", "is false, and without predictions no rule of [[rules]] acts"
+        )
     for number, rule in enumerate(settings.rules, 1):
         where = f"[[rules]] number {number}"
         if settings.robots and not any(map(rule.concerns, settings.robots)):
@@ -282,6 +286,8 @@ def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
 def _path(_kind: type, value: Any) -> Path:
     if not isinstance(value, str) or not value:
         raise ValueError(f"must be a folder's path in quotes, not {value!r}")
+    if "://" in value:
+        raise ValueError(f"must be a folder of this computer, not {value!r}: [store] url is where it ends")
     return Path(value)
 
 

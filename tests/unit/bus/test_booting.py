@@ -227,6 +227,31 @@ def test_an_error_that_no_driver_should_make_is_told_and_tried_again(
         until(lambda: gait.node.ready)
 
 
+def test_a_node_that_boots_anew_tells_nothing_of_what_was_wrong_before(
+    gait: CanDevice, drive: Drive, channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor that it was never tried, while its first answers are on their way."""
+    goes_on = threading.Event()
+
+    def boot(_sdo: SdoChannel) -> None:
+        drive.begun += 1
+        if drive.begun == 1:
+            raise DeviceTimeout("the mapping is unreadable")
+        if drive.begun == 3:
+            goes_on.wait(WAIT_S)
+
+    monkeypatch.setattr(drive, "boot", boot)
+    with FakeNode(channel, 5, dict(OBJECTS)) as fake:
+        gait.node.attach(drive, "drive")
+        until(lambda: gait.node.ready)
+        fake.boot_up()
+        until(lambda: drive.begun == 3)
+        try:
+            assert gait.node.problem(time.monotonic_ns()) == "it was not read yet: look again in a moment"
+        finally:
+            goes_on.set()
+
+
 def test_a_node_that_is_let_go_in_the_middle_of_its_boot_ends(
     gait: CanDevice, drive: Drive, channel: str
 ) -> None:

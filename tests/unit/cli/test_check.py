@@ -59,6 +59,7 @@ def test_every_scenario_in_the_tree_is_well(file: Path) -> None:
 
 
 GUARDED = 'title = "x"\n[guard.rule.hot]\nwatch = "temperature"\nabove = 90.0\n'
+GUARDED += '[[expect]]\nrule = "hot"\ntripped = false\nat_s = 1\n'
 
 
 @pytest.mark.parametrize(
@@ -146,6 +147,18 @@ def test_a_program_reads_the_same_as_json(tmp_path: Path, capsys: pytest.Capture
             ("", '[insole.left]\nport = "/dev/x"\nlayout = "mine.toml"\n'),
             "mistake: [insole.left]: ",
         ),
+        (
+            ("0x2000:0", "0x2FFF:0"),
+            "mistake: [[stop.controller]] number 1 object: 0x2FFF:0 of gait_controller.eds: its EDS has no",
+        ),
+        (
+            ("value = 0", "value = 70000"),
+            "mistake: [[stop.controller]] number 1 object: 0x2000:0 of gait_controller.eds: 70000 is 70000",
+        ),
+        (
+            ("0x2000:0", "0x2010:0"),
+            "warning: [[stop.controller]] number 1 object: 0x2010:0 cannot be written, says",
+        ),
     ],
 )
 def test_files_beside_it_and_limits_are_looked_at(tmp_path: Path, change: tuple[str, str], says: str) -> None:
@@ -188,6 +201,11 @@ def test_a_bus_and_an_address_that_are_not_here_are_warned_of(tmp_path: Path) ->
     assert "warning: [can.none] channel: there is no interface can77" in said
     assert f"warning: [can.hub] channel: nothing answers at 127.0.0.1:{port}" in said
     assert "warning: [can.line] channel: /dev/none does not exist" in said
+
+
+def test_records_that_are_a_file_are_warned_of(tmp_path: Path) -> None:
+    file = written(tmp_path, f'{BARE}[gateway]\nrecords = "robot.toml"\n')
+    assert f"warning: [gateway] records: {file} is no folder" in told(file, machine=True)
 
 
 def test_nothing_of_this_computer_is_looked_at_where_nobody_wants_it(tmp_path: Path) -> None:

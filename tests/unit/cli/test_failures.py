@@ -1,7 +1,9 @@
 """A program that asked for JSON reads on stdout why a command failed, whoever found that out."""
 
 import json
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -57,3 +59,23 @@ def test_the_streams_are_the_programs_own_again() -> None:
     before = sys.stdout, sys.stderr
     main(["gatway", "--json"])
     assert (sys.stdout, sys.stderr) == before
+
+
+@pytest.mark.parametrize(
+    "words", [["check", "--schema", "robot"], ["check", "--json", "none.toml"], ["--help"]]
+)
+def test_a_full_disk_is_told_in_words_without_a_traceback(words: list[str]) -> None:
+    command = [sys.executable, "-P", "-m", "gateway.main", *words]
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (ended.returncode, "No space left on device" in ended.stderr) == (1, True)
+    assert not any(words in ended.stderr for words in ("Traceback", "Errno", "Exception ignored"))
+
+
+@pytest.mark.parametrize("words", [["top", "--help"], ["describe"], ["describe", "--json"]])
+def test_a_package_that_every_command_needs_is_told_in_words(words: list[str]) -> None:
+    without = "import sys; sys.modules['msgspec'] = None; from gateway.main import main; sys.exit(main())"
+    command = [sys.executable, "-c", without, *words]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr == ("gwrms: msgspec is not installed, which every command needs: pip install gwrms\n")

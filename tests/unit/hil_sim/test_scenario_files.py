@@ -148,6 +148,7 @@ STATE = 'component = "knee"\nstate = "{}"\n'
             "knee was 'stale' at 2.00 s, then 'lost' at 3.00 s",
         ),
         (STATE.format("ok") + "between_s = [5, 9]", False, "nothing was seen of knee then"),
+        (STATE.format("ok") + "between_s = [3.5, 9]", False, "nothing was seen of knee from 4.00 to 9.00 s"),
         (STATE.format("ok") + "at_s = 5", False, "nothing was seen of knee then"),
     ],
 )
@@ -242,7 +243,7 @@ def test_a_rule_is_tripped_or_not_and_says_why_and_whether_it_has_stopped_the_ro
 
 def test_a_rule_that_has_not_tripped_may_be_blind(tmp_path: Path) -> None:
     one = expect(tmp_path, 'rule = "hot"\ntripped = false\nbetween_s = [1, 4]')
-    assert judge(one, hot=[(1.0, "blind"), (3.0, "watching")]).ok
+    assert judge(one, hot=[(1.0, "blind"), (2.0, "blind"), (3.0, "watching")]).ok
     wrong = judge(one, hot=[(1.0, "blind"), (3.0, "tripped"), (4.0, "cleared")])
     assert (wrong.ok, wrong.seen, wrong.decided_s) == (False, "hot was 'tripped' at 3.00 s", 3.0)
 
