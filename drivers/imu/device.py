@@ -8,9 +8,9 @@ from drivers.imu.frame import ImuFrame, moments
 from drivers.imu.settings import ImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.line import Line, Recognise, unrecognised
-from drivers.noted import found
+from drivers.losses import Losses
 from drivers.samples import Quality, State
-from drivers.shares import beside, missing_frames
+from drivers.shares import beside
 
 
 class Imu(TrunkImu):
@@ -26,7 +26,7 @@ class Imu(TrunkImu):
         imu_format = FORMATS[settings.format]
         super().__init__(name, settings, imu_format.conventions, settings.attitude, beside)
         self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.parser, recognise)
-        self._missing_share = missing_frames()
+        self._losses = Losses()
         self._clock_spec = imu_format.clock
         self._clock = imu_format.clock.make() if imu_format.clock else None
 
@@ -42,14 +42,14 @@ class Imu(TrunkImu):
     def quality(self, now_ns: int) -> Quality:
         counters = self.line.parser.counters.as_dict() | {"reconnects": self.line.reconnects}
         quality = self._quality(now_ns, self.line.problem(now_ns), counters)
-        return beside(quality, found([self._missing_share]), now_ns) if quality.state is State.OK else quality
+        return beside(quality, self._losses.findings, now_ns) if quality.state is State.OK else quality
 
     def received(self, frames: Sequence[ImuFrame], stamp_ns: int) -> None:
         """Frames of the line; called in the port's thread."""
         for moment in frames if len(frames) == 1 else moments(frames):
             self._received(moment, stamp_ns)
-        counters = self.line.parser.counters
-        self._missing_share.update(stamp_ns, counters.frames_missed, counters.frames + counters.frames_missed)
+        numbered = bool(frames) and frames[-1].sequence is not None
+        self._losses.update(stamp_ns, self.line.parser.counters, numbered=numbered)
 
     def _received(self, frame: ImuFrame, stamp_ns: int) -> None:
         if frame.late:
@@ -64,5 +64,5 @@ class Imu(TrunkImu):
     def disconnected(self) -> None:
         """The port went away."""
         self._forget()
-        self._missing_share.restart()
+        self._losses.restart()
         self._clock = self._clock_spec.make() if self._clock_spec else None

@@ -18,9 +18,10 @@ from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line, Recognise, unrecognised
+from drivers.losses import Losses
 from drivers.noted import found
 from drivers.samples import Channel, Finding, Quality, State
-from drivers.shares import beside, missing_frames, saturated_frames
+from drivers.shares import beside, saturated_frames
 
 USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}
@@ -69,7 +70,7 @@ class Insole:
         self.check = FootCheck(name, len(layout.cells))
         self._feet_check = FeetCheck(name)
         self._swap_check = SwapCheck()
-        self._missing_share, self._saturated_share = missing_frames(), saturated_frames()
+        self._losses, self._saturated_share = Losses(), saturated_frames()
         self._indices = tuple(range(len(self.channels)))
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._fault: str | None = None  # what the device's own frames say is wrong
@@ -99,7 +100,7 @@ class Insole:
         if state is State.OK:
             wrong = (*self._implausible(), *found([self._saturated_share]))
             state = State.FAULT if self._fault is not None or wrong else state
-            findings = (*wrong, *found([self._missing_share]))
+            findings = (*wrong, *self._losses.findings)
             return beside(Quality(state, age_ms, self._fault, self._counters()), findings, now_ns)
         silence = self.line.problem(now_ns) or self._fault or self._wrong_foot()
         return Quality(state, age_ms, silence or silence_text(age_ms), self._counters())
@@ -113,8 +114,8 @@ class Insole:
         for frame in frames:
             self._take(frame, stamp_ns)
         self._saturated_share.update(stamp_ns, self._saturated, self._taken)
-        counters = self.line.parser.counters
-        self._missing_share.update(stamp_ns, counters.frames_missed, counters.frames + counters.frames_missed)
+        numbered = bool(frames) and frames[-1].sequence is not None
+        self._losses.update(stamp_ns, self.line.parser.counters, numbered=numbered)
 
     def _take(self, frame: InsoleFrame, stamp_ns: int) -> None:
         if frame.late:
@@ -142,7 +143,7 @@ class Insole:
         self.check.restart()
         self._feet_check.restart()
         self._swap_check.restart()
-        self._missing_share.restart()
+        self._losses.restart()
         self._saturated_share.restart()
 
     def _update(self, stamp_ns: int, pressures: tuple[float | None, ...]) -> None:

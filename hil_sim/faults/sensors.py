@@ -87,7 +87,7 @@ FAULTS = {
     "sensor_dropout": Fault(
         Target.SENSOR,
         _on_line(_switched("dropout_share", _share)),
-        "Some frames never come, and the sensor's own counter shows the gaps.",
+        "Some frames never come; where the sensor counts them, its own numbers show the gaps.",
         {"percent": Number(20.0, 0.01, 100.0, "%", "share of the frames that are not sent")},
     ),
     "insole_stuck_cell": Fault(
