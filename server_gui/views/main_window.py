@@ -44,6 +44,7 @@ from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
+from server_gui.views.recording_chip import ask_recording
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.reset import ask_clear, ask_reset
 from server_gui.views.resources import Resources
@@ -325,6 +326,9 @@ class MainWindow(QMainWindow):
         hide.setShortcut(QKeySequence("F9"))
         hide.triggered.connect(self._panels.put_away)
         menu.addAction("Keys").triggered.connect(self.keys.turn)
+        recording = menu.addAction("Stop recording, or start it")
+        recording.setShortcut(QKeySequence("Ctrl+R"))
+        recording.triggered.connect(lambda: ask_recording(self, self._desk.recording))
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
         looks = {look.value.capitalize(): look for look in Look}

@@ -20,6 +20,7 @@ from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
@@ -39,7 +40,7 @@ class RobotCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), ElidedLabel("dim")
+        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), FittedLabel("dim")
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
         self.remove.setText("✕")
@@ -75,9 +76,9 @@ class RobotCard(QFrame):
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
         set_text(self._state, mark.word if worst is None else worst.line)
-        age = age_text(robot.age_s())
+        age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
-        set_text(self._link, f"{age}{' old' if robot.age_s() is not None else ''}{live}")
+        self._link.say(*dict.fromkeys((f"{age}{live}", age)))
         if self.property("selected") != selected:
             self.setProperty("selected", selected)
             self.style().polish(self)
