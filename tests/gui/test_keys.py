@@ -65,6 +65,7 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench:
     assert window.parameters.trial.isVisible()
     assert not window.trial.isVisible(), "it is told twice"
     window._panels.put_away()
+    window.tabs.setCurrentIndex(1)  # the overview shows it itself
     bench.draw(window)
     assert window.trial.isVisible()
     assert "430" in window.trial.words.text()
