@@ -37,7 +37,7 @@ from server_gui.views.unit_plot import UnitPlot
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.plot import PlacedFlag
 
 Floats = npt.NDArray[np.float64]
