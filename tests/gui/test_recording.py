@@ -3,6 +3,7 @@
 import concurrent.futures
 import contextlib
 import itertools
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
@@ -33,8 +35,11 @@ from server_gui.core.settings.server_file import (
     Upload,
     add_robots,
 )
+from server_gui.views.ask import Question
+from server_gui.views.main_window import MainWindow
 from server_gui.views.widgets.fitted import FittedLabel
 from tests.fake_robot import FakeRobot
+from tests.gui.fakes import Bench
 from tests.gui.running import running, wait
 
 ADDRESS = "192.0.2.7:7420"
@@ -210,6 +215,47 @@ def test_marks_and_uploads_are_asked_for_and_told() -> None:
 
 
 # --- the whole window
+
+
+def test_ctrl_r_asks_before_it_ends_a_recording_and_then_for_a_name(window: MainWindow, bench: Bench) -> None:
+    keeper = FakeKeeper(report())
+    bench.desk.recording, _ = looked(keeper)
+    bench.draw(window)
+    QTest.keyClick(window, Qt.Key.Key_R, Qt.KeyboardModifier.ControlModifier)
+    (question,) = window.findChildren(Question)
+    assert keeper.asked == []
+    question.act.click()
+    assert keeper.asked == ["pause"]
+    keeper.answer = report(is_paused=True)
+    bench.desk.recording.look()
+    bench.draw(window)
+    assert window.header.recording.main_text == "Not recording: stopped"
+    window.header.recording.turn.click()
+    asked = window.findChildren(Question)[-1]
+    assert asked.field is not None
+    asked.field.setText("Ada, stairs")
+    QTest.keyClick(asked.field, Qt.Key.Key_Return)
+    assert keeper.asked == ["pause", "go on Ada, stairs"]
+
+
+def test_the_recording_s_chip_says_for_how_long_and_as_what(window: MainWindow, bench: Bench) -> None:
+    answer = report()
+    since_s = time.time() - 3725
+    link = replace(
+        answer.robots["exo-01"],
+        address=bench.station.address,
+        recording_since_utc_s=since_s,
+        notes="Ada, stairs",
+    )
+    bench.desk.recording, _ = looked(FakeKeeper(replace(answer, robots={"exo-01": link})))
+    bench.draw(window)
+    chip = window.header.recording
+    assert chip.main_text.startswith("Recording 1:02:0")
+    assert "Ada, stairs" in chip.accessibleDescription()
+    assert chip.turn.isVisible()
+    bench.desk.recording = Recording(By.NOBODY, None, lambda call: call(), News(), "to show only")
+    bench.draw(window)
+    assert not chip.turn.isVisible()
 
 
 @pytest.fixture
