@@ -5,8 +5,8 @@ import time
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import age_text
@@ -15,6 +15,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.choosable import Choosable
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.whole import WholeLabel
 
@@ -23,19 +24,16 @@ MOST: Final = 4  # rows before the others are asked for
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 
 
-class AlarmRow(QFrame):
+class AlarmRow(Choosable):
     """One alarm. `chosen` when it is clicked, or Return or Space is pressed on it."""
 
-    chosen = Signal()
     cleared = Signal()
     signal = Signal()
     acknowledged = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__("alarm")
         self._theme = theme
-        self.setObjectName("alarm")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._icon = MarkIcon(theme, 13)
         self.headline, self.details = WholeLabel(), WholeLabel("dim")
@@ -89,15 +87,6 @@ class AlarmRow(QFrame):
         )
         self.setAccessibleName(headline)
         self.setAccessibleDescription(self.details.text())
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self.chosen.emit()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Space) and not event.modifiers():
-            self.chosen.emit()
-        else:
-            super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

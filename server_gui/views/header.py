@@ -11,7 +11,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopProgress, StopState
 from server_gui.views.chip import Chip, Words
-from server_gui.views.marks import Mark, age_text, drives_mark
+from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import status
 from server_gui.views.recording_chip import NAME, RecordingChip
 from server_gui.views.theme import Theme
@@ -172,12 +172,11 @@ def _robot(station: Station) -> Words:
 
 
 def _drives(station: Station) -> Words:
-    joints = station.robot.names("joint")
+    count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Drives not known", (f"–/{len(joints)} enabled", "CiA 402"))
+        return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
     mark = drives_mark(station.robot)
-    enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
-    return Words(mark, mark.word.capitalize(), (f"{enabled}/{len(joints)} enabled", "CiA 402"))
+    return Words(mark, mark.word.capitalize(), (count, "CiA 402"))
 
 
 def _status(station: Station) -> Words:

@@ -328,8 +328,7 @@ def _stop(station: Station, joint: str) -> Cell:
     stopping = station.stopping
     proof = stopping.proofs.get(joint)
     if proof is not None:
-        said = f"{proof.after_ms:.0f} ms" if proof.after_ms > 0 else "before"
-        return Cell(said, "good" if station.is_live else "old", None, f"{proof.state}, {said} after the STOP")
+        return Cell(proof.when, "good" if station.is_live else "old", None, f"{proof.text} since the STOP")
     if stopping.state is StopState.IDLE:
         return Cell(NONE, "dim", None, "no stop was sent since the window began")
     return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

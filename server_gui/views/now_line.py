@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSi
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.marks import Mark, drives_mark
+from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import activity
 from server_gui.views.theme import Theme
 from server_gui.views.trial_words import changes, ends
@@ -132,10 +132,8 @@ class NowLine(QFrame):
 
 
 def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
-    joints = station.robot.names("joint")
+    count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
-        return Mark("ring", "old", "not known"), ("Drives not known now",), (f"– of {len(joints)} enabled",)
+        return Mark("ring", "old", "not known"), ("Drives not known now",), (count,)
     mark = drives_mark(station.robot)
-    enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
-    count = f"{enabled} of {len(joints)} enabled"
     return mark, (mark.word.capitalize(),), (count,)

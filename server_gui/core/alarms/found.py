@@ -10,13 +10,12 @@ from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.marks import age_text
+from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import Part, Robot
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
-ENABLED: Final = "operation enabled"
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _IN_FAULT: Final = ("fault", "fault reaction active")
