@@ -222,7 +222,7 @@ def _alarms(station: Station) -> Words:
         return Words(Mark("diamond", "accent"), "A recording", ("no fault shown",))
     if not station.is_live or not station.robot.parts:
         return Words(Mark("ring", "old"), "Alarms not known", ("no live data",))
-    return Words(Mark("disc", "good"), "No alarms", ("all components ok",))
+    return Words(Mark("disc", "good"), "No alarms", ("all ok",))
 
 
 _WORDS: Final[dict[str, Callable[[Station], Words]]] = {

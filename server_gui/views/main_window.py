@@ -145,7 +145,7 @@ class MainWindow(QMainWindow):
             self.cloud = Cloud(archive, desk.recording, theme)
             self.models = ModelsPage(archive.models, theme)
             self._views += (self.recordings, self.cloud, self.models)
-            self.tabs.addTab(Scrolled(self.recordings), "Re&cordings")
+            self.tabs.addTab(self.recordings, "Re&cordings")
             self.tabs.addTab(Scrolled(self.cloud), "C&loud")
             self.tabs.addTab(Scrolled(self.models), "&Models")
         self._bar = StatusBar(desk, theme)

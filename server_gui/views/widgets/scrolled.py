@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QScrollArea, QStackedWidget, QWidget
+from PySide6.QtWidgets import QScrollArea, QWidget
 
 
 class Scrolled(QScrollArea):
@@ -14,8 +14,6 @@ class Scrolled(QScrollArea):
         self.setWidgetResizable(True)
         self.setWidget(view)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        if isinstance(view, QStackedWidget):
-            view.currentChanged.connect(self._grow)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest and watched is self._view:
@@ -27,15 +25,7 @@ class Scrolled(QScrollArea):
         self._grow()
 
     def _grow(self) -> None:
-        layout = self._page.layout()
-        if layout is None or not layout.hasHeightForWidth():
-            self._view.setMinimumHeight(0)
-            return
-        width = max(self.viewport().width(), layout.totalMinimumSize().width())
-        self._view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
-
-    @property
-    def _page(self) -> QWidget:
-        """Of several the one in front: what all together need would be what they would like to have."""
-        view = self._view
-        return view.currentWidget() or view if isinstance(view, QStackedWidget) else view
+        layout = self._view.layout()
+        if layout is not None and layout.hasHeightForWidth():
+            width = max(self.viewport().width(), layout.totalMinimumSize().width())
+            self._view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
