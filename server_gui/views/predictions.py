@@ -180,7 +180,7 @@ def _runner_up(shown: Told) -> str:
 def _tip(shown: Told) -> str:
     """Which model, which nobody reads at arm's length."""
     if isinstance(shown, Recalled):
-        return told_name(shown.prediction.model)
+        return f"{told_name(shown.prediction.model)}, {shown.prediction.model}"
     predicted = shown.predicted
-    told = [model_name(predicted.card), *belief(shown).wordings[:1]]
+    told = [f"{model_name(predicted.card)}, {predicted.card.id}"]
     return "\n".join(told if predicted.quality is None else [*told, predicted.quality.text])
