@@ -237,7 +237,7 @@ def test_typing_into_the_table_edits_the_exact_value(panel: ParametersPanel, ben
 
 
 def test_the_filter_finds_by_words_and_by_object(panel: ParametersPanel) -> None:
-    panel.filters.words.setText("0x2001 torque")
+    panel.filters.words.setText("0x6072 torque")
     panel.refresh()
     shown = panel.tree.filter
     groups = [shown.index(place, NAME) for place in range(shown.rowCount())]
