@@ -35,6 +35,7 @@ def _link(robot: Robot) -> str:
 def table(summary: Summary, gait: Gait, robot: Robot) -> str:
     """Return what the run showed."""
     link = robot.link
+    links = "once" if link.links == 1 else f"{link.links} times"
     lines = [
         "",
         f"{'joint':<14}{'angle over the run':>26}",
@@ -48,7 +49,7 @@ def table(summary: Summary, gait: Gait, robot: Robot) -> str:
         f"{'component':<14}{'worst state':>26}",
         *(f"{name:<14}{state:>26}" for name, state in summary.worst.items()),
         "",
-        f"{summary.rows} rows, {link.dropped} dropped, {link.missed} batches missed, {link.links} links",
+        f"{summary.rows} rows, {link.dropped} dropped, {link.missed} batches missed, linked {links}",
     ]
     return "\n".join(lines) + "\n"
 

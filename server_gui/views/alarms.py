@@ -1,11 +1,12 @@
 """Active alarms, pinned above the tabs: what is wrong, since when, what the robot did, what to check."""
 
 import datetime
+import time
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import age_text
@@ -14,27 +15,25 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.choosable import Choosable
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.whole import WholeLabel
 
 WIDE: Final = 760  # at text of 100 %: then the buttons stand beside the words
 MOST: Final = 4  # rows before the others are asked for
-LOUD: Final = "bad"
+Told = tuple[Station | None, Active]  # without a robot: of what this window records
 
 
-class AlarmRow(QFrame):
+class AlarmRow(Choosable):
     """One alarm. `chosen` when it is clicked, or Return or Space is pressed on it."""
 
-    chosen = Signal()
     cleared = Signal()
     signal = Signal()
     acknowledged = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__("alarm")
         self._theme = theme
-        self.setObjectName("alarm")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._icon = MarkIcon(theme, 13)
         self.headline, self.details = WholeLabel(), WholeLabel("dim")
@@ -67,35 +66,27 @@ class AlarmRow(QFrame):
         theme.changed.connect(self._restyle)
         self._restyle()
 
-    def say(self, station: Station, one: Active, *, named: bool, is_open: bool) -> None:
+    def say(self, station: Station | None, one: Active, *, named: bool, is_open: bool) -> None:
         """Show this alarm; in full where it `is_open`, else what it is alone."""
         alarm = one.alarm
         self._icon.show_mark(alarm.mark)
         self._tone(alarm.mark.colour)
-        headline = " · ".join(filter(None, (station.title if named else "", alarm.line)))
+        headline = " · ".join(filter(None, (station.title if station and named else "", alarm.line)))
         more = [] if alarm.is_now else ["last known"]
         more += ["acknowledged"] if one.is_acknowledged else []
         headline += f" ({', '.join(more)})" if more else ""
         set_text(self.headline, headline)
-        set_text(self.details, details(station, one) if is_open else "")
+        now_s = time.time() if station is None else station.robot.now_s()
+        set_text(self.details, details(one, now_s) if is_open else "")
         self.details.setVisible(is_open)
         self.clear.setVisible(is_open and alarm.clears)
-        self.clear.setEnabled(station.is_linked)
+        self.clear.setEnabled(station is not None and station.is_linked)
         self.show_signal.setVisible(is_open and alarm.channel is not None and one.at_ns is not None)
         self.acknowledge.setVisible(
             is_open and not one.is_acknowledged and alarm.kind is not Kind.NOT_STOPPED
         )
         self.setAccessibleName(headline)
         self.setAccessibleDescription(self.details.text())
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self.chosen.emit()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Space) and not event.modifiers():
-            self.chosen.emit()
-        else:
-            super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -137,7 +128,7 @@ class AlarmStrip(QWidget):
         self._theme = theme
         self._open: tuple[str, tuple[Kind, str]] | None = None  # the one that was chosen
         self._all = False
-        self._told: tuple[tuple[Station, Active], ...] = ()
+        self._told: tuple[Told, ...] = ()
         self.rows: list[AlarmRow] = []
         self.setAccessibleName("Active alarms")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
@@ -175,25 +166,26 @@ class AlarmStrip(QWidget):
         set_button(self.more, "Show fewer alarms" if self._all else f"Show {hidden} more alarms")
         self.setVisible(bool(told))
 
-    def _active(self) -> list[tuple[Station, Active]]:
-        """Of all robots; of the one that is looked at first, where they are as bad."""
+    def _active(self) -> list[Told]:
+        """Of all robots and the recording; of the one that is looked at first, where they are as bad."""
         selected = self._desk.selected
-        found = [(station, one) for station in self._desk.stations for one in station.alarms.active]
+        found: list[Told] = [(None, one) for one in self._desk.recording.alarms.active]
+        found += [(station, one) for station in self._desk.stations for one in station.alarms.active]
         places = {kind: place for place, kind in enumerate(Kind)}
         return sorted(
             found,
             key=lambda told: (
                 told[1].is_acknowledged,
                 told[1].alarm.kind is not Kind.NOT_STOPPED,
-                told[0] is not selected,
+                told[0] is not None and told[0] is not selected,
                 places[told[1].alarm.kind],
                 told[1].since_s,
             ),
         )
 
-    def _opened(self, shown: tuple[tuple[Station, Active], ...]) -> int:
+    def _opened(self, shown: tuple[Told, ...]) -> int:
         """Which row is shown in full: the chosen one, else the worst."""
-        keys = [(station.name, one.alarm.key) for station, one in shown]
+        keys = [_key(told) for told in shown]
         if self._open in keys:
             return keys.index(self._open)
         return 0 if shown and not shown[0][1].is_acknowledged else -1
@@ -208,20 +200,19 @@ class AlarmStrip(QWidget):
         self._column.insertWidget(place, row)
 
     def _choose(self, place: int) -> None:
-        station, one = self._told[place]
-        chosen = (station.name, one.alarm.key)
+        chosen = _key(self._told[place])
         self._open = None if self._open == chosen else chosen
         self.refresh()
 
     def _show(self, place: int) -> None:
         station, one = self._told[place]
-        if one.alarm.channel is not None and one.at_ns is not None:
+        if station is not None and one.alarm.channel is not None and one.at_ns is not None:
             self.shown.emit(station, one.alarm.channel, one.at_ns)
 
     def _acknowledge(self, place: int) -> None:
         station, one = self._told[place]
-        station.alarms.acknowledge(one.alarm.key)
-        if one.alarm.kind is Kind.RESET:
+        (self._desk.recording if station is None else station).alarms.acknowledge(one.alarm.key)
+        if station is not None and one.alarm.kind is Kind.RESET:
             station.stopping.was_ended = False
         self._open = None
         self.refresh()
@@ -231,11 +222,16 @@ class AlarmStrip(QWidget):
         self.refresh()
 
 
-def details(station: Station, one: Active) -> str:
-    """Since when, what the robot did, and what to check."""
+def _key(told: Told) -> tuple[str, tuple[Kind, str]]:
+    station, one = told
+    return "" if station is None else station.name, one.alarm.key
+
+
+def details(one: Active, now_s: float) -> str:
+    """Since when (UTC), what the robot did, and what to check."""
     alarm = one.alarm
     since = datetime.datetime.fromtimestamp(one.since_s, datetime.UTC).astimezone()
-    for_s = max(0.0, station.robot.now_s() - one.since_s)
+    for_s = max(0.0, now_s - one.since_s)
     lines = [f"since {since:%H:%M:%S}, for {lasting(for_s)}"]
     lines += [f"robot: {alarm.did}"] if alarm.did else []
     lines += [f"→ {alarm.check}"] if alarm.check else []

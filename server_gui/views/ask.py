@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.plain import PlainLabel
 
@@ -11,9 +11,17 @@ WIDTH = 420
 
 
 class Question(QDialog):
-    """Never modal: a window behind a modal one takes no click on STOP. Return cancels."""
+    """Never modal: a window behind a modal one takes no click on STOP. Return cancels, but in a `field`."""
 
-    def __init__(self, parent: QWidget, title: str, text: str, action: str, do: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        parent: QWidget,
+        title: str,
+        text: str,
+        action: str,
+        do: Callable[[], None],
+        field: QLineEdit | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setWindowTitle(title)
         self.setModal(False)
@@ -23,7 +31,8 @@ class Question(QDialog):
         self.words.setMinimumWidth(WIDTH)
         self.cancel, self.act = QPushButton("Cancel"), QPushButton(action)
         self.act.setAutoDefault(False)
-        self.cancel.setDefault(True)
+        self.field = field
+        (self.cancel if field is None else self.act).setDefault(True)
         self.cancel.clicked.connect(self.reject)
         self.act.clicked.connect(self.accept)
         self.accepted.connect(do)
@@ -35,16 +44,25 @@ class Question(QDialog):
         column.setContentsMargins(16, 14, 16, 12)
         column.setSpacing(12)
         column.addWidget(self.words)
+        if field is not None:
+            column.addWidget(field)
         column.addLayout(buttons)
-        self.cancel.setFocus()
+        (field or self.cancel).setFocus()
 
 
-def ask(parent: QWidget, title: str, text: str, action: str, do: Callable[[], None]) -> Question:
+def ask(
+    parent: QWidget,
+    title: str,
+    text: str,
+    action: str,
+    do: Callable[[], None],
+    field: QLineEdit | None = None,
+) -> Question:
     """Show a question; `do` is called when `action` is chosen. One of a title at a time."""
     for known in parent.findChildren(Question):
         if known.windowTitle() == title and known.isVisible():
             known.raise_()
             return known
-    question = Question(parent, title, text, action, do)
+    question = Question(parent, title, text, action, do, field)
     question.show()
     return question

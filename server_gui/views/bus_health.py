@@ -24,12 +24,12 @@ from server_gui.core.processing.bus_health import (
     FULL_PERCENT,
     Level,
     Talking,
-    alarms,
     level,
     load_text,
     node_level,
     seen,
     talking,
+    trouble,
 )
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
@@ -245,7 +245,8 @@ class BusHealthView(QWidget):
                 card.show_bus(shown[place])
 
     def _say(self, station: Station, buses: Sequence[BusInfo] | None) -> None:
-        found = alarms(station.robot)
+        known = [(bus, trouble(bus)) for bus in buses or ()]
+        found = [(level(bus), f"bus {bus.name}", *said) for bus, said in known if said is not None]
         if buses is None:
             is_old = (
                 station.is_linked and station.robot.buses_at_ns is not None and station.robot.buses is None
@@ -255,10 +256,10 @@ class BusHealthView(QWidget):
             text = "This robot has no CAN bus."
         else:
             text = "\n".join(
-                f"{LEVELS[bad].word}: {what}{f' · check: {check}' if check else ''}"
-                for bad, what, check in found
+                f"{LEVELS[bad].word}: {bus}: {what}{f' · check: {check}' if check else ''}"
+                for bad, bus, what, check in found
             )
-        tone = "bad" if any(bad is Level.ALARM for bad, _, _ in found) else ""
+        tone = "bad" if any(bad is Level.ALARM for bad, *_ in found) else ""
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)

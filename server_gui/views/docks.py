@@ -9,7 +9,9 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabWidget,
 from server_gui.views.theme import Theme
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
-WIDE: Final = 1600  # wide, at text of 100 %: from here on parameters are shown with range and default
+# Robots and parameters, by how wide the window is at text of 100 %: in all but the last, parameters are shown
+# with range and default.
+WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 474)), (0, (225, 400)))
 ROOMY: Final = 1100  # wide, at text of 100 %: what is narrower has no room for everything at once
 STACK: Final = 340  # wide, likewise: panels that are one behind the other
 MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
@@ -36,7 +38,7 @@ class Docks(QObject):
         self._uncovered = uncovered
         self._theme = theme
         self.is_narrow = False
-        self._is_wide = False
+        self._widths: tuple[int, int] | None = None
         window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
         window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
         window.setTabPosition(Area.AllDockWidgetAreas, QTabWidget.TabPosition.North)
@@ -92,10 +94,8 @@ class Docks(QObject):
                 self._stack()
             else:
                 self._unstack()
-        is_wide = self._window.width() >= self._theme.px(WIDE)
-        if scaled or (is_wide is not self._is_wide and not self.is_narrow):
+        if scaled or (self._usual_widths != self._widths and not self.is_narrow):
             self._size()
-        self._is_wide = self._is_wide if self.is_narrow else is_wide
 
     def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
         dock = QDockWidget(title)
@@ -120,12 +120,17 @@ class Docks(QObject):
 
     def _size(self) -> None:
         px = self._theme.px
-        widths = (225, 400 if self._window.width() < px(WIDE) else 600)
         if self.is_narrow:
             self._window.resizeDocks(self.all[:1], [px(STACK)], Qt.Orientation.Horizontal)
             return
-        self._window.resizeDocks(self.all[:2], [px(width) for width in widths], Qt.Orientation.Horizontal)
+        self._widths = self._usual_widths
+        self._window.resizeDocks(self.all[:2], [px(wide) for wide in self._widths], Qt.Orientation.Horizontal)
         self._window.resizeDocks(self.all[2:3], [px(120)], Qt.Orientation.Vertical)
+
+    @property
+    def _usual_widths(self) -> tuple[int, int]:
+        width = self._window.width()
+        return next(widths for least, widths in WIDTHS if width >= self._theme.px(least))
 
     def _stack(self) -> None:
         """One behind the other; their tabs say what they are, so that they need no title."""

@@ -1,23 +1,21 @@
 """Always in sight: robot, drives, status, link, alarms, what became of a STOP, and STOP itself."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopProgress, StopState
-from server_gui.views.marks import Mark, age_text, drives_mark
+from server_gui.views.chip import Chip, Words
+from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import status
+from server_gui.views.recording_chip import NAME, RecordingChip
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.elided import ElidedLabel
-from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 STOP_MARKS: Final = {
@@ -26,81 +24,8 @@ STOP_MARKS: Final = {
     StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
 }
 STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
-LEAST: Final = 84  # wide, at text of 100 %: a chip with less says nothing
 # Left out in this order where there is less room; alarms stand below the header too.
-SPARE: Final = ("status", "robot", "link", "drives", "warnings")
-
-
-@dataclass(frozen=True, slots=True)
-class Words:
-    """What a chip says: of its detail as many parts as there is room for, and in its tip all."""
-
-    mark: Mark
-    main: str
-    parts: tuple[str, ...] = ()
-    tip: str = ""
-
-
-class Chip(QFrame):
-    """A mark, what it means, and a line of detail; of what has no room whole parts are left out."""
-
-    def __init__(self, theme: Theme, name: str) -> None:
-        super().__init__()
-        self._theme = theme
-        self._words = Words(Mark("ring", "old"), "")
-        self.setObjectName("card")
-        self.setAccessibleName(name)
-        self._icon = MarkIcon(theme, 12)
-        self._main, self._detail = ElidedLabel("title"), ElidedLabel("dim")
-        words = QVBoxLayout()
-        words.setSpacing(0)
-        words.addWidget(self._main)
-        words.addWidget(self._detail)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(9, 3, 11, 3)
-        row.addWidget(self._icon)
-        row.addLayout(words)
-
-    @property
-    def main_text(self) -> str:
-        return self._main.text()
-
-    @property
-    def needs(self) -> int:
-        """How wide it is with all of its first line."""
-        bold = QFontMetrics(self._theme.text_font(bold=True))
-        return max(bold.horizontalAdvance(self._words.main) + self._around, self._theme.px(LEAST))
-
-    @property
-    def wants(self) -> int:
-        """How wide it is with everything."""
-        plain = QFontMetrics(self._theme.text_font())
-        return max(self.needs, plain.horizontalAdvance(" · ".join(self._words.parts)) + self._around)
-
-    def say(self, words: Words) -> None:
-        """Show this."""
-        self._words = words
-        self._icon.show_mark(words.mark)
-        set_text(self._main, words.main)
-        set_tip(self, words.tip or "\n".join(filter(None, (words.main, " · ".join(words.parts)))))
-        self.setAccessibleDescription(f"{words.main}, {' · '.join(words.parts)}")
-        self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        room = self.width() - self._around
-        plain, parts = QFontMetrics(self._theme.text_font()), self._words.parts
-        texts = [" · ".join(parts[:count]) for count in range(len(parts), 0, -1)]
-        fits = (text for text in texts if plain.horizontalAdvance(text) <= room)
-        last = texts[-1] if texts and not any(sign.isdigit() for sign in texts[-1]) else ""  # a name at most
-        set_text(self._detail, next(fits, last))
-
-    @property
-    def _around(self) -> int:
-        return self._theme.px(12) + 34
+SPARE: Final = ("status", "robot", "recording", "link", "drives", "warnings")
 
 
 class Header(QWidget):
@@ -123,6 +48,7 @@ class Header(QWidget):
         self._row.setSpacing(8)
         self._row.addWidget(self._brand)
         self._chips = {name: Chip(theme, name) for name in _WORDS}
+        self._chips[NAME] = self.recording = RecordingChip(desk, theme)
         self._outcome = Chip(theme, "what became of the STOP")
         for chip in (*self._chips.values(), self._outcome):
             self._row.addWidget(chip, 1)
@@ -163,6 +89,7 @@ class Header(QWidget):
         if station is not None:
             for name, words in _WORDS.items():
                 self._chips[name].say(words(station))
+            self.recording.refresh()
         self._refresh_stop(station)
         self._fit()
 
@@ -245,12 +172,11 @@ def _robot(station: Station) -> Words:
 
 
 def _drives(station: Station) -> Words:
-    joints = station.robot.names("joint")
+    count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Drives not known", (f"–/{len(joints)} enabled", "CiA 402"))
+        return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
     mark = drives_mark(station.robot)
-    enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
-    return Words(mark, mark.word.capitalize(), (f"{enabled}/{len(joints)} enabled", "CiA 402"))
+    return Words(mark, mark.word.capitalize(), (count, "CiA 402"))
 
 
 def _status(station: Station) -> Words:
@@ -296,7 +222,7 @@ def _alarms(station: Station) -> Words:
         return Words(Mark("diamond", "accent"), "A recording", ("no fault shown",))
     if not station.is_live or not station.robot.parts:
         return Words(Mark("ring", "old"), "Alarms not known", ("no live data",))
-    return Words(Mark("disc", "good"), "No alarms", ("every component is ok",))
+    return Words(Mark("disc", "good"), "No alarms", ("all ok",))
 
 
 _WORDS: Final[dict[str, Callable[[Station], Words]]] = {

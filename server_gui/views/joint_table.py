@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from gateway.units import Unit, rounded
 from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.texts import error_text
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import Part
@@ -313,7 +314,8 @@ def _error(station: Station, part: Part, *, stale: bool) -> Cell:
         number = f"0x{int(code):04X}"
         found = CODE.search(problem)
         words = (found["words"] or "").strip() if found and found[0].startswith(number) else ""
-        return Cell(f"{number} {words}".strip(), "old" if stale else "bad", None, problem)
+        said = f"{number} {words}" if words else error_text(int(code))
+        return Cell(said, "old" if stale else "bad", None, "\n".join(filter(None, (problem, said))))
     if part.state != "ok" and problem:
         return Cell(problem, "old" if not station.is_live else "bad", None, problem)
     if stale:
@@ -326,8 +328,7 @@ def _stop(station: Station, joint: str) -> Cell:
     stopping = station.stopping
     proof = stopping.proofs.get(joint)
     if proof is not None:
-        said = f"{proof.after_ms:.0f} ms" if proof.after_ms > 0 else "before"
-        return Cell(said, "good" if station.is_live else "old", None, f"{proof.state}, {said} after the STOP")
+        return Cell(proof.when, "good" if station.is_live else "old", None, f"{proof.text} since the STOP")
     if stopping.state is StopState.IDLE:
         return Cell(NONE, "dim", None, "no stop was sent since the window began")
     return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

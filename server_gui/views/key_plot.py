@@ -25,14 +25,16 @@ AT_FLAG: Final = 0.01  # of what is in sight, that the pointer may be beside a f
 class Kind:
     """What is plotted: channels with the colours and words of their curves; `least` range is SI.
 
-    Curves whose channel's component has a parameter `limit` may come no further from 0 than that.
+    Curves whose channel's component has a parameter of the CiA 402 object `most` may come no further from 0
+    than that; of `ends`, no further than these to either side.
     """
 
     title: str
     si: str
     least: float
     curves: tuple[tuple[str, str, str], ...]  # channel, colour, word
-    limit: str = ""
+    most: str = ""
+    ends: str = ""
 
 
 class KeyPlot(Card):
@@ -67,9 +69,7 @@ class KeyPlot(Card):
         columns = [rings.values(name, len(times)) for name in self.channels]
         live = station.is_live
         self.plot.show_flags(flags)
-        self.plot.show_limits(
-            [side * limit * unit.scale for limit in self._limits(station) for side in (1, -1)]
-        )
+        self.plot.show_limits([limit * unit.scale for limit in self._limits(station)])
         self.plot.draw(rings.source, times, columns, live=live, scale=unit.scale)
         if slow or self._hover is not None:
             self._say(station, unit, flags, live=live)
@@ -81,10 +81,9 @@ class KeyPlot(Card):
         parts = [
             (css(self._theme, colour), "━", f"{word} {told[word]}") for _, colour, word in self._kind.curves
         ]
-        limits = self._limits(station)
+        limits = _limit_texts(self._limits(station), unit)
         if limits:
-            said = " and ".join(f"±{unit.editable(limit)}" for limit in dict.fromkeys(limits))
-            parts.append((css(self._theme, "bad"), "┅", f"limit {said}"))
+            parts.append((css(self._theme, "bad"), "┅", f"limit {limits}"))
         self.legend.say(parts)
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
@@ -114,15 +113,23 @@ class KeyPlot(Card):
         return [None if np.isnan(value) else float(value) for value in found]
 
     def _limits(self, station: Station) -> list[float]:
-        if not self._kind.limit:
-            return []
-        names = [f"{channel.partition('.')[0]}.{self._kind.limit}" for channel in self.channels]
-        held = [station.robot.parameters.get(name) for name in names]
-        return [
-            one.value
-            for one in held
-            if one is not None and one.value is not None and one.unit == self._kind.si
+        most = self._held(station, self._kind.most)
+        return [*most, *(-limit for limit in most), *self._held(station, self._kind.ends)]
+
+    def _held(self, station: Station, wanted: str) -> list[float]:
+        """What drives hold in an object, where the robot's file gives it the plot's unit."""
+        parts = {channel.partition(".")[0] for channel in self.channels}
+        known = (
+            () if not wanted or station.robot.description is None else station.robot.description.parameters
+        )
+        held = [
+            station.robot.parameters.get(info.name)
+            for info in known
+            if info.component in parts
+            and info.object.lower().startswith(wanted)
+            and info.unit == self._kind.si
         ]
+        return [one.value for one in held if one is not None and one.value is not None]
 
     @property
     def _unit(self) -> Unit:
@@ -130,3 +137,11 @@ class KeyPlot(Card):
 
     def _resize(self) -> None:
         self.plot.setMinimumHeight(self._theme.px(58))
+
+
+def _limit_texts(limits: Sequence[float], unit: Unit) -> str:
+    """`±40 and ±80`, `−5 and 120`."""
+    both = [limit for limit in limits if limit > 0 and -limit in limits]
+    said = [f"±{unit.editable(limit)}" for limit in both]
+    said += [unit.editable(limit) for limit in sorted(limits) if abs(limit) not in both]
+    return " and ".join(dict.fromkeys(said))

@@ -17,6 +17,7 @@ KEYS: Final[dict[str, dict[str, str]]] = {
         "Ctrl+1": "Look at the first robot; up to Ctrl+9",
         "Alt+O": "Overview; Alt with the underlined letter opens each tab",
         "Ctrl+F": "Filter the parameters",
+        "Ctrl+R": "Stop recording, or start it",
         "F9": "Hide the panels, or show them again",
         "F1": "What the manual says of this",
         "?": "This sheet, and away with it",

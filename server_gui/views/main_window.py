@@ -44,6 +44,7 @@ from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
+from server_gui.views.recording_chip import ask_recording
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.reset import ask_clear, ask_reset
 from server_gui.views.resources import Resources
@@ -110,9 +111,9 @@ class MainWindow(QMainWindow):
         self.robots.added.connect(self.added)
         self.robots.removed.connect(self.removed)
         self.parameters = ParametersPanel(desk, theme)
-        self.trial = TrialBar(desk)
-        self.trial.keep.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
-        self.trial.take_back.connect(lambda: desk.selected.end_trial() if desk.selected else None)
+        self.trial = TrialBar(desk, of_all=True)
+        self.trial.keep.connect(lambda: self.trial.station.keep_trial() if self.trial.station else None)
+        self.trial.take_back.connect(lambda: self.trial.station.end_trial() if self.trial.station else None)
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
@@ -144,7 +145,7 @@ class MainWindow(QMainWindow):
             self.cloud = Cloud(archive, desk.recording, theme)
             self.models = ModelsPage(archive.models, theme)
             self._views += (self.recordings, self.cloud, self.models)
-            self.tabs.addTab(Scrolled(self.recordings), "Re&cordings")
+            self.tabs.addTab(self.recordings, "Re&cordings")
             self.tabs.addTab(Scrolled(self.cloud), "C&loud")
             self.tabs.addTab(Scrolled(self.models), "&Models")
         self._bar = StatusBar(desk, theme)
@@ -174,7 +175,8 @@ class MainWindow(QMainWindow):
         self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
-        self.trial.refresh(shown=not _is_seen(self.parameters.trial))
+        elsewhere = (self.parameters.trial, self.overview.now.trial)
+        self.trial.refresh(shown=not any(_is_seen(one) for one in elsewhere))
         self.events.refresh()
         self._bar.refresh()
 
@@ -325,6 +327,9 @@ class MainWindow(QMainWindow):
         hide.setShortcut(QKeySequence("F9"))
         hide.triggered.connect(self._panels.put_away)
         menu.addAction("Keys").triggered.connect(self.keys.turn)
+        recording = menu.addAction("Stop recording, or start it")
+        recording.setShortcut(QKeySequence("Ctrl+R"))
+        recording.triggered.connect(lambda: ask_recording(self, self._desk.recording))
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
         looks = {look.value.capitalize(): look for look in Look}

@@ -8,11 +8,11 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSi
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.marks import Mark, drives_mark
+from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import activity
 from server_gui.views.theme import Theme
+from server_gui.views.trial_words import changes, ends
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
@@ -107,13 +107,10 @@ class NowLine(QFrame):
             self._show_trial(station, trial)
 
     def _show_trial(self, station: Station, trial: Trial) -> None:
-        left_s = trial.left_s()
-        ends = f"taken back in {left_s:.0f} s" if left_s else "its time is over: reading …"
-        changes = _changes(station, trial, self._desk)
-        count = f"{len(changes)} values" if len(changes) > 1 else changes[0]
-        self.trial.say(
-            ON_TRIAL, (f"On trial: {', '.join(changes)}", f"On trial: {count}", "On trial"), (ends,)
-        )
+        said = changes(station, trial, self._desk.shown.units)
+        count = f"{len(said)} values" if len(said) > 1 else said[0]
+        wordings = (f"On trial: {', '.join(said)}", f"On trial: {count}", "On trial")
+        self.trial.say(ON_TRIAL, wordings, (ends(trial),))
 
     def _fit(self, *, on_trial: bool) -> None:
         columns = min(max(self.width() // self._theme.px(A_FACT), 1), 2 + on_trial)
@@ -135,22 +132,8 @@ class NowLine(QFrame):
 
 
 def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
-    joints = station.robot.names("joint")
+    count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
-        return Mark("ring", "old", "not known"), ("Drives not known now",), (f"– of {len(joints)} enabled",)
+        return Mark("ring", "old", "not known"), ("Drives not known now",), (count,)
     mark = drives_mark(station.robot)
-    enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
-    count = f"{enabled} of {len(joints)} enabled"
     return mark, (mark.word.capitalize(),), (count,)
-
-
-def _changes(station: Station, trial: Trial, desk: Desk) -> list[str]:
-    said = []
-    for name, value in trial.values.items():
-        info = station.known.get(name)
-        unit = unit_of(name, "" if info is None else info.unit, desk.shown.units)
-        before = trial.before.get(name)
-        old = "?" if before is None else unit.editable(before)
-        short = name.replace("_", " ").replace(".", " ")
-        said.append(f"{short} {old} → {unit.editable(value)} {unit.symbol}".rstrip())
-    return said

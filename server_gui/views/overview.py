@@ -35,15 +35,19 @@ STATUS_LINES: Final = 4
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
-    Kind("Knee angle", "rad", 0.2, tuple((f"{side}_knee.position", side, side) for side in SIDES)),
     Kind(
-        "Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "max_torque"
+        "Knee angle",
+        "rad",
+        0.2,
+        tuple((f"{side}_knee.position", side, side) for side in SIDES),
+        ends="0x607d",
     ),
+    Kind("Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "0x6072"),
     Kind(
         "Trunk tilt",
         "rad",
         0.08,
-        (("trunk.tilt_forward", "first", "forward"), ("trunk.tilt_side", "second", "sideways")),
+        (("trunk.tilt_forward", "green", "forward"), ("trunk.tilt_side", "pink", "sideways")),
     ),
 )
 
@@ -228,10 +232,12 @@ class Overview(QWidget):
             if known != self._soles[side]:
                 self._soles[side] = known
                 self._maps[side].set_cells(known.cells)
-            self._maps[side].say(carried[side].problem or ("" if known.count else "no data"))
-            self._loads[side].say(*_load_texts(side, carried[side], force))
+            wordings = _load_texts(side, carried[side], force)
+            self._loads[side].say(*wordings)
             share = carried[side].share
             said = "–" if share is None else f"{100 * share:.0f} %"
+            value = f"{wordings[0]}, {said} of the load" if live else "not known now"
+            self._maps[side].say(carried[side].problem or ("" if known.count else "no data"), value)
             self._shares[side].say(f"{said} of the load", said)
         sources = "; ".join(dict.fromkeys(known.source for known in self._soles.values()))
         count = f"{max(known.count for known in self._soles.values())} cells"

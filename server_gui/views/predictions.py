@@ -9,6 +9,7 @@ from ml.serving.trust import Level
 from server_gui.core.desk.belief import belief, is_stopped
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
+from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.current import STALE_S, Recalled, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
@@ -179,7 +180,7 @@ def _runner_up(shown: Told) -> str:
 def _tip(shown: Told) -> str:
     """Which model, which nobody reads at arm's length."""
     if isinstance(shown, Recalled):
-        return f"model {shown.prediction.model}"
+        return f"{told_name(shown.prediction.model)}, {shown.prediction.model}"
     predicted = shown.predicted
-    told = [f"model {predicted.card.id}", *belief(shown).wordings[:1]]
+    told = [f"{model_name(predicted.card)}, {predicted.card.id}"]
     return "\n".join(told if predicted.quality is None else [*told, predicted.quality.text])

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QWidget
 
-from server_gui.core.alarms.found import ENABLED
+from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.station import Station
 from server_gui.views.ask import Question, ask

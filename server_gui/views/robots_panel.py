@@ -1,9 +1,7 @@
 """Every robot: state, age of its data, a stop of its own; add and remove one; STOP ALL."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import (
-    QFrame,
     QHBoxLayout,
     QLineEdit,
     QScrollArea,
@@ -19,27 +17,26 @@ from server_gui.views.ask import ask
 from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.choosable import Choosable
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.whole import WholeLabel
 
 
-class RobotCard(QFrame):
+class RobotCard(Choosable):
     """One robot; `chosen` when it is clicked, or Return or Space is pressed on it; `removed` likewise."""
 
-    chosen = Signal()
     removed = Signal()
 
     def __init__(self, station: Station, theme: Theme) -> None:
-        super().__init__()
+        super().__init__("card")
         self.station = station
-        self.setObjectName("card")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), ElidedLabel("dim")
+        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), FittedLabel("dim")
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
         self.remove.setText("✕")
@@ -75,21 +72,12 @@ class RobotCard(QFrame):
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
         set_text(self._state, mark.word if worst is None else worst.line)
-        age = age_text(robot.age_s())
+        age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
-        set_text(self._link, f"{age}{' old' if robot.age_s() is not None else ''}{live}")
+        self._link.say(*dict.fromkeys((f"{age}{live}", age)))
         if self.property("selected") != selected:
             self.setProperty("selected", selected)
             self.style().polish(self)
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self.chosen.emit()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Space) and not event.modifiers():
-            self.chosen.emit()
-        else:
-            super().keyPressEvent(event)
 
 
 class RobotsPanel(QWidget):

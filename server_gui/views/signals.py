@@ -37,7 +37,7 @@ from server_gui.views.unit_plot import UnitPlot
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.plot import PlacedFlag
 
 Floats = npt.NDArray[np.float64]
@@ -217,7 +217,7 @@ class Signals(QWidget):
         self._before, self._next = QPushButton("◀"), QPushButton("▶")
         for button, way, which in ((self._before, -1, "before"), (self._next, 1, "after")):
             button.setAccessibleName(f"To the event {which}")
-            button.setToolTip(f"To the event {which}: a stop, fault, write, trial or mark")
+            set_tip(button, f"To the event {which}: a stop, fault, write, trial or mark")
             button.clicked.connect(lambda _=False, way=way: self._turn(way))
         self._keys(as_csv)
         as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))

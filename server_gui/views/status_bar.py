@@ -13,7 +13,7 @@ from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import Level, worst
 from server_gui.views.bus_health import LEVELS
-from server_gui.views.marks import Mark
+from server_gui.views.recording_chip import TONES
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.fitted import FittedLabel
@@ -26,12 +26,6 @@ STOP: Final = (
     "F12: software stop, no emergency stop",
     "F12: software stop",
 )
-TONES: Final = {
-    Tone.GOOD: Mark("disc", "good", "recording"),
-    Tone.WARNING: Mark("triangle", "warn", "recording, with a warning"),
-    Tone.BAD: Mark("square", "bad", "not recording"),
-    Tone.OFF: Mark("ring", "dim", "not recording"),
-}
 
 
 class StatusBar(QStatusBar):

@@ -5,13 +5,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel
 
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plain import rich
+from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plot import Curve, Plot, css
+from server_gui.views.widgets.wrapped import Wrapped
 
 Floats = npt.NDArray[np.float64]
 SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest that holds what there is
@@ -27,9 +25,8 @@ class Trend(Card):
         self._shown: tuple[object, ...] = ()
         self._rows = object()  # another one where what is drawn is no longer only added to
         self.plot = Plot(theme, SPANS_S[0], least)
-        self.legend = QLabel()
-        self.legend.setTextFormat(Qt.TextFormat.RichText)
-        self.legend.setWordWrap(True)
+        self.plot.setAccessibleName(title)
+        self.legend = Wrapped(f"Values of {title}")
         self.body.addWidget(self.legend)
         self.body.addWidget(self.plot, 1)
         self._resize()
@@ -45,9 +42,8 @@ class Trend(Card):
         live: bool,
     ) -> None:
         """Draw a column a curve over the times (s, rising); nothing where there are none."""
-        if not len(times):
-            return
-        span = next((seconds for seconds in SPANS_S if times[-1] - times[0] < seconds), SPANS_S[-1])
+        length_s = times[-1] - times[0] if len(times) else 0.0
+        span = next((seconds for seconds in SPANS_S if length_s < seconds), SPANS_S[-1])
         if self.plot.seconds != span:
             self.plot.set_seconds(span)
         if (source, tuple(curves)) != self._shown:
@@ -63,11 +59,10 @@ class Trend(Card):
         said = []
         for curve, values in zip(curves, columns, strict=True):
             known = values[~np.isnan(values)]
-            newest = f"<b>{known[-1] * self._scale:.1f}</b>" if len(known) else "–"
-            colour = css(self._theme, curve.colour)
-            text = f"━ {rich(curve.channel)} {newest}".replace(" ", "&nbsp;")
-            said.append(f'<span style="color:{colour}">{text}</span>')
-        set_text(self.legend, "&nbsp; ".join(said))
+            newest = f"{known[-1] * self._scale:.1f}" if len(known) else "–"
+            said.append((css(self._theme, curve.colour), "━", f"{curve.channel} {newest}"))
+        self.legend.say(said)
+        self.plot.setAccessibleDescription(self.legend.accessibleDescription())
 
 
 def since_restart(rows: Floats) -> Floats:

@@ -4,17 +4,14 @@ from collections.abc import Sequence
 from itertools import cycle
 from typing import Final
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel
-
 from gateway.units import Unit
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plain import rich
+from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plot import Curve, Mouse, Plot, css
+from server_gui.views.widgets.wrapped import Wrapped
 
-# Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
-OTHERS: Final = ("#009e73", "#cc79a7", "#d55e00", "#f0e442", "#8f8fd6", "#7fb36b")
+# Of what is neither the first left nor the first right channel of its plot.
+OTHERS: Final = ("green", "pink", "vermilion", "yellow", "violet", "lime")
 
 
 class UnitPlot(Card):
@@ -30,21 +27,20 @@ class UnitPlot(Card):
         ]
         self.plot.set_curves(self._curves)
         self._theme = theme
-        self._legend = QLabel()
-        self._legend.setTextFormat(Qt.TextFormat.RichText)
-        self._legend.setWordWrap(True)
+        self.plot.setAccessibleName(self.accessibleName())
+        self._legend = Wrapped(f"Values of {self.accessibleName()}")
         self.body.addWidget(self._legend)
         self.body.addWidget(self.plot)
         self.setMinimumHeight(theme.px(120))
 
     def show_values(self, values: Sequence[float | None]) -> None:
         """Show the newest value of each curve, behind its name."""
-        names = (
-            f'<span style="color:{css(self._theme, curve.colour)}">━ {rich(curve.channel)} '
-            f"<b>{rich(self.unit.text(value))}</b></span>"
+        told = [
+            (curve, f"{curve.channel} {self.unit.text(value)}")
             for curve, value in zip(self._curves, values, strict=True)
-        )
-        set_text(self._legend, "&nbsp;&nbsp; ".join(names))
+        ]
+        self._legend.say([(css(self._theme, curve.colour), "━", text) for curve, text in told])
+        self.plot.setAccessibleDescription(self._legend.accessibleDescription())
 
 
 def _title(unit: Unit, channels: Sequence[str]) -> str:

@@ -105,9 +105,10 @@ def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
     tape, player = archive.playback.tape, full_window.recordings.player
     assert tape is not None
     archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
-    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk  0.94"), "showed it")
-    lines = player.overview.status_lines
-    whole.until(lambda: "Does: Walk  0.94 · said then by activity-3fa2c1" in lines.texts, "said by what")
+    whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk 94 %"), "showed it")
+    lines, activity = player.overview.status_lines, player.overview.now.activity
+    whole.until(lambda: activity.main.text().startswith("Walk 94 %"), "said it large")
+    assert activity.detail.text().startswith("said then by model 3fa2 of activity")
     archive.playback.seek(tape.last_ns)
     whole.until(lambda: "predicted" not in player.banner.text(), "jumped")
     whole.until(lambda: any(text.startswith("Not predicted") for text in lines.texts), "said so")

@@ -17,7 +17,7 @@ from server_gui.views.processes import COMMAND, CPU, NAME, ProcessTable, argumen
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.sort_header import SortHeader
 from tests.gui.fakes import Bench, destroy, stop_is_whole
-from tests.support.desk import HELD, looked, walking
+from tests.support.desk import HELD, described, looked, walking
 
 TOLD_AS_ONE = {f"Ctrl+{place}" for place in range(2, 10)}  # with Ctrl+1
 NOT_THE_WINDOWS = {"F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
@@ -65,6 +65,7 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench:
     assert window.parameters.trial.isVisible()
     assert not window.trial.isVisible(), "it is told twice"
     window._panels.put_away()
+    window.tabs.setCurrentIndex(1)  # the overview shows it itself
     bench.draw(window)
     assert window.trial.isVisible()
     assert "430" in window.trial.words.text()
@@ -144,3 +145,19 @@ def test_what_the_robot_would_refuse_is_marked_while_it_is_staged(window: MainWi
 
 def _names(table: ProcessTable) -> list[str]:
     return [str(table.model().index(row, NAME).data()) for row in range(table.model().rowCount())]
+
+
+def test_a_trial_on_a_robot_that_is_not_looked_at_is_shown_with_its_name(
+    window: MainWindow, bench: Bench
+) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described("exo-02")])
+    until_ns = time.monotonic_ns() + 30_000_000_000
+    other.writing.trial = Trial(7, {"gait.step_length": 0.43}, {"gait.step_length": 0.4}, until_ns)
+    bench.draw(window)
+    assert window.trial.isVisible()
+    assert window.trial.words.text().startswith("exo-02: on trial: gait step length 400 → 430 mm")
+    window.trial.take_back.emit()
+    assert bench.commands[1].named("revert") == [(7,)]
+    assert not bench.first.named("revert")
+    other.writing.trial = None

@@ -143,7 +143,7 @@ def test_a_trial_counts_down_and_is_seen_to_go_back(panel: ParametersPanel, benc
     bench.station.take([looked({**HELD, "gait.step_length": 0.43})])
     panel.refresh()
     assert panel.trial.isVisible()
-    assert "400 → 430 mm; the robot takes it back in" in panel.trial.words.text()
+    assert "400 → 430 mm; taken back in" in panel.trial.words.text()
     assert row(panel, "gait.step_length")[SAID] == "◔ trial"
     trial = bench.station.writing.trial
     assert trial is not None
@@ -237,7 +237,7 @@ def test_typing_into_the_table_edits_the_exact_value(panel: ParametersPanel, ben
 
 
 def test_the_filter_finds_by_words_and_by_object(panel: ParametersPanel) -> None:
-    panel.filters.words.setText("0x2001 torque")
+    panel.filters.words.setText("0x6072 torque")
     panel.refresh()
     shown = panel.tree.filter
     groups = [shown.index(place, NAME) for place in range(shown.rowCount())]

@@ -2,6 +2,8 @@
 
 import concurrent.futures
 import contextlib
+import itertools
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -9,13 +11,15 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
 from ml.store import Store
 from ml.store.tables import TELEMETRY
 from server_gui.app import App
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk import feeds
 from server_gui.core.desk.feeds import Record
 from server_gui.core.desk.recording import SOON, By, Recording, Tone
@@ -31,8 +35,11 @@ from server_gui.core.settings.server_file import (
     Upload,
     add_robots,
 )
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.ask import Question
+from server_gui.views.main_window import MainWindow
+from server_gui.views.widgets.fitted import FittedLabel
 from tests.fake_robot import FakeRobot
+from tests.gui.fakes import Bench
 from tests.gui.running import running, wait
 
 ADDRESS = "192.0.2.7:7420"
@@ -41,8 +48,15 @@ AWAY = "the store s3://lab/exo cannot be reached: Connection refused"
 
 
 def report(
-    alarms: tuple[Alarm, ...] = (), problem: str | None = None, waiting: int = 0, rows_per_s: float = 50.0
+    alarms: tuple[Alarm, ...] = (),
+    problem: str | None = None,
+    waiting: int = 0,
+    rows_per_s: float = 50.0,
+    age_s: float | None = 0.1,
+    **more: Any,
 ) -> CollectorReport:
+    link = LinkStatistics(Address.parse(ADDRESS)).report("")
+    link = replace(link, rows_per_s=rows_per_s, newest_age_s=age_s)
     return CollectorReport(
         version="1.0",
         pid=77,
@@ -51,9 +65,10 @@ def report(
         store="s3://lab/exo",
         upload=Upload.ALWAYS,
         disk_free_bytes=31 << 30,
-        robots={"exo-01": replace(LinkStatistics(Address.parse(ADDRESS)).report(""), rows_per_s=rows_per_s)},
+        robots={"exo-01": link},
         recorder=RecorderState(12, 3, 0, 0.01, alarms),
         uploader=UploaderState(2, waiting, 5 << 20, 0.5, problem),
+        **more,
     )
 
 
@@ -75,6 +90,14 @@ class FakeKeeper:
         self.asked.append("upload")
         return settled(0)
 
+    def pause(self) -> "Future[None]":
+        self.asked.append("pause")
+        return settled(None)
+
+    def go_on(self, name: str) -> "Future[None]":
+        self.asked.append(f"go on {name}")
+        return settled(None)
+
 
 def settled(answer: Any) -> "Future[Any]":
     future: Future[Any] = concurrent.futures.Future()
@@ -87,7 +110,7 @@ def settled(answer: Any) -> "Future[Any]":
 
 def looked(keeper: FakeKeeper, by: By = By.WINDOW, why: str = "") -> tuple[Recording, News]:
     news = News()
-    recording = Recording(by, keeper, lambda call: call(), news, why)
+    recording = Recording(by, keeper, lambda call: call(), news, why, keeper if by is By.WINDOW else None)
     recording.look()
     return recording, news
 
@@ -100,11 +123,47 @@ def test_all_is_well() -> None:
     assert not news.items
 
 
-def test_a_recording_to_which_nothing_comes_is_not_all_well() -> None:
-    recording, _ = looked(FakeKeeper(report(rows_per_s=0.0)))
+@pytest.mark.parametrize("age_s", [None, 5.0])
+def test_a_recording_to_which_nothing_comes_is_not_all_well(age_s: float | None) -> None:
+    recording, _ = looked(FakeKeeper(report(age_s=age_s)))
     said = recording.said(ADDRESS)
     assert said.tone is Tone.WARNING
     assert said.text.startswith("Recording · nothing comes · ")
+
+
+def test_rows_come_before_there_is_a_rate_of_them() -> None:
+    recording, _ = looked(FakeKeeper(report(rows_per_s=0.0)))
+    said = recording.said(ADDRESS)
+    assert (said.tone, said.text[:22]) == (Tone.GOOD, "Recording · rows come ")
+
+
+def test_what_is_not_kept_and_what_is_not_uploaded_are_alarms_of_their_own() -> None:
+    recording, _ = looked(FakeKeeper(report((FULL,), AWAY)))
+    told = {one.alarm.kind: one.alarm for one in recording.alarms.active}
+    assert told[Kind.NOT_RECORDED].what == FULL.text
+    assert told[Kind.UPLOAD].what == AWAY
+    assert all(one.check for one in told.values())
+    fine, _ = looked(FakeKeeper(report()))
+    assert not fine.alarms.active
+
+
+def test_a_recording_is_stopped_and_started_by_its_name() -> None:
+    keeper = FakeKeeper(report(is_paused=True))
+    recording, news = looked(keeper)
+    assert recording.is_paused
+    assert recording.can_pause
+    assert (recording.said(ADDRESS).tone, recording.said(ADDRESS).text) == (
+        Tone.OFF,
+        "Not recording: stopped",
+    )
+    assert not recording.alarms.active
+    recording.go_on("Ada, stairs")
+    recording.mark("here")
+    keeper.answer = report()
+    recording.look()
+    recording.pause()
+    assert keeper.asked == ["go on Ada, stairs", "pause"], "nothing is marked where nothing is recorded"
+    assert any("not marked" in item.text for item in news.items)
 
 
 def test_a_disk_that_is_full_is_said_with_what_to_do_and_once_in_the_news() -> None:
@@ -158,6 +217,47 @@ def test_marks_and_uploads_are_asked_for_and_told() -> None:
 # --- the whole window
 
 
+def test_ctrl_r_asks_before_it_ends_a_recording_and_then_for_a_name(window: MainWindow, bench: Bench) -> None:
+    keeper = FakeKeeper(report())
+    bench.desk.recording, _ = looked(keeper)
+    bench.draw(window)
+    QTest.keyClick(window, Qt.Key.Key_R, Qt.KeyboardModifier.ControlModifier)
+    (question,) = window.findChildren(Question)
+    assert keeper.asked == []
+    question.act.click()
+    assert keeper.asked == ["pause"]
+    keeper.answer = report(is_paused=True)
+    bench.desk.recording.look()
+    bench.draw(window)
+    assert window.header.recording.main_text == "Not recording: stopped"
+    window.header.recording.turn.click()
+    asked = window.findChildren(Question)[-1]
+    assert asked.field is not None
+    asked.field.setText("Ada, stairs")
+    QTest.keyClick(asked.field, Qt.Key.Key_Return)
+    assert keeper.asked == ["pause", "go on Ada, stairs"]
+
+
+def test_the_recording_s_chip_says_for_how_long_and_as_what(window: MainWindow, bench: Bench) -> None:
+    answer = report()
+    since_s = time.time() - 3725
+    link = replace(
+        answer.robots["exo-01"],
+        address=bench.station.address,
+        recording_since_utc_s=since_s,
+        notes="Ada, stairs",
+    )
+    bench.desk.recording, _ = looked(FakeKeeper(replace(answer, robots={"exo-01": link})))
+    bench.draw(window)
+    chip = window.header.recording
+    assert chip.main_text.startswith("Recording 1:02:0")
+    assert "Ada, stairs" in chip.accessibleDescription()
+    assert chip.turn.isVisible()
+    bench.desk.recording = Recording(By.NOBODY, None, lambda call: call(), News(), "to show only")
+    bench.draw(window)
+    assert not chip.turn.isVisible()
+
+
 @pytest.fixture
 def robot() -> Iterator[FakeRobot]:
     with FakeRobot() as made:
@@ -187,12 +287,38 @@ def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
         wait(lambda: station.robot.resources is not None, "saw the robot's computer")
         wait(lambda: rows(app, "exo-01") > 20, "recorded rows")
         assert len(robot.called("stream.start")) == 1
-        shown = app.window.statusBar().findChildren(ElidedLabel)
+        shown = app.window.statusBar().findChildren(FittedLabel)
         wait(lambda: any(label.text().startswith("Recording · ") for label in shown), "said so")
     store = Store(settings.store.url)
     assert store.dataset(TELEMETRY.location("exo-01", 1)).count_rows() > 10
     assert store.dataset("sessions").to_table()["operator"].to_pylist()[-1] == "Ada"
     assert "stairs" in store.dataset("events").to_table()["text"].to_pylist()
+
+
+def test_what_comes_while_it_is_stopped_is_not_kept_and_a_name_begins_a_session(
+    qt: QApplication, settings: ServerSettings, kept: QSettings
+) -> None:
+    with running(qt, settings, kept, Record("Ada", "first")) as app:
+        recording, station = app.desk.recording, app.desk.stations[0]
+        wait(lambda: rows(app, "exo-01") > 5 and recording.can_pause, "recorded")
+        recording.pause()
+        wait(lambda: recording.is_paused, "stopped")
+        newest_ns = station.rings.newest_ns or 0
+        wait(lambda: (station.rings.newest_ns or 0) > newest_ns + 10**9, "is shown as before")
+        recording.go_on("stairs")
+        wait(lambda: not recording.is_paused, "went on")
+        link = recording.link(station.address)
+        assert link is not None
+        assert link.notes == "stairs"
+        again_ns = station.rings.newest_ns or 0
+        wait(lambda: (station.rings.newest_ns or 0) > again_ns + 5 * 10**8, "recorded again")
+    store = Store(settings.store.url)
+    sessions = store.dataset("sessions").to_table().to_pylist()
+    notes = {row["session"]: row["notes"] for row in sessions}
+    assert sorted(notes.values()) == ["first", "stairs"]
+    stamps_ns = store.dataset(TELEMETRY.location("exo-01", 1)).to_table(["stamp_ns"])["stamp_ns"].to_pylist()
+    gaps_ns = [late - soon for soon, late in itertools.pairwise(sorted(stamps_ns))]
+    assert max(gaps_ns) > 9 * 10**8
 
 
 def rows(app: App, robot: str) -> int:

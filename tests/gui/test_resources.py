@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 from PySide6.QtCore import Qt
@@ -16,6 +17,8 @@ from server_gui.views.computer import held_back
 from server_gui.views.processes import CPU, MEMORY, NAME, PID
 from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
+from server_gui.views.trend import Trend
+from server_gui.views.widgets.plot import Curve
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import resources
 
@@ -117,14 +120,14 @@ def test_disk_network_heat_and_who_uses_the_cpu_are_shown_over_time(view: Resour
     assert bench.station.processing.resource.devices.recent().shape == (2, 6)
     cards = (view.devices, view.temperature, view.top)
     told = {card: card.legend.text().replace("&nbsp;", " ") for card in cards}
-    assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.devices]) == [
+    assert re.findall(r"━ ([^<]+) ([\d.]+)<", told[view.devices]) == [
         ("disk read", "20.0"),
         ("written", "4.0"),
         ("network in", "1.0"),
         ("out", "64.0"),
     ]
-    assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.temperature]) == [("hottest °C", "61.5")]
-    assert re.findall(r"━ ([^<]+) <b>([^<]+)", told[view.top]) == [
+    assert re.findall(r"━ ([^<]+) ([\d.]+)<", told[view.temperature]) == [("hottest °C", "61.5")]
+    assert re.findall(r"━ ([^<]+) ([\d.]+)<", told[view.top]) == [
         ("gait_ctrl", "40.0"),
         ("&lt;b&gt;", "5.0"),
     ]
@@ -162,3 +165,14 @@ def test_a_first_look_has_no_percentages_and_says_so(view: Resources, bench: Ben
 def test_the_filter_finds_processes_by_name(view: Resources, bench: Bench) -> None:
     view.words.setText("gait")
     assert show(view, bench, use("gait_ctrl", 1, 1.0), use("sshd", 2, 1.0)) == ["gait_ctrl"]
+
+
+def test_a_trend_without_rows_has_no_axis_that_would_measure_nothing(theme: Theme) -> None:
+    trend = Trend(theme, "CPU (%)", 10.0)
+    trend.show_rows("none", np.zeros(0), [Curve("cpu", "accent")], [np.zeros(0)], live=True)
+    assert trend.plot._is_blank
+    trend.show_rows("some", np.array([1.0, 2.0]), [Curve("cpu", "accent")], [np.array([3.0, 4.0])], live=True)
+    assert not trend.plot._is_blank
+    assert trend.plot.accessibleDescription() == "cpu 4.0"
+    trend.show_rows("another", np.zeros(0), [Curve("cpu", "accent")], [np.zeros(0)], live=True)
+    assert trend.plot._is_blank

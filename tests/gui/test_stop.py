@@ -14,7 +14,7 @@ from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.support.desk import JOINTS, described
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
@@ -164,3 +164,18 @@ def test_the_robot_is_named_on_the_button_and_so_is_another(header: Header, benc
     bench.desk.select(other)
     header.refresh()
     assert header.stop.text() == "STOP  exo-02"
+
+
+def test_a_very_long_name_makes_no_card_wider_and_hides_no_stop(window: MainWindow, bench: Bench) -> None:
+    other = bench.add("x" * 90, 7421)
+    other.take([described("x" * 90)])
+    bench.desk.select(other)
+    window.resize(1024, 700)
+    bench.draw(window)
+    assert stop_is_whole(window)
+    for card in window.robots.cards:
+        area = window.robots.rect()
+        corners = (card.stop.rect().topLeft(), card.stop.rect().bottomRight())
+        assert all(area.contains(card.stop.mapTo(window.robots, corner)) for corner in corners)
+        assert card.stop.text().startswith("STOP")
+        assert card.stop.width() >= card.stop.fontMetrics().horizontalAdvance(card.stop.text())

@@ -49,8 +49,8 @@ def test_nothing_in_the_header_is_green_where_nothing_is_known(
     shown = {name: words(station) for name, words in _WORDS.items()}
     green = {name: said for name, said in shown.items() if said.mark.colour == "good"}
     assert green.keys() <= ({"link"} if happened is _nothing_came else set())
-    assert "every component is ok" not in str(shown)
-    assert shown["drives"].parts[0].startswith("–/")
+    assert "all ok" not in str(shown)
+    assert shown["drives"].parts[0].startswith("– of ")
     assert shown["warnings"].main != "No alarms"
 
 

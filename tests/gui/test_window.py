@@ -12,6 +12,7 @@ from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.main_window import USUAL, MainWindow
+from server_gui.views.parameters.tree import DEFAULT, RANGE
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
@@ -212,3 +213,11 @@ def test_what_became_of_a_stop_is_read_in_full_in_a_small_window(
     assert window.header.reset_button.isVisible()
     assert (window.width(), window.height()) == (width, height)
     assert stop_is_whole(window)
+
+
+def test_range_and_default_of_parameters_are_seen_on_a_laptop(window: MainWindow, bench: Bench) -> None:
+    window.resize(1366, 768)
+    bench.draw(window)
+    bench.draw(window)
+    tree = window.parameters.tree
+    assert not any(tree.isColumnHidden(column) for column in (RANGE, DEFAULT))

@@ -177,7 +177,7 @@ def info(name: str) -> ParameterInfo:
         True,
         None,
         component,
-        "0x2001:0",
+        "0x6072:0" if name.endswith("max_torque") else "0x2001:0",
         "rw",
         component != "gait",
         type="INTEGER32",

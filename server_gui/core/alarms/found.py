@@ -10,12 +10,12 @@ from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.marks import age_text
+from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import Part, Robot
+from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
-ENABLED: Final = "operation enabled"
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _IN_FAULT: Final = ("fault", "fault reaction active")
@@ -247,17 +247,19 @@ def _of_guard(facts: Facts) -> Iterator[Alarm]:
     robot, description = facts.robot, facts.robot.description
     if description is None or not description.guard.configured:
         return
-    if description.guard.problem is not None and not description.guard.rules:
-        yield Alarm(Kind.BLIND, "guard", description.guard.problem, "the guard", check=check_of(Kind.BLIND))
+    if description.guard.problem is not None:
+        why = f"it does not run: {description.guard.problem}"
+        yield Alarm(Kind.BLIND, "guard", why, "the guard", check=check_of(Kind.BLIND), is_now=False)
     for rule in description.guard.rules:
-        state = robot.word(f"guard.{rule.name}") or rule.state
-        kind = {"tripped": Kind.GUARD, "blind": Kind.BLIND}.get(state)
+        word = robot.word(f"guard.{rule.name}")
+        kind = {"tripped": Kind.GUARD, "blind": Kind.BLIND}.get(word or rule.state)
         if kind is not None:
-            yield _of_rule(kind, rule, facts)
+            yield _of_rule(kind, rule, facts, is_now=word is not None and not robot.is_stale())
 
 
-def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts) -> Alarm:
-    why = _told(facts.journal, rule.name) or rule.reason or f"{rule.watch} {rule.limit}"
+def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts, *, is_now: bool) -> Alarm:
+    blind = "; ".join(rule.problems) if kind is Kind.BLIND else ""
+    why = _told(facts.journal, rule.name) or rule.reason or blind or f"{rule.watch} {rule.limit}"
     actions = ", ".join(action.replace("_", " ") for action in rule.actions)
     did = f"the rule's actions: {actions}" if kind is Kind.GUARD and actions else ""
     drives = _drives_did(facts.robot) if kind is Kind.GUARD else ""
@@ -265,7 +267,7 @@ def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts) -> Alarm:
     channel = None if on is None else _channel(facts.robot, on, None, (rule.watch,))
     did = "; ".join(filter(None, (did, drives)))
     where = f"rule {rule.name}"
-    return Alarm(kind, f"guard.{rule.name}", why, where, did, check_of(kind), channel=channel)
+    return Alarm(kind, f"guard.{rule.name}", why, where, did, check_of(kind), None, channel, is_now=is_now)
 
 
 def _told(journal: Iterable[Mapping[str, Any]], rule: str) -> str:
@@ -278,16 +280,18 @@ def _told(journal: Iterable[Mapping[str, Any]], rule: str) -> str:
 
 
 def _of_buses(robot: Robot) -> Iterator[Alarm]:
-    description = robot.description
-    for bus in () if description is None or robot.is_recording else description.buses:
-        if bus.state == CLOSED and bus.problem is None:
+    """As they are now; where nobody looks at them, as the robot has told it once with the link."""
+    if robot.is_recording or robot.description is None:
+        return
+    now = bus_health.seen(robot)
+    for bus in robot.description.buses if now is None else now:
+        said = bus_health.trouble(bus)
+        if said is None or (bus.state == CLOSED and bus.problem is None):
             continue
-        told = [*bus.findings, *(one for node in bus.nodes for one in node.findings)]
-        what = "; ".join(dict.fromkeys(one.words for one in told)) or bus.problem
-        if what:
-            checks = "; ".join(dict.fromkeys(one.check for one in told)) or check_of(Kind.BUS)
-            # Told once a link: whether it is so still is not known.
-            yield Alarm(Kind.BUS, f"bus.{bus.name}", what, f"bus {bus.name}", check=checks, is_now=False)
+        what, check = said
+        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.Level.ALARM else Kind.BUS
+        where, is_now = f"bus {bus.name}", now is not None
+        yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
 
 
 # --- small things

@@ -16,6 +16,7 @@ class Mark:
     word: str = ""
 
 
+ENABLED: Final = "operation enabled"
 GLYPHS: Final = {
     "disc": "●",
     "ring": "○",
@@ -72,14 +73,21 @@ def drives_mark(robot: Robot) -> Mark:
     for bad in ("fault", "fault reaction active", "quick stop active"):
         if bad in words:
             return Mark(STATES[bad].shape, STATES[bad].colour, f"{words.count(bad)} in {bad}")
-    enabled = words.count("operation enabled")
+    enabled = words.count(ENABLED)
     if None in words:
         return Mark("ring", "old", f"{words.count(None)} of {len(joints)} drives not known")
     if enabled == len(joints):
-        return Mark("disc", "good", "operation enabled")
+        return STATES[ENABLED]
     if enabled:
         return Mark("half", "warn", f"{enabled} of {len(joints)} enabled")
     return state_mark(words[0]) if len(set(words)) == 1 else Mark("half", "warn", "drives differ")
+
+
+def enabled_text(robot: Robot, *, live: bool) -> str:
+    """Return how many drives are enabled, as far as that is known."""
+    joints = robot.names("joint")
+    enabled = sum(robot.word(f"{joint}.state") == ENABLED for joint in joints)
+    return f"{enabled if live else '–'} of {len(joints)} enabled"
 
 
 def age_text(age_s: float | None) -> str:

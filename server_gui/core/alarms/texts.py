@@ -22,12 +22,16 @@ class Kind(Enum):
     LOST = "lost"
     NO_DATA = "no data yet"
     STALE = "stale"
+    BUS_FAILS = "bus fails"
+    NOT_RECORDED = "not recorded"
     STOPPED = "STOPPED"
     PART_STALE = "sensor stale"
     UNKNOWN = "state not known"
     BUS = "bus"
     BLIND = "guard blind"
     REPORTS = "warning"
+    RECORDING = "recording"
+    UPLOAD = "store"
     RESET = "stop reset"
 
 
@@ -91,6 +95,12 @@ TEXTS: Final = dict(
             "the robot says of it what this window does not know: update the window",
         ),
         _text(Kind.BUS, "triangle", "warn", "check termination, wiring, bitrate and load (gwrms describe)"),
+        _text(
+            Kind.BUS_FAILS, "square", "bad", "check termination, wiring, bitrate and load (gwrms describe)"
+        ),
+        _text(Kind.NOT_RECORDED, "square", "bad", "what comes now is not kept: see to it, or stop the trial"),
+        _text(Kind.RECORDING, "triangle", "warn", "see to the disk of the spool (gwrms collect --status)"),
+        _text(Kind.UPLOAD, "triangle", "warn", "nothing is lost: it waits in the spool; check the store"),
         _text(
             Kind.BLIND, "triangle", "warn", "the guard does not see what it is to watch: check that component"
         ),

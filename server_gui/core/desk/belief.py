@@ -8,6 +8,7 @@ from typing import Final
 from ml.registry.card import Source
 from ml.serving.trust import Level
 from server_gui.core.desk.station import Station
+from server_gui.core.models.names import told_name
 from server_gui.core.prediction.current import Recalled, Shown, Told
 from server_gui.core.prediction.state import Quality
 
@@ -38,7 +39,7 @@ class Belief:
 def belief(told: Told) -> Belief:
     """Return how far what a model says is to be believed."""
     if isinstance(told, Recalled):
-        return Belief(Worth.UNCHECKED, (f"said then by the model {told.prediction.model}", "said then"))
+        return Belief(Worth.UNCHECKED, (f"said then by {told_name(told.prediction.model)}", "said then"))
     predicted = told.predicted
     if predicted.trust.level is Level.DRIFTED:
         return Belief(Worth.DOUBTFUL, (_drifted(told), "unlike its learning", "do not rely on it"))

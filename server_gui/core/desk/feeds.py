@@ -111,7 +111,7 @@ class Feeds:
         """Return what there is to say of who records; `look` keeps it right."""
         keeper = self._collector or self._elsewhere
         by = {Collector: By.WINDOW, RemoteCollector: By.OTHER}.get(type(keeper), By.NOBODY)
-        return Recording(by, keeper, deliver, news, self._why)
+        return Recording(by, keeper, deliver, news, self._why, self._collector)
 
     def follow(self, name: str, address: Address) -> None:
         """Another robot, from now on."""
@@ -175,7 +175,7 @@ class Feeds:
             task.cancel()
         self._tasks = {name: collector.follow(name, address) for name, address in self._robots.items()}
         self._end_showing_only()
-        recording.taken_over(collector)
+        recording.taken_over(collector, collector)
 
     def _end_showing_only(self) -> None:
         """In a thread: it may take a while."""

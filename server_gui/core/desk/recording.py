@@ -1,14 +1,17 @@
 """What is recorded of the robots, by whom, and how that goes, in words for the window."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
 from gateway.amounts import size
+from server_gui.core.alarms.alarm import Alarm, Alarms
+from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.fleet.collector import CollectorReport
+from server_gui.core.fleet.link_statistics import LinkReport
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import AlarmKind
 from server_gui.core.threads.answers import Deliver, when_done
@@ -19,6 +22,9 @@ SOON: Final = "this window records as soon as it can"
 WHO: Final = "recording"  # what the news name instead of a robot
 STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
 NEEDED: Final = frozenset({"network", "recorder"})  # threads without which nothing is recorded
+NOTHING: Final = "nothing comes"
+COMES_S: Final = 3.0  # since the newest row: then nothing comes any more
+DAMAGED: Final = "gwrms cloud verify says what is missing, gwrms cloud mend brings it again"
 UNKNOWN_NS: Final = 2_000_000_000  # without an answer: nobody knows then
 
 
@@ -35,6 +41,18 @@ class Keeper(Protocol):
 
     def upload(self) -> "Future[int]":
         """Bring everything that was recorded until now into the store; how many batches waited."""
+        ...
+
+
+class Pausing(Protocol):
+    """A collector of this process, which may pause."""
+
+    def pause(self) -> "Future[None]":
+        """End every session, and record nothing until `go_on`."""
+        ...
+
+    def go_on(self, name: str) -> "Future[None]":
+        """Begin a session of every robot, with this name."""
         ...
 
 
@@ -67,13 +85,23 @@ class Said:
 class Recording:
     """For the window's thread. `why` says why this window does not record, where it does not."""
 
-    def __init__(self, by: By, keeper: Keeper | None, deliver: Deliver, news: News, why: str = "") -> None:
+    def __init__(
+        self,
+        by: By,
+        keeper: Keeper | None,
+        deliver: Deliver,
+        news: News,
+        why: str = "",
+        pausing: Pausing | None = None,
+    ) -> None:
         self.by = by
         self.why = why
         self.report: CollectorReport | None = None
         self.problem: str | None = None  # why nobody can be asked
         self.on_mark: list[Callable[[str], None]] = []  # told when an instant was marked
         self._keeper = keeper
+        self._pausing = pausing
+        self._alarms = Alarms()
         self._deliver = deliver
         self._news = news
         self._asked_ns: int | None = None
@@ -118,14 +146,53 @@ class Recording:
         since_ns = self._alone_since_ns
         return since_ns is not None and time.monotonic_ns() - since_ns >= for_s * 1e9
 
-    def taken_over(self, keeper: Keeper) -> None:
+    def taken_over(self, keeper: Keeper, pausing: Pausing | None = None) -> None:
         """Nobody else records any more, and this window does from now on."""
-        self.by, self._keeper, self.why = By.WINDOW, keeper, ""
+        self.by, self._keeper, self._pausing, self.why = By.WINDOW, keeper, pausing, ""
         self.report, self.problem, self._alone_since_ns, self._asking = None, None, None, False
         self._news.add(NewsKind.STATE, WHO, "nobody else records any more: this window does from now on")
 
+    # --- start and stop
+
+    @property
+    def can_pause(self) -> bool:
+        """Whether this window records, and so may end that or begin it."""
+        return self._pausing is not None and self.report is not None and self.problem is None
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether somebody has ended it here; robots are followed as before."""
+        return self.report is not None and self.report.is_paused
+
+    def pause(self) -> None:
+        """End what is recorded now, of every robot."""
+        if self._pausing is not None:
+            self._change(self._pausing.pause(), "stopped: what comes now is not kept")
+
+    def go_on(self, name: str) -> None:
+        """Begin a recording of every robot with this name."""
+        if self._pausing is not None:
+            self._change(self._pausing.go_on(name), f"started: {name}" if name else "started")
+
+    def link(self, address: str | None) -> LinkReport | None:
+        """Return what is known of the recording of the robot with this address."""
+        links = () if self.report is None else self.report.robots.values()
+        return next((link for link in links if link.address == address), None)
+
+    def _change(self, future: "Future[None]", text: str) -> None:
+        def done(_: None) -> None:
+            self._news.add(NewsKind.STATE, WHO, text)
+            self._asked_ns = None  # how it goes now is asked at once
+
+        when_done(
+            future, self._deliver, done, lambda error: self._news.add(NewsKind.WARNING, WHO, str(error))
+        )
+
     def mark(self, text: str) -> None:
         """Mark this instant in every robot's recording."""
+        if self.is_paused:
+            self._news.add(NewsKind.WARNING, WHO, "not marked: nothing is recorded, it was stopped here")
+            return
         for told in self.on_mark if self._keeper is not None else ():
             told(text)
         self._ask(lambda keeper: keeper.mark(text), lambda count: f"marked in {_robots(count)}: {text}")
@@ -133,6 +200,28 @@ class Recording:
     def upload(self) -> None:
         """Bring what was recorded until now into the store."""
         self._ask(lambda keeper: keeper.upload(), lambda _: "what was recorded until now goes to the store")
+
+    @property
+    def alarms(self) -> Alarms:
+        """What keeps rows from being kept, or from the store, as of now."""
+        self._alarms.look(self._found(), time.time())
+        return self._alarms
+
+    def _found(self) -> Iterator[Alarm]:
+        said, report = self.said(None), self.report
+        if said.tone is Tone.BAD:
+            yield Alarm(Kind.NOT_RECORDED, "", said.detail or said.text, check=check_of(Kind.NOT_RECORDED))
+        if report is None:
+            return
+        for one in report.recorder.alarms:
+            if one.kind not in STOPPED:
+                where, check = "recorder", check_of(Kind.RECORDING)
+                yield Alarm(Kind.RECORDING, one.kind.value, one.text, where, check=check)
+        uploader = report.uploader
+        if uploader.problem is not None:
+            yield Alarm(Kind.UPLOAD, "", uploader.problem, check=check_of(Kind.UPLOAD))
+        for text in (*uploader.lost, *uploader.ahead):
+            yield Alarm(Kind.UPLOAD, text, text, "what is kept", check=DAMAGED)
 
     def said(self, address: str | None) -> Said:
         """Return how it goes, for who looks at the robot with this address."""
@@ -152,12 +241,14 @@ class Recording:
         stopped = [alarm.text for alarm in report.recorder.alarms if alarm.kind in STOPPED]
         if stopped:
             return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(stopped))
+        if report.is_paused:
+            return Said(Tone.OFF, "Not recording: stopped", "somebody has stopped it in this window")
         addresses = {link.address for link in report.robots.values()}
         if self.by is By.OTHER and address is not None and address not in addresses:
             return Said(Tone.WARNING, "This robot is NOT recorded", _not_followed(report))
-        return self._going_on(report)
+        return self._going_on(report, address)
 
-    def _going_on(self, report: CollectorReport) -> Said:
+    def _going_on(self, report: CollectorReport, address: str | None) -> Said:
         who = "" if self.by is By.WINDOW else f" by process {report.pid}"
         rows = sum(link.rows_per_s for link in report.robots.values())
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]
@@ -166,13 +257,13 @@ class Recording:
         problems += (*report.uploader.lost, *report.uploader.ahead)
         facts = [
             f"Recording{who}",
-            f"{rows:.0f} rows/s" if rows else "nothing comes",
+            _coming(rows, [link for link in report.robots.values() if address in (None, link.address)]),
             *_queue(report),
             f"{size(report.disk_free_bytes)} free",
         ]
         detail = [*problems, f"spool {report.spool}", f"store {report.store}", self.why]
         return Said(
-            Tone.WARNING if problems or not rows else Tone.GOOD,
+            Tone.WARNING if problems or facts[1] == NOTHING else Tone.GOOD,
             " · ".join(facts),
             "\n".join(filter(None, detail)),
         )
@@ -219,6 +310,14 @@ def _queue(report: CollectorReport) -> list[str]:
     if uploader.problem is not None:
         return [spool, f"store not reached, {uploader.waiting} to upload"]
     return [spool, f"{uploader.waiting} to upload" if uploader.waiting else "all uploaded"]
+
+
+def _coming(rows_per_s: float, links: Sequence[LinkReport]) -> str:
+    """By the newest row: a rate over seconds is 0 at the beginning, and goes on for a while at the end."""
+    ages_s = [link.newest_age_s for link in links if link.newest_age_s is not None]
+    if not ages_s or min(ages_s) > COMES_S:
+        return NOTHING
+    return f"{rows_per_s:.0f} rows/s" if rows_per_s else "rows come"
 
 
 def _robots(count: int) -> str:

@@ -59,6 +59,7 @@ class CollectorReport(Struct, frozen=True):
     uploader: UploaderState
     prediction: PredictingState | None = None  # None: it is off
     threads: tuple[Trouble, ...] = ()  # of its own, that have died or stand still
+    is_paused: bool = False  # robots are followed, but nothing is recorded
 
 
 class Collector:
@@ -160,6 +161,14 @@ class Collector:
         """Bring everything that was recorded until now into the store; how many batches waited."""
         return self._do(lambda: self._upload(""))
 
+    def pause(self) -> "concurrent.futures.Future[None]":
+        """End every session, and record nothing until `go_on`."""
+        return self._do(self._fleet.pause)
+
+    def go_on(self, name: str) -> "concurrent.futures.Future[None]":
+        """Begin a session of every robot, with this name."""
+        return self._do(lambda: self._fleet.go_on(name))
+
     def _do(self, what: Callable[[], Result]) -> "concurrent.futures.Future[Result]":
         """In the network's thread."""
 
@@ -198,7 +207,7 @@ class Collector:
 
     async def _mark(self, text: str) -> int:
         lost = self._recorder.state.lost
-        robots = list(self._fleet.robots)
+        robots = [] if self._fleet.is_paused else list(self._fleet.robots)
         for name in robots:
             self._recorder.mark(name, text)
         return len(robots) if await self._on_disk(lost) else 0
@@ -235,6 +244,7 @@ class Collector:
             recorder=self._recorder.state,
             uploader=self._uploader.state,
             threads=self.watch.look(),
+            is_paused=self._fleet.is_paused,
             prediction=None if self._prediction is None else self._prediction.state,
         )
 

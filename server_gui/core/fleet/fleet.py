@@ -6,6 +6,8 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from msgspec.structs import replace
+
 from gateway.client import Address
 from server_gui.core.fleet.link_log import LinkLog
 from server_gui.core.fleet.link_statistics import LinkReport, LinkStatistics
@@ -34,7 +36,7 @@ class Member:
     ) -> None:
         self.statistics = LinkStatistics(address)
         self._robot = robot
-        self._keeping = keeping
+        self.keeping = keeping
         subscribers = [keeping.take, self.statistics.take, LinkLog(robot, address).take, *others]
         self._feed = functools.partial(Feed, address, subscribers, following)
 
@@ -50,11 +52,12 @@ class Member:
     @property
     def session(self) -> str:
         """What the recording that goes on is called; for any thread."""
-        return self._keeping.session
+        return self.keeping.session
 
     def report(self) -> LinkReport:
         """Return how its link does now."""
-        return self.statistics.report(self._keeping.session)
+        found, keeping = self.statistics.report(self.keeping.session), self.keeping
+        return replace(found, recording_since_utc_s=keeping.began_s, notes=keeping.notes)
 
 
 class Fleet:
@@ -71,6 +74,7 @@ class Fleet:
         self._recorder = recorder
         self._operator = operator
         self._notes = notes
+        self.is_paused = False  # nothing is recorded, until somebody wants it
         self._members: dict[str, Member] = {}
         self._left: dict[str, Member] = {}  # that are not followed any more
         self._joining: asyncio.Queue[tuple[str, Member]] = asyncio.Queue()
@@ -87,6 +91,8 @@ class Fleet:
     def follow(self, robot: str, address: Address) -> None:
         """Another robot, from now on."""
         keeping = RobotRecording(robot, self._recorder, self._operator, self._notes)
+        if self.is_paused:
+            keeping.pause()
         others = [functools.partial(subscriber, robot) for subscriber in self.subscribers]
         member = Member(robot, address, self._following, keeping, others)
         self._members = self._members | {robot: member}
@@ -103,6 +109,18 @@ class Fleet:
         if task is not None:
             task.cancel()
         self._recorder.end(robot)
+
+    def pause(self) -> None:
+        """Follow all of them as before, and record nothing of it."""
+        self.is_paused = True
+        for member in self._members.values():
+            member.keeping.pause()
+
+    def go_on(self, name: str) -> None:
+        """Record all of them again, in sessions with this name; without one as they were called."""
+        self._notes, self.is_paused = name or self._notes, False
+        for member in self._members.values():
+            member.keeping.go_on(self._notes)
 
     def session(self, robot: str) -> str:
         """Return what a robot's recording that goes on is called."""

@@ -36,6 +36,8 @@ class LinkReport(Struct, frozen=True):
     quality: LinkQuality  # over the last minute
     clock_offset_s: float | None  # the robot's monotonic clock minus ours
     clock_uncertainty_s: float | None
+    recording_since_utc_s: float | None = None  # this session
+    notes: str = ""  # its notes
 
 
 class LinkStatistics:

@@ -43,7 +43,8 @@ class RecordedPrediction(PredictionService):
         self._show = show
 
     def _keep(self, news: Sequence[PredictionNews]) -> None:
-        rows = [record(self._session(one.robot), one) for one in news if isinstance(one, Predicted)]
+        told = [(self._session(one.robot), one) for one in news if isinstance(one, Predicted)]
+        rows = [record(session, one) for session, one in told if session]  # else nothing of it is recorded
         if rows:
             self._recorder.add(*rows)
         for one in news:

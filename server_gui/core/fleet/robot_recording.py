@@ -1,5 +1,7 @@
 """Hands everything that one robot's feed tells to the recorder, whole; begins and ends its sessions."""
 
+import time
+
 import msgspec
 
 from gateway.client import ConnectionState
@@ -24,21 +26,40 @@ class RobotRecording:
     """One robot's recording, in the network's thread.
 
     A session lasts over dropped links, for as long as the robot's boot, configuration and software stay the
-    same.
+    same; `pause` ends it, `go_on` begins another. Of what comes between, only the robot's journal is kept.
     """
 
     def __init__(self, robot: str, recorder: Recorder, operator: str = "", notes: str = "") -> None:
         self.session = ""
+        self.began_s: float | None = None  # UTC: that session
+        self.notes = notes
         self._robot = robot
         self._recorder = recorder
         self._operator = operator
-        self._notes = notes
         self._facts = Facts()
         self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
         self._linked = False
+        self._is_paused = False
+        self._description: Description | None = None  # the newest
+
+    def pause(self) -> None:
+        """Keep nothing of it from now on."""
+        self._is_paused = True
+        self.session, self.began_s, self._same = "", None, ()
+        self._recorder.end(self._robot)
+
+    def go_on(self, notes: str) -> None:
+        """Keep everything again, in a new session with these notes."""
+        self._is_paused, self.notes = False, notes
+        if self._description is not None:
+            self._described(self._description)
 
     def take(self, event: Event) -> None:
         """Keep what an event tells; returns at once."""
+        if isinstance(event, Described):
+            self._description = event.description
+        if self._is_paused and not isinstance(event, Journalled | LinkChanged):
+            return
         match event:
             case Telemetry():
                 offset_ns = None if event.clock is None else event.clock.offset_ns
@@ -61,11 +82,11 @@ class RobotRecording:
 
     def _described(self, description: Description) -> None:
         self._recorder.describe(self._robot, description)
-        found = session_facts.facts(description, self._operator, self._notes)
+        found = session_facts.facts(description, self._operator, self.notes)
         same = (description.boot_id, found.configuration_hash, description.version)
         if same != self._same:
             self._same, self._facts = same, found
-            self.session = self._recorder.begin(self._robot, found)
+            self.session, self.began_s = self._recorder.begin(self._robot, found), time.time()
 
     def _learn(self, **known: object) -> None:
         """More is known of the session than when it began."""
@@ -75,6 +96,6 @@ class RobotRecording:
             self._recorder.amend(self._robot, found)
 
     def _link_changed(self, event: LinkChanged) -> None:
-        if self._linked and event.state is ConnectionState.WAITING:
+        if self._linked and event.state is ConnectionState.WAITING and not self._is_paused:
             self._recorder.event(self._robot, EventKind.LINK, f"the link dropped: {event.problem}")
         self._linked = event.state is ConnectionState.CONNECTED

@@ -40,6 +40,12 @@ def model_names(cards: Iterable[Card], shipped: Iterable[str] = ()) -> dict[str,
     }
 
 
+def told_name(model: str) -> str:
+    """Return a name of a model of which only the id (`activity-3fa2c1…`) is known."""
+    task, _, digits = model.rpartition("-")
+    return f"model {digits[:ID_SHOWN]} of {task_name(task).lower()}" if task else f"the model {model}"
+
+
 def class_name(name: str) -> str:
     """Return a class, as people read it."""
     return name.replace("_", " ")

@@ -1,6 +1,7 @@
 """How a robot's CAN buses are: what is an alarm, what a warning, and who talks how much."""
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -15,6 +16,7 @@ FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
 BUSY_PERCENT: Final = 80.0  # as the gateway finds it
 MISSING_PERCENT: Final = 1.0  # of a node's PDOs
 OLD_S: Final = 5.0  # what was seen before is not known now
+FEWER: Final = "look who sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
 
 
@@ -61,8 +63,7 @@ def level(bus: BusInfo) -> Level:
 
 def node_level(node: NodeInfo) -> Level:
     """Return how bad a node is."""
-    missing = node.pdos_missing_percent
-    return Level.WARNING if node.findings or (missing or 0.0) >= MISSING_PERCENT else Level.GOOD
+    return Level.WARNING if node.findings or _misses(node) else Level.GOOD
 
 
 def load_text(bus: BusInfo) -> str:
@@ -95,19 +96,23 @@ def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
     )
 
 
-def alarms(robot: Robot) -> list[tuple[Level, str, str]]:
-    """Return what is wrong with the buses now: how bad, what, and what to check."""
-    found: list[tuple[Level, str, str]] = []
-    for bus in seen(robot) or ():
-        bad = level(bus)
-        if bad is Level.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT:
-            text = f"bus {bus.name} is full: {load_text(bus)} of its time is taken"
-            found.append((bad, text, "look who sends so much, and send fewer PDOs or SYNC less often"))
-        elif bad in (Level.ALARM, Level.WARNING):
-            first = bus.findings[0] if bus.findings else None
-            text = bus.problem or (first.words if first is not None else bus.state)
-            found.append((bad, f"bus {bus.name}: {text}", "" if first is None else first.check))
-    return found
+def trouble(bus: BusInfo) -> tuple[str, str] | None:
+    """Return what is wrong with a bus, and what to check where that is known; None: nothing."""
+    if level(bus) is Level.GOOD:
+        return None
+    load, full = bus.load_percent or 0.0, []
+    if (load >= BUSY_PERCENT and not bus.findings) or load >= FULL_PERCENT:
+        said = "it is full" if load >= FULL_PERCENT else "it is busy"
+        full = [(f"{said}: {load_text(bus)} of its time is taken", FEWER)]
+    found = [*bus.findings, *(one for node in bus.nodes for one in node.findings)]
+    told = [
+        (bus.problem or "", ""),
+        (bus.state if bus.state != ACTIVE else "", ""),
+        *full,
+        *((one.words, one.check) for one in found),
+        *((_missing(node), "") for node in bus.nodes if not node.findings and _misses(node)),
+    ]
+    return _joined(words for words, _ in told), _joined(check for _, check in told)
 
 
 def talking(bus: BusInfo) -> list[Talking]:
@@ -133,3 +138,16 @@ def talking(bus: BusInfo) -> list[Talking]:
 
 def _names(one: Talking) -> str:
     return f"{', '.join(name.replace('_', ' ') for name in one.names)} {100 * one.share:.0f} %"
+
+
+def _joined(texts: Iterable[str]) -> str:
+    return "; ".join(dict.fromkeys(filter(None, texts)))
+
+
+def _misses(node: NodeInfo) -> bool:
+    return (node.pdos_missing_percent or 0.0) >= MISSING_PERCENT
+
+
+def _missing(node: NodeInfo) -> str:
+    names = ", ".join(name.replace("_", " ") for name in node.components) or f"node {node.node_id}"
+    return f"{node.pdos_missing_percent or 0.0:.0f} % of the PDOs of {names} are missing"

@@ -28,6 +28,16 @@ class Proof:
     after_ms: float
     state: str
 
+    @property
+    def when(self) -> str:
+        """After the STOP."""
+        return f"{self.after_ms:.0f} ms" if self.after_ms > 0 else "before"
+
+    @property
+    def text(self) -> str:
+        """`switch on disabled after 34 ms`."""
+        return f"{self.state} {'after ' if self.after_ms > 0 else ''}{self.when}"
+
 
 @dataclass(slots=True)
 class StopProgress:
@@ -144,10 +154,7 @@ class StopProgress:
     @property
     def proof_lines(self) -> list[str]:
         """The same, a line a drive."""
-        return [
-            f"{_listed([drive])}: {proof.state} after {proof.after_ms:.0f} ms"
-            for drive, proof in self.proofs.items()
-        ]
+        return [f"{_listed([drive])}: {proof.text}" for drive, proof in self.proofs.items()]
 
     @property
     def said(self) -> str:

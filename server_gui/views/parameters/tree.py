@@ -33,7 +33,7 @@ NAME, ROBOT, NEW, UNIT, RANGE, DEFAULT, FILE, STORED, SAID = range(len(TITLES))
 IF_ROOM: Final = (FILE, RANGE, DEFAULT, STORED)  # shown while they fit; the chosen one's card has them all
 REFUSED: Final = "✕ limit"  # the robot would refuse what is staged
 WRONG: Final = ("✕", REFUSED, "⚠ changed")
-NAME_PX: Final = 130  # that a name has at least
+NAME_PX: Final = 110  # that a name has at least
 
 
 class NewValue(QStyledItemDelegate):

@@ -5,8 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QV
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import unit_of
-from server_gui.core.tuning.writing import Trial
+from server_gui.views.trial_words import changes, ends
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
 
@@ -14,16 +13,19 @@ from server_gui.views.widgets.plain import PlainLabel
 class TrialBar(QFrame):
     """Hidden while nothing is on trial. `keep` and `take_back` are what people decide.
 
-    The window has one of the parameters' panel, and one above its tabs for when that is not in sight.
+    The window has one of the parameters' panel, and one above its tabs for when that is not in sight: the one
+    above is `of_all` robots, `station` is the one whose trial it shows.
     """
 
     keep = Signal()
     take_back = Signal()
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, *, of_all: bool = False) -> None:
         super().__init__()
         self._desk = desk
-        self._write: int | None = None
+        self._of_all = of_all
+        self.station: Station | None = None
+        self._write: tuple[str, int] | None = None
         self.setObjectName("card")
         self.setAccessibleName("Trial")
         self.words = PlainLabel()
@@ -46,31 +48,24 @@ class TrialBar(QFrame):
         self.hide()
 
     def refresh(self, *, shown: bool = True) -> None:
-        """Count down; `shown`: it is to be seen while there is a trial."""
-        station = self._desk.selected
+        """Count down; `shown`: that of the robot that is looked at is to be seen here."""
+        station = self.station = self._whose(shown=shown)
         trial = None if station is None else station.writing.trial
-        self.setVisible(trial is not None and shown)
+        self.setVisible(trial is not None)
         if station is None or trial is None:
             return
         left_s = trial.left_s()
-        if trial.write != self._write:
-            self._write = trial.write
+        if (station.name, trial.write) != self._write:
+            self._write = station.name, trial.write
             self._bar.setRange(0, max(1, round(left_s * 10)))
         self._bar.setValue(round(left_s * 10))
-        ends = (
-            f"the robot takes it back in {left_s:.0f} s"
-            if left_s
-            else "its time is over: reading the values …"
-        )
-        set_text(self.words, f"On trial: {_values(station, trial, self._desk)}; {ends}")
+        whose = "" if station is self._desk.selected else f"{station.title}: "
+        said = ", ".join(changes(station, trial, self._desk.shown.units))
+        set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}")
 
-
-def _values(station: Station, trial: Trial, desk: Desk) -> str:
-    said = []
-    for name, value in trial.values.items():
-        info = station.known.get(name)
-        unit = unit_of(name, "" if info is None else info.unit, desk.shown.units)
-        before = trial.before.get(name)
-        old = "?" if before is None else unit.editable(before)
-        said.append(f"{name} {old} → {unit.editable(value)} {unit.symbol}".rstrip())
-    return ", ".join(said)
+    def _whose(self, *, shown: bool) -> Station | None:
+        """Whose trial; where there are several, the next one when that is over."""
+        selected = self._desk.selected
+        found = [selected] if selected is not None and shown else []
+        found += [one for one in self._desk if one is not selected] if self._of_all else []
+        return next((one for one in found if one.writing.trial is not None), None)

@@ -7,6 +7,9 @@ from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.player import Player
 from server_gui.views.recordings.sessions import SessionsPage
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.scrolled import Scrolled
+
+LIST, PLAYER = range(2)
 
 
 class Recordings(QStackedWidget):
@@ -19,16 +22,15 @@ class Recordings(QStackedWidget):
         self.list = SessionsPage(archive, recording, theme)
         self.list.played.connect(self._play)
         self.player = Player(archive, theme)
-        self.player.left.connect(lambda: self.setCurrentWidget(self.list))
-        self.addWidget(self.list)
-        self.addWidget(self.player)
+        self.player.left.connect(lambda: self.setCurrentIndex(LIST))
+        for page in (self.list, self.player):  # each by itself, else a low one is as high as the other likes
+            self.addWidget(Scrolled(page))
 
     def refresh(self) -> None:
         """Show how it is now."""
-        page = self.player if self.currentWidget() is self.player else self.list
-        page.refresh()
+        (self.list if self.currentIndex() == LIST else self.player).refresh()
 
     def _play(self) -> None:
         if self._archive.play():
-            self.setCurrentWidget(self.player)
+            self.setCurrentIndex(PLAYER)
             self.player.show_tape()

@@ -71,6 +71,11 @@ class Player(QWidget):
         everything.addLayout(self._transport())
         everything.addWidget(self.labels)
 
+    def heightForWidth(self, width: int) -> int:
+        """As low as it can be: what scrolls it would give the views all that they would like to have."""
+        layout = self.layout()
+        return -1 if layout is None else layout.totalMinimumHeightForWidth(width)
+
     def show_tape(self) -> None:
         """Show another recording."""
         if self._playback.tape is not None:

@@ -57,7 +57,7 @@ class Timeline(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Time of the recording")
-        self.setToolTip(TIP)
+        set_tip(self, TIP)
         self.setMouseTracking(True)
         theme.changed.connect(self.updateGeometry)
 

@@ -13,7 +13,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QImage, QMouseEvent, QPainter, Q
 from PySide6.QtWidgets import QApplication, QGraphicsItem, QWidget
 
 from server_gui.core.desk.flags import FlagKind
-from server_gui.views.theme import Look, Theme
+from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
 from server_gui.views.widgets.cursors import Cursors, Shown
 from server_gui.views.widgets.plain import set_tip
@@ -25,11 +25,6 @@ MARGIN: Final = 0.06
 OLD: Final = 0.35  # opacity of what is not live
 NEAR_PX: Final = 4  # a press and a release no further apart are a click
 NO_DATA: Final = "no data"
-# Of what belongs to no side, dark and light: Okabe & Ito's green and purple, with 4.5 : 1 of contrast.
-PLAIN: Final = {
-    "first": {Look.DARK: "#2dbb8c", Look.LIGHT: "#007a58"},
-    "second": {Look.DARK: "#d895bd", Look.LIGHT: "#95406f"},
-}
 
 
 class Mouse(Enum):
@@ -42,7 +37,7 @@ class Mouse(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One line: its colour is a name in the palette, or a colour of its own."""
+    """One line: its colour is a name in the palette."""
 
     channel: str
     colour: str
@@ -147,6 +142,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self.set_seconds(seconds)
         theme.changed.connect(self._restyle)
         self._restyle()
+        self._be_blank(True)
 
     def sizeHint(self) -> QSize:
         """As small as a plot may be; layouts give it more."""
@@ -277,6 +273,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         if is_blank != self._is_blank:
             self._is_blank = is_blank
             self.getPlotItem().getAxis("left").setStyle(showValues=not is_blank)
+            self._mark()
 
     # --- the mouse
 
@@ -377,7 +374,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
                 axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))
         self._inks = raster.Inks(
-            tuple(_colour(theme, curve.colour).rgba() for curve in self._curves),
+            tuple(theme.colour(curve.colour).rgba() for curve in self._curves),
             tuple(curve.dashed for curve in self._curves),
             theme.colour("card").rgba(),
         )
@@ -385,10 +382,4 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 
 def css(theme: Theme, name: str) -> str:
     """Return a curve's colour for texts."""
-    return _colour(theme, name).name()
-
-
-def _colour(theme: Theme, name: str) -> QColor:
-    if name in PLAIN:
-        return QColor(PLAIN[name][theme.look])
-    return QColor(name) if name.startswith("#") else theme.colour(name)
+    return theme.colour(name).name()

@@ -70,11 +70,11 @@ class PressureMap(QWidget):
         self._weights = None if self._cells is None else weights(self._cells)
         self._trail.clear()
 
-    def say(self, words: str) -> None:
-        """Say this across the sole: why nothing is known of it; nothing where that is empty."""
+    def say(self, words: str, value: str = "") -> None:
+        """Say this across the sole: why nothing is known of it; else `value` is read aloud."""
+        self.setAccessibleDescription(words or value)
         if words != self._words:
             self._words = words
-            self.setAccessibleDescription(words)
             self.update()
 
     def show_pressures(self, pressures: Sequence[float | None], cop: Cell | None, *, live: bool) -> None:

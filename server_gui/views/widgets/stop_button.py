@@ -1,6 +1,6 @@
 """The STOP button: acts when it is pressed, not when it is let go, and names the robot that it stops."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QPushButton, QWidget
 
@@ -33,6 +33,19 @@ class StopButton(QPushButton):
         self._robot = robot
         self.setAccessibleName("STOP" if robot is None else f"STOP {plain(robot)}")
         self._fit()
+
+    def minimumSizeHint(self) -> QSize:
+        """Of the word alone: a long name makes nothing wider."""
+        whole = super().sizeHint()
+        return QSize(min(whole.width(), self._word + AROUND), whole.height())
+
+    def sizeHint(self) -> QSize:
+        """As wide as it may be where that is said, else as little as it needs: layouts stretch it."""
+        return super().sizeHint() if self.most is not None else self.minimumSizeHint()
+
+    @property
+    def _word(self) -> int:
+        return QFontMetrics(self.font()).horizontalAdvance("STOP")
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from drivers.error_codes import error_check
 from gateway.client import ConnectionState, NotConnected
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
@@ -16,7 +17,7 @@ from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.events import Described, Event, Journalled, LinkChanged, Looked
+from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
 from server_gui.core.follow.news import News, NewsKind
 from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
@@ -271,3 +272,38 @@ def test_a_look_without_quality_takes_no_alarm_back(bench: Bench) -> None:
     bench.station.take([looked(state="lost", problem="no heartbeat")])
     bench.station.take([Looked(Snapshot(0, {}, {}, {}), None, 0)])
     assert kinds(bench.station) == [Kind.LOST]
+
+
+# --- buses
+
+
+FINE = BusInfo("main", "error active", 1_000_000, 41.0, 1010.0, 0, 0, 1, 0, [])
+
+
+def test_a_bus_that_is_full_now_is_an_alarm_and_is_over_when_it_is_not(bench: Bench) -> None:
+    bench.station.take([BusesSeen((replace(FINE, load_percent=100.0),), time.monotonic_ns())])
+    (one,) = bench.station.alarms.active
+    assert (one.alarm.kind, one.alarm.is_now) == (Kind.BUS_FAILS, True)
+    assert one.alarm.what == "it is full: 100 % of its time is taken"
+    assert bench.station.mark.colour == "bad"
+    bench.station.take([BusesSeen((FINE,), time.monotonic_ns())])
+    assert kinds(bench.station) == []
+
+
+def test_what_a_robot_told_of_its_buses_with_the_link_counts_until_somebody_looks(bench: Bench) -> None:
+    told = replace(described().description, buses=[replace(FINE, state="error passive")])
+    bench.station.take([Described(told)])
+    (one,) = bench.station.alarms.active
+    assert (one.alarm.kind, one.alarm.what, one.alarm.is_now) == (Kind.BUS, "error passive", False)
+    bench.station.take([BusesSeen((FINE,), time.monotonic_ns())])
+    assert kinds(bench.station) == []
+
+
+def test_a_guard_that_does_not_run_is_blind_though_it_has_rules(bench: Bench) -> None:
+    rule = GuardRuleInfo(
+        "knee_heat", "torque", "above 60 N·m", ["left_knee"], [], "alarm", "watching", 0, None, 0, []
+    )
+    guard = GuardInfo(configured=True, problem="its thread has ended", rules=[rule])
+    bench.station.take([Described(replace(described().description, guard=guard)), walking(5)])
+    (one,) = bench.station.alarms.active
+    assert one.alarm.line == "guard blind: the guard: it does not run: its thread has ended"

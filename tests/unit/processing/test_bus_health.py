@@ -10,7 +10,7 @@ from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
 from gateway.wire.finding import FindingInfo
 from server_gui.core.follow.events import BusesSeen, LinkChanged
 from server_gui.core.follow.robot import Robot
-from server_gui.core.processing.bus_health import Level, alarms, level, seen, talking, worst
+from server_gui.core.processing.bus_health import Level, level, seen, talking, trouble, worst
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 0, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("heartbeat", 2, 10.0)]
@@ -45,11 +45,14 @@ def test_a_bus_is_as_bad_as_what_is_worst_of_it(bus: BusInfo, bad: Level) -> Non
 
 
 def test_a_full_bus_is_an_alarm_that_says_what_to_check() -> None:
-    ((bad, what, check),) = alarms(robot(replace(BUS, load_percent=100.0)))
-    assert bad is Level.ALARM
-    assert what == "bus main is full: 100 % of its time is taken"
-    assert "send fewer PDOs" in check
-    assert alarms(robot(BUS)) == []
+    said = trouble(replace(BUS, load_percent=100.0))
+    assert said is not None
+    assert said[0] == "it is full: 100 % of its time is taken"
+    assert "send fewer PDOs" in said[1]
+    assert trouble(BUS) is None
+    missing = trouble(replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)]))
+    assert missing is not None
+    assert missing[0] == "20 % of the PDOs of left knee are missing"
 
 
 def test_what_is_old_or_never_came_or_is_of_a_link_that_is_gone_is_not_known() -> None:

@@ -1,0 +1,83 @@
+"""The recording in the header: whether it goes on, for how long and as what; start and stop."""
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
+
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.recording import Recording, Said, Tone
+from server_gui.views.ask import ask
+from server_gui.views.chip import Chip, Words
+from server_gui.views.marks import Mark
+from server_gui.views.recordings.timeline import clock_text
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import set_tip
+
+NAME: Final = "recording"
+TONES: Final = {
+    Tone.GOOD: Mark("disc", "good", "recording"),
+    Tone.WARNING: Mark("triangle", "warn", "recording, with a warning"),
+    Tone.BAD: Mark("square", "bad", "not recording"),
+    Tone.OFF: Mark("ring", "dim", "not recording"),
+}
+
+
+class RecordingChip(Chip):
+    """Of the robot that is looked at; start and stop are for all that this window records."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        self.turn = QPushButton("Stop")
+        self.turn.setAccessibleName("Stop recording")
+        super().__init__(theme, NAME, self.turn)
+        self._desk = desk
+        self.turn.clicked.connect(lambda: ask_recording(self.window(), desk.recording))
+
+    def refresh(self) -> None:
+        """Show how it is now."""
+        recording, station = self._desk.recording, self._desk.selected
+        address = None if station is None else station.address
+        said = recording.said(address)
+        self.say(_words(recording, said, address))
+        text = "Start…" if recording.is_paused else "Stop…"
+        if self.turn.text() != text:
+            self.turn.setText(text)
+            self.turn.setAccessibleName(f"{text.rstrip('…')} recording")
+        self.turn.setVisible(recording.can_pause)
+        set_tip(self.turn, "Of every robot of this window (Ctrl+R)")
+
+
+def ask_recording(parent: QWidget, recording: Recording) -> None:
+    """Ask for its name and begin it, or ask whether it is to end."""
+    if not recording.can_pause:
+        return
+    if recording.is_paused:
+        ask_name(parent, recording.go_on)
+        return
+    text = (
+        "Stop recording every robot of this window?\n\nRobots are shown as before, and their journals are "
+        "kept; nothing else of what they send is, until it is started again."
+    )
+    ask(parent, "Stop recording", text, "Stop recording", recording.pause)
+
+
+def ask_name(parent: QWidget, begin: Callable[[str], None]) -> None:
+    """Ask what a recording is called, and begin it."""
+    name = QLineEdit()
+    name.setPlaceholderText("What it is of: wearer, trial, settings")
+    name.setAccessibleName("Name of the recording")
+    text = "A recording of every robot of this window begins. Its name stands among its notes."
+    ask(parent, "Start recording", text, "Start", lambda: begin(name.text().strip()), field=name)
+
+
+def _words(recording: Recording, said: Said, address: str | None) -> Words:
+    link, mark = recording.link(address), TONES[said.tone]
+    first, _, rest = said.text.partition(" · ")
+    since_s = None if link is None else link.recording_since_utc_s
+    tip = "\n".join(filter(None, (said.text, said.detail)))
+    if said.tone in (Tone.BAD, Tone.OFF) or since_s is None:
+        return Words(mark, first, (rest,) if rest else (), tip)
+    clock = clock_text(max(0.0, time.time() - since_s))
+    parts = (rest.partition(" · ")[0], link.notes) if link is not None and link.notes else (rest,)
+    return Words(mark, f"{first} {clock}", parts, tip)
