@@ -13,7 +13,9 @@ from gateway.certificates import KeyProblem
 log = logging.getLogger(__name__)
 
 RECORD: Final = 16 * 1024  # the most that one record holds (RFC 8446 §5.1)
-NO_CHECK_TIME: Final = 0x20_0000  # X509_V_FLAG_NO_CHECK_TIME: a robot without a clock begins in 1970
+# X509_V_FLAG_NO_CHECK_TIME: a robot without a clock begins in 1970. X509_V_FLAG_PARTIAL_CHAIN: a certificate is
+# found as it is, and not by its subject, which two desks may share.
+_VERIFY: Final = 0x20_0000 | ssl.VerifyFlags.VERIFY_X509_PARTIAL_CHAIN
 _WAITS: Final = (ssl.SSLWantReadError, ssl.SSLWantWriteError)
 
 
@@ -65,7 +67,7 @@ def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.num_tickets = 0  # nobody comes back by another way than their key
     context.verify_mode = ssl.CERT_REQUIRED
-    context.verify_flags = ssl.VerifyFlags(context.verify_flags | NO_CHECK_TIME)
+    context.verify_flags = ssl.VerifyFlags(context.verify_flags | _VERIFY)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a dump would hold the key
     try:
         context.load_cert_chain(folder.certificate, folder.key, password=_no_password)
