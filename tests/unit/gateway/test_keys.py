@@ -109,6 +109,24 @@ def test_a_key_that_is_known_vouches_for_no_other(come: Connect, tmp_path: Path)
     assert not let_in(come, keys.vouched_for("vouched", authority))
 
 
+def test_two_desks_that_call_themselves_the_same_are_both_let_in(come: Connect, tmp_path: Path) -> None:
+    """As two computers with one user and one host name do; nobody keeps another one out by their name."""
+    twins = [(tmp_path / one / "desk.key", tmp_path / one / "desk.crt") for one in ("first", "second")]
+    for name, twin in zip(("anna", "ben"), twins, strict=True):
+        make("pi-raspberrypi", *twin)
+        shutil.copy(twin[1], tmp_path / "clients" / f"{name}.crt")
+    assert [let_in(come, one) for one in twins] == [True, True]
+
+
+def test_a_certificate_that_cannot_be_told_in_words_keeps_nobody_out(come: Connect, tmp_path: Path) -> None:
+    odd = keys.dated(
+        "odd", "20200101000000Z", "20591231235959Z", "CA:FALSE\nsubjectAltName = DER:30:04:82:02:ff:fe"
+    )
+    shutil.copy(odd[1], tmp_path / "clients")
+    assert [let_in(come, odd) for _ in range(HANDSHAKES + 1)] == [True] * (HANDSHAKES + 1)
+    assert let_in(come, "operator")
+
+
 def test_a_file_that_is_no_certificate_locks_nobody_else_out(come: Connect, tmp_path: Path) -> None:
     (tmp_path / "clients" / "a-torn.crt").write_text(
         "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n"
