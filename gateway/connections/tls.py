@@ -4,6 +4,7 @@ import logging
 import resource
 import socket
 import ssl
+import stat
 import threading
 from typing import Final
 
@@ -125,6 +126,8 @@ def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a dump would hold the key
     try:
         context.load_cert_chain(folder.certificate, folder.key, password=_no_password)
+        if folder.key.stat().st_mode & stat.S_IROTH:
+            log.warning("%s can be read by everybody on this computer: chmod 600 it", folder.key)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is no key pair"
         raise KeyProblem(

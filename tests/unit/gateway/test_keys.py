@@ -15,10 +15,11 @@ from pathlib import Path
 import pytest
 
 from gateway.access.folder import AccessFolder
+from gateway.access.known import known_in
 from gateway.certificates import KeyProblem
 from gateway.connections import handshakes
 from gateway.connections.listeners import listen
-from gateway.connections.tls import RECORD
+from gateway.connections.tls import RECORD, context_of
 from gateway.daemon import Daemon
 from gateway.key_making import make
 from gateway.wire.limits import HANDSHAKES
@@ -229,6 +230,24 @@ def test_what_is_decrypted_and_not_yet_read_is_not_forgotten(come: Connect) -> N
     assert client.call("clock.read")
 
 
+def test_a_stop_that_comes_with_the_end_of_the_handshake_acts(address: tuple[str, int]) -> None:
+    """No poll tells of it: it has been read with the handshake."""
+    come, goes = ssl.MemoryBIO(), ssl.MemoryBIO()
+    secured = keys.context(keys.pair("viewer")).wrap_bio(come, goes)
+    with raw(address) as bare:
+        while True:
+            try:
+                secured.do_handshake()
+                break
+            except ssl.SSLWantReadError:
+                bare.sendall(goes.read())
+                come.write(bare.recv(4096))
+        secured.write(STOP % b"now")
+        bare.sendall(goes.read())
+        come.write(bare.recv(4096))
+        assert b'"held":true' in secured.read(4096)
+
+
 def test_large_answers_and_streams_come_whole(come: Connect, bench: Bench) -> None:
     client = come("viewer")
     client.call("stream.start", modules=["component"], rate_hz=200)
@@ -268,6 +287,16 @@ def test_a_key_that_cannot_be_used_ends_the_start_and_is_not_told(bench: Bench, 
         Daemon(config(tmp_path), listener)
     assert str(tmp_path / "keys") in str(caught.value)
     assert secret not in f"{caught.value!r}{caught.value.__cause__!r}"
+
+
+@pytest.mark.parametrize(("mode", "warned"), [(0o600, False), (0o640, False), (0o604, True)])
+def test_a_key_that_everybody_may_read_is_warned_about(
+    tmp_path: Path, mode: int, warned: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = AccessFolder(keyed(tmp_path), {})
+    folder.key.chmod(mode)
+    context_of(folder, known_in(folder))
+    assert bool([one for one in caplog.messages if "can be read by everybody" in one]) == warned
 
 
 def test_an_empty_folder_of_keys_is_no_robot_without_keys(bench: Bench, tmp_path: Path) -> None:
