@@ -92,7 +92,8 @@ class Handshakes:
         address = peer.rpartition(":")[0]
         waiting = self._waiting.get(address, ())
         all_waiting = sum(map(len, self._waiting.values()))
-        if len(waiting) >= HANDSHAKES_WAITING_OF_ONE_ADDRESS or all_waiting >= HANDSHAKES_WAITING:
+        full = all_waiting >= HANDSHAKES_WAITING and not self._drop_silent()
+        if full or len(waiting) >= HANDSHAKES_WAITING_OF_ONE_ADDRESS:
             connection.close()
             self._complain(address, "begins more handshakes than are done")
             self._end_one()
@@ -101,9 +102,12 @@ class Handshakes:
         self._settle()
 
     def _settle(self) -> None:
-        """Begin those for whom there is room, one of each address after the other."""
-        while self._waiting and (len(self._running) < HANDSHAKES or self._make_room()):
-            address = next(iter(self._waiting))
+        """Begin those for whom there is room, one of each address after the other; who speaks comes first."""
+        while self._waiting:
+            speaks = next((one for one, came in self._waiting.items() if not _is_silent(came[0][0])), None)
+            if len(self._running) >= HANDSHAKES and not self._make_room(speaks=speaks is not None):
+                return
+            address = speaks or next(iter(self._waiting))
             came = self._waiting.pop(address)
             connection, peer = came.popleft()
             if came:
@@ -111,8 +115,26 @@ class Handshakes:
             self._look()
             self._running.append(_Handshake(self, self._loop, connection, peer, self._context))
 
-    def _make_room(self) -> bool:
-        """The oldest of the address that has most under way gives up its place, unless it has just begun."""
+    def _drop_silent(self) -> bool:
+        """Of those that wait, one that says nothing goes; false where each does."""
+        for address, came in self._waiting.items():
+            if _is_silent(came[0][0]):
+                came.popleft()[0].close()
+                if not came:
+                    del self._waiting[address]
+                self._end_one()
+                return True
+        return False
+
+    def _make_room(self, *, speaks: bool) -> bool:
+        """The oldest of the address that has most under way gives up its place, unless it has just begun.
+
+        To who `speaks`, one that has said nothing gives it up at once: silence costs an attacker nothing.
+        """
+        silent = next((one for one in self._running if one.is_silent), None) if speaks else None
+        if silent is not None:
+            silent.give_up("others wait")
+            return True
         addresses = [one.address for one in self._running]
         greediest = max(addresses, key=addresses.count)
         oldest = next(one for one in self._running if one.address == greediest)
@@ -192,6 +214,11 @@ class _Handshake:
     def age_s(self) -> float:
         return time.monotonic() - self._began_s
 
+    @property
+    def is_silent(self) -> bool:
+        """Whether it has said nothing yet."""
+        return self._stream is None and _is_silent(self._socket)
+
     def give_up(self, why: str) -> None:
         self._leave()
         self._socket.close()
@@ -226,6 +253,16 @@ class _Handshake:
         if first and first[0] == _HANDSHAKE:
             self._stream = TlsStream(self._socket, self._context)
         return self._stream
+
+
+def _is_silent(connection: socket.socket) -> bool:
+    try:
+        connection.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass  # it has gone, which is to be seen too
+    return False
 
 
 def _reason(error: OSError) -> str:

@@ -22,8 +22,8 @@ from gateway.connections.listeners import listen
 from gateway.connections.tls import RECORD, context_of
 from gateway.daemon import Daemon
 from gateway.key_making import make
-from gateway.wire.limits import HANDSHAKES
-from tests.support.waiting import until
+from gateway.wire.limits import HANDSHAKES, HANDSHAKES_WAITING
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import CLOCK, STOP, Bench, Client, config, serving
@@ -191,6 +191,16 @@ def test_half_a_handshake_is_closed_and_keeps_nobody_out(
         with KeyedClient(address, "operator") as client:
             assert client.call("robot.stop", reason="now")["held"] is True
         assert [said(half) for half in halves] == [b""] * len(halves)
+
+
+def test_who_says_nothing_by_hundreds_of_addresses_keeps_nobody_out(address: tuple[str, int]) -> None:
+    """Which one computer has by IPv6. Here they are those of the loopback."""
+    with ExitStack() as open_:
+        for number in range(2 * HANDSHAKES_WAITING):
+            source = (f"127.1.{number // 250}.{number % 250 + 1}", 0)
+            open_.enter_context(socket.create_connection(address, timeout=WAIT_S, source_address=source))
+        with KeyedClient(address, "operator") as client:
+            assert client.call("robot.stop", reason="now")["held"] is True
 
 
 def test_strangers_by_the_hundred_keep_nobody_s_stop_out(come: Connect, address: tuple[str, int]) -> None:
