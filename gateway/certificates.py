@@ -6,7 +6,8 @@ import hashlib
 import re
 from typing import Final
 
-_PEM: Final = re.compile(rb"-----BEGIN CERTIFICATE-----\s+([A-Za-z0-9+/=\s]+?)-----END CERTIFICATE-----")
+# Each of its parts can be read in one way only: whoever sends it has no work made of it.
+_PEM: Final = re.compile(rb"-----BEGIN CERTIFICATE-----(\s[A-Za-z0-9+/=\s]*+)-----END CERTIFICATE-----")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")  # of a key's owner, and of its file
 
 

@@ -1,7 +1,8 @@
 """What is changed in a robot's access folder: keys made, clients added and taken away."""
 
-import contextlib
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 
 from gateway.access.folder import CERTIFICATE, KEY, AccessFolder
 from gateway.certificates import NAME, KeyProblem, der_of, fingerprint, pem_of
@@ -61,24 +62,35 @@ def add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
 
 
 def remove(folder: AccessFolder, name: str) -> None:
-    """Forget a client: first its certificate. Raises `KeyProblem` where there is none, or it stays."""
-    file = folder.clients / f"{name}.crt"
-    try:
-        file.unlink()
-    except FileNotFoundError as error:
-        known = ", ".join(one.stem for one in folder.files()) or "nobody"
-        raise KeyProblem(f"there is no {name}; known are {known}") from error
-    except OSError as error:
-        raise KeyProblem(f"{file} cannot be removed: {error.strerror}; {name} IS STILL LET IN") from error
-    _edit(folder, lambda text: without_entry(text, "clients", name))
+    """Forget a client, under every name that its certificate has: first that, then the role.
+
+    Raises:
+        KeyProblem: there is none, or it stays.
+
+    """
+    files = {one.stem: one for one in folder.files()}
+    if name not in files:
+        raise KeyProblem(f"there is no {name}; known are {', '.join(files) or 'nobody'}")
+    der = _certificate(files[name])
+    same = [one for one, file in files.items() if der is not None and _certificate(file) == der]
+    for one in dict.fromkeys((name, *same)):
+        try:
+            files[one].unlink(missing_ok=True)
+        except OSError as error:
+            problem = f"{files[one]} cannot be removed: {error.strerror}; {name} IS STILL LET IN"
+            raise KeyProblem(problem) from error
+        _edit(folder, partial(without_entry, table="clients", key=one))
 
 
 def _known_as(folder: AccessFolder, der: bytes) -> str | None:
-    for file in folder.files():
-        with contextlib.suppress(OSError, KeyProblem):
-            if der_of(file.read_bytes()) == der:
-                return file.stem
-    return None
+    return next((one.stem for one in folder.files() if _certificate(one) == der), None)
+
+
+def _certificate(file: Path) -> bytes | None:
+    try:
+        return der_of(file.read_bytes())
+    except (OSError, KeyProblem):
+        return None
 
 
 def _edit(folder: AccessFolder, change: Callable[[str], str]) -> None:

@@ -90,7 +90,7 @@ class Connection(asyncio.Protocol):
         except ClientError:
             raise
         except OSError as error:
-            if pin is not None and not isinstance(error, ConnectionRefusedError):
+            if pin is not None and not isinstance(error, (ConnectionRefusedError, socket.gaierror)):
                 raise Unreachable(
                     f"{address} is paired, and what answers there ended the handshake ({_reason(error)}): it "
                     "is another program, or is busy. Nothing was sent"

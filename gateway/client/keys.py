@@ -4,6 +4,7 @@
 """
 
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 KEY, CERTIFICATE = "desk.key", "desk.crt"
 PIN_LENGTH: Final = 64  # hexadecimal digits of a SHA-256
-_HERE: Final = ("127.", "localhost", "::1")
+_HERE: Final = re.compile(r"127(\.\d{1,3}){3}|localhost|::1")  # a name that only begins so is elsewhere
 
 
 def user_folder() -> Path:
@@ -40,20 +41,29 @@ def pin_of(address: Address) -> str | None:
     """The certificate that a robot must have, by its address; None where it is not paired.
 
     Raises:
-        NotPaired: the server's file cannot be read, so nobody knows whether it is.
+        NotPaired: it is on another computer and not paired: nothing is said to that in plain. Or the server's
+            file cannot be read, so nobody knows whether it is.
 
     """
+    is_here = _HERE.fullmatch(address.host.lower()) is not None
     if address.pin is not None or address.path is not None:
         return address.pin
     try:
         robots = _robots(server_file())
     except (OSError, ValueError, RecursionError) as error:
-        if address.host.startswith(_HERE):
+        if is_here:
             return None  # this computer needs no pin, and a stop must come through
         raise NotPaired(
             f"{server_file()} cannot be read ({error}), so which key is {address}'s is unknown"
         ) from error
-    return next((pin for pin, where in robots if where == address), None)
+    pin = next((pin for pin, where in robots if where == address), None)
+    if pin is None and not is_here:
+        raise NotPaired(
+            f"{address} is not paired, and to another computer nothing is said in plain: use the "
+            f"address under which it stands in {server_file()}, or pair it (gwrms keys pair there, then "
+            "gwrms pair here)"
+        )
+    return pin
 
 
 def context_for(address: Address, pin: str) -> "ssl.SSLContext":

@@ -1,6 +1,7 @@
 """The desk's side of pairing: proves a robot's code, and pins its key in the server's file."""
 
 import getpass
+import itertools
 import re
 import socket
 import ssl
@@ -74,6 +75,8 @@ def _paired(secured: ssl.SSLSocket, where: Address, code: str, pem: bytes, name:
         raise WrongRobot(
             f"what answers at {where} does not know the code: somebody is in between, or it is another robot"
         )
+    if not 0 < reply.port < 65536:
+        raise NotPaired(f"{where} says that its gateway has the port {reply.port}, which is none")
     return Paired(reply.robot, Address(where.host, reply.port, robot), reply.name, reply.role)
 
 
@@ -142,10 +145,17 @@ def pin(robot: str, address: Address, file: Path | None = None) -> str:
 
 
 def _entry_of(document: Mapping[str, Any], robot: str, address: Address) -> tuple[str, str | None]:
-    """Its name in the file, and the pin that stands there."""
+    """Its name in the file, and the pin that stands there.
+
+    A robot says itself how it is called: that gives it no other one's line.
+    """
     robots = document.get("robots", {})
-    for name, entry in robots.items() if isinstance(robots, Mapping) else ():
-        table = entry if isinstance(entry, Mapping) else {"address": entry}
-        if name == robot or Address.parse(str(table.get("address", ""))) == address:
+    wished = re.sub(r"[^A-Za-z0-9_.-]+", "-", robot).strip("-._") or "robot"
+    taken = set(robots) if isinstance(robots, Mapping) else set()
+    for name in taken:
+        table = robots[name] if isinstance(robots[name], Mapping) else {"address": robots[name]}
+        is_named_so = name in (robot, wished) and "pin" in table
+        if is_named_so or Address.parse(str(table.get("address", ""))) == address:
             return str(name), table.get("pin")
-    return re.sub(r"[^A-Za-z0-9_.-]+", "-", robot).strip("-._") or "robot", None
+    others = (f"{wished}-{number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain((wished,), others) if one not in taken), None

@@ -3,6 +3,7 @@
 Who is known comes out of it as a stream with an identity; nobody else is answered anything but TLS.
 """
 
+import contextlib
 import logging
 import socket
 import ssl
@@ -16,7 +17,7 @@ from gateway.access.identity import Identity
 from gateway.access.known import Access
 from gateway.certificates import KeyProblem, fingerprint
 from gateway.connections.tls import TlsStream, context_of
-from gateway.process.loop import READ, WRITE, Loop, Timer
+from gateway.process.loop import READ, Loop, Timer
 from gateway.wire.limits import HANDSHAKE_S, HANDSHAKES, HANDSHAKES_WAITING, HANDSHAKES_WAITING_OF_ONE_ADDRESS
 
 log = logging.getLogger(__name__)
@@ -91,7 +92,8 @@ class Handshakes:
         address = peer.rpartition(":")[0]
         waiting = self._waiting.get(address, ())
         all_waiting = sum(map(len, self._waiting.values()))
-        if len(waiting) >= HANDSHAKES_WAITING_OF_ONE_ADDRESS or all_waiting >= HANDSHAKES_WAITING:
+        full = all_waiting >= HANDSHAKES_WAITING and not self._drop_silent()
+        if full or len(waiting) >= HANDSHAKES_WAITING_OF_ONE_ADDRESS:
             connection.close()
             self._complain(address, "begins more handshakes than are done")
             self._end_one()
@@ -100,9 +102,12 @@ class Handshakes:
         self._settle()
 
     def _settle(self) -> None:
-        """Begin those for whom there is room, one of each address after the other."""
-        while self._waiting and (len(self._running) < HANDSHAKES or self._make_room()):
-            address = next(iter(self._waiting))
+        """Begin those for whom there is room, one of each address after the other; who speaks comes first."""
+        while self._waiting:
+            speaks = next((one for one, came in self._waiting.items() if not _is_silent(came[0][0])), None)
+            if len(self._running) >= HANDSHAKES and not self._make_room(speaks=speaks is not None):
+                return
+            address = speaks or next(iter(self._waiting))
             came = self._waiting.pop(address)
             connection, peer = came.popleft()
             if came:
@@ -110,8 +115,26 @@ class Handshakes:
             self._look()
             self._running.append(_Handshake(self, self._loop, connection, peer, self._context))
 
-    def _make_room(self) -> bool:
-        """The oldest of the address that has most under way gives up its place, unless it has just begun."""
+    def _drop_silent(self) -> bool:
+        """Of those that wait, one that says nothing goes; false where each does."""
+        for address, came in self._waiting.items():
+            if _is_silent(came[0][0]):
+                came.popleft()[0].close()
+                if not came:
+                    del self._waiting[address]
+                self._end_one()
+                return True
+        return False
+
+    def _make_room(self, *, speaks: bool) -> bool:
+        """The oldest of the address that has most under way gives up its place, unless it has just begun.
+
+        To who `speaks`, one that has said nothing gives it up at once: silence costs an attacker nothing.
+        """
+        silent = next((one for one in self._running if one.is_silent), None) if speaks else None
+        if silent is not None:
+            silent.give_up("others wait")
+            return True
         addresses = [one.address for one in self._running]
         greediest = max(addresses, key=addresses.count)
         oldest = next(one for one in self._running if one.address == greediest)
@@ -148,29 +171,27 @@ class Handshakes:
         self._ended += 1
         self._finished()
 
-    def admit(self, connection: ssl.SSLSocket, peer: str) -> None:
+    def admit(self, stream: TlsStream, peer: str) -> None:
         """Let in whoever has proved to be known; whom another's certificate vouches for is nobody."""
-        der = connection.getpeercert(binary_form=True)
+        der = stream.certificate
         identity = self._known.by_key.get(fingerprint(der)) if der else None
         if identity is None:
-            connection.close()
+            stream.close()
             self._complain(peer.rpartition(":")[0], "has a key that nobody here knows")
             return
-        self._warn_of_expiry(identity, connection)
-        self._admitted(TlsStream(connection), peer, identity)
+        self._warn_of_expiry(identity, stream.ends)
+        self._admitted(stream, peer, identity)
 
     def fail(self, peer: str, why: str) -> None:
         self._complain(peer.rpartition(":")[0], why)
 
-    def _warn_of_expiry(self, identity: Identity, connection: ssl.SSLSocket) -> None:
-        """Once a start; nobody is kept out for it."""
-        name, found = identity.name or "", connection.getpeercert() or {}
-        ends = str(found.get("notAfter", ""))
-        if name in self._warned or not ends:
-            return
-        if ssl.cert_time_to_seconds(ends) - time.time() < EXPIRY_WARNING_S:
-            self._warned.add(name)
-            log.warning("the certificate of %s is only for the time until %s: pair it anew", name, ends)
+    def _warn_of_expiry(self, identity: Identity, ends: str) -> None:
+        """Once a start; nobody is kept out for it, nor for a date that is none."""
+        name = identity.name or ""
+        with contextlib.suppress(ValueError):
+            if name not in self._warned and ssl.cert_time_to_seconds(ends) - time.time() < EXPIRY_WARNING_S:
+                self._warned.add(name)
+                log.warning("the certificate of %s is only for the time until %s: pair it anew", name, ends)
 
 
 class _Handshake:
@@ -181,7 +202,8 @@ class _Handshake:
     ) -> None:
         self.address = peer.rpartition(":")[0]
         self._owner, self._loop = owner, loop
-        self._socket: socket.socket | ssl.SSLSocket = connection
+        self._socket = connection
+        self._stream: TlsStream | None = None  # from its first byte on
         self._peer, self._context = peer, context
         self._began_s = time.monotonic()
         self._late = loop.call_later(HANDSHAKE_S, lambda: self.give_up("does not end its handshake"))
@@ -191,6 +213,11 @@ class _Handshake:
     @property
     def age_s(self) -> float:
         return time.monotonic() - self._began_s
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether it has said nothing yet."""
+        return self._stream is None and _is_silent(self._socket)
 
     def give_up(self, why: str) -> None:
         self._leave()
@@ -204,32 +231,38 @@ class _Handshake:
 
     def _on_ready(self, _events: int) -> None:
         try:
-            if not isinstance(self._socket, ssl.SSLSocket) and not self._begin(self._socket):
+            stream = self._stream or self._begun()
+            if stream is None:
                 self.give_up("speaks another protocol, or no TLS: it has not been paired")
                 return
-            self._go_on()
-        except (BlockingIOError, ssl.SSLWantReadError):
-            self._loop.watch(self._socket, READ, self._on_ready)
-        except ssl.SSLWantWriteError:
-            self._loop.watch(self._socket, WRITE, self._on_ready)
+            stream.handshake()
+        except BlockingIOError:
+            return
         except OSError as error:
             self.give_up(f"is not let in: {_reason(error)}")
-
-    def _begin(self, connection: socket.socket) -> bool:
-        """Look at the first byte: to what is no TLS not even an alert is said."""
-        first = connection.recv(1, socket.MSG_PEEK)
-        if not first or first[0] != _HANDSHAKE:
-            return False
-        self._loop.watch(connection, 0, self._on_ready)
-        self._socket = self._context.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
-        return True
-
-    def _go_on(self) -> None:
-        if isinstance(self._socket, ssl.SSLSocket):
-            self._socket.do_handshake()
-            self._leave()
-            self._owner.admit(self._socket, self._peer)
+            return
+        self._leave()
+        try:
+            self._owner.admit(stream, self._peer)
+        finally:  # whatever becomes of it, its place is free
             self._owner.is_over(self)
+
+    def _begun(self) -> TlsStream | None:
+        """By the first byte: to what is no TLS not even an alert is said."""
+        first = self._socket.recv(1, socket.MSG_PEEK)
+        if first and first[0] == _HANDSHAKE:
+            self._stream = TlsStream(self._socket, self._context)
+        return self._stream
+
+
+def _is_silent(connection: socket.socket) -> bool:
+    try:
+        connection.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass  # it has gone, which is to be seen too
+    return False
 
 
 def _reason(error: OSError) -> str:

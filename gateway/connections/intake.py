@@ -141,6 +141,8 @@ class Inlet:
         # Bytes that are decrypted already: no poll tells of them. A bare socket has none.
         self._pending: Callable[[], int] | None = getattr(connection, "pending", None)
         front.watch(connection, READ, self._on_ready)
+        if self._pending is not None:
+            front.post(self._look_again)  # what has come with the end of a handshake
 
     # In the loop's thread.
 
@@ -238,6 +240,9 @@ class Inlet:
         try:
             data = self.socket.recv(most)
         except BlockingIOError:
+            self._pay(self._spent())  # TLS may have had something, that is none of ours
+            if self._owed_ns > COSTLY_NS:
+                self._rest(self._pace.rest_s(self._owed_ns))
             return False
         except OSError as error:
             self._end(str(error), self._sorted(self._splitter.end()))
@@ -253,9 +258,7 @@ class Inlet:
         self.received_bytes += len(data)
         lines = self._splitter.feed(data)
         heard = self._sorted(lines)
-        spent_ns = self._spent()
-        self._cpu_ns += spent_ns
-        self._owe(spent_ns)
+        self._pay(self._spent())
         floods = self._floods(sum(isinstance(line, framing.StopRequest) for line in lines))
         if self._is_full or self._splitter.dropping or self._owed_ns > COSTLY_NS:
             self._rest(max(self._pace.rest_s(self._owed_ns), FLOOD_S * floods))
@@ -267,6 +270,10 @@ class Inlet:
         if lines or heard.ended:
             self._hand_over(heard)
         return True
+
+    def _pay(self, spent_ns: int) -> None:
+        self._cpu_ns += spent_ns
+        self._owe(spent_ns)
 
     def _owe(self, spent_ns: int) -> None:
         """Put down what it has cost; while it costs nothing, that is forgotten."""

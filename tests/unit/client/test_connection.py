@@ -133,9 +133,3 @@ async def test_nobody_listening_is_said_in_words(robot: FakeRobot) -> None:
     with pytest.raises(Unreachable, match=r"no gateway at 127\.0\.0\.1:\d+ \(Connection refused\)"):
         await _open(robot)
     await asyncio.to_thread(robot.listen)
-
-
-@in_loop
-async def test_unknown_host_is_said_in_words() -> None:
-    with pytest.raises(Unreachable, match="no gateway at"):
-        await Connection.open(Address("no-such-host.invalid"), lambda method, params: None, 20.0)

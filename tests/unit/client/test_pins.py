@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from gateway.client import Address, LinkLost, LinkSettings, NotPaired, Robot, Unreachable, WrongRobot
-from gateway.client.keys import keys_folder, server_file
+from gateway.client.keys import keys_folder, pin_of, server_file
 from gateway.client.pairing import pin
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway.harness import Bench, config, serving
@@ -48,6 +48,12 @@ def test_a_robot_in_the_server_s_file_is_reached_by_its_address_alone(address: A
 def test_another_key_than_the_pinned_one_is_refused_loudly_and_told_nothing(address: Address) -> None:
     with pytest.raises(WrongRobot, match="ANOTHER ROBOT ANSWERS"):
         Robot(pinned(address, "impostor"), ONCE)
+
+
+@pytest.mark.usefixtures("address")
+def test_an_unknown_host_is_said_in_words() -> None:
+    with pytest.raises(Unreachable, match="no gateway at"):
+        Robot(pinned(Address("no-such-host.invalid", 7420)), ONCE)
 
 
 def test_a_desk_whose_key_is_not_known_is_told_to_pair(address: Address, tmp_path: Path) -> None:
@@ -98,3 +104,15 @@ def test_a_unix_socket_is_an_address(tmp_path: Path) -> None:
     assert (found.path, str(found)) == (f"{tmp_path}/exo.sock", f"{tmp_path}/exo.sock")
     with pytest.raises(Unreachable, match=r"no gateway at .*exo\.sock"):
         Robot(found, ONCE)
+
+
+@pytest.mark.parametrize("host", ["192.0.2.7", "exo.local", "localhost.example", "127.example", "::1:2"])
+def test_to_another_computer_nothing_is_said_in_plain(
+    host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor under another name of a robot that is paired: whoever answers there could be anybody."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    pin("exo", Address("192.0.2.8", 7420, "a" * 64))
+    with pytest.raises(NotPaired, match="nothing is said in plain"):
+        pin_of(Address(host, 7420))
+    assert [pin_of(Address(here, 7420)) for here in ("127.0.0.1", "localhost", "::1")] == [None] * 3

@@ -15,14 +15,15 @@ from pathlib import Path
 import pytest
 
 from gateway.access.folder import AccessFolder
+from gateway.access.known import known_in
 from gateway.certificates import KeyProblem
 from gateway.connections import handshakes
 from gateway.connections.listeners import listen
-from gateway.connections.tls import RECORD
+from gateway.connections.tls import RECORD, context_of
 from gateway.daemon import Daemon
 from gateway.key_making import make
-from gateway.wire.limits import HANDSHAKES
-from tests.support.waiting import until
+from gateway.wire.limits import HANDSHAKES, HANDSHAKES_WAITING
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import CLOCK, STOP, Bench, Client, config, serving
@@ -109,6 +110,24 @@ def test_a_key_that_is_known_vouches_for_no_other(come: Connect, tmp_path: Path)
     assert not let_in(come, keys.vouched_for("vouched", authority))
 
 
+def test_two_desks_that_call_themselves_the_same_are_both_let_in(come: Connect, tmp_path: Path) -> None:
+    """As two computers with one user and one host name do; nobody keeps another one out by their name."""
+    twins = [(tmp_path / one / "desk.key", tmp_path / one / "desk.crt") for one in ("first", "second")]
+    for name, twin in zip(("anna", "ben"), twins, strict=True):
+        make("pi-raspberrypi", *twin)
+        shutil.copy(twin[1], tmp_path / "clients" / f"{name}.crt")
+    assert [let_in(come, one) for one in twins] == [True, True]
+
+
+def test_a_certificate_that_cannot_be_told_in_words_keeps_nobody_out(come: Connect, tmp_path: Path) -> None:
+    odd = keys.dated(
+        "odd", "20200101000000Z", "20591231235959Z", "CA:FALSE\nsubjectAltName = DER:30:04:82:02:ff:fe"
+    )
+    shutil.copy(odd[1], tmp_path / "clients")
+    assert [let_in(come, odd) for _ in range(HANDSHAKES + 1)] == [True] * (HANDSHAKES + 1)
+    assert let_in(come, "operator")
+
+
 def test_a_file_that_is_no_certificate_locks_nobody_else_out(come: Connect, tmp_path: Path) -> None:
     (tmp_path / "clients" / "a-torn.crt").write_text(
         "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n"
@@ -174,6 +193,16 @@ def test_half_a_handshake_is_closed_and_keeps_nobody_out(
         assert [said(half) for half in halves] == [b""] * len(halves)
 
 
+def test_who_says_nothing_by_hundreds_of_addresses_keeps_nobody_out(address: tuple[str, int]) -> None:
+    """Which one computer has by IPv6. Here they are those of the loopback."""
+    with ExitStack() as open_:
+        for number in range(2 * HANDSHAKES_WAITING):
+            source = (f"127.1.{number // 250}.{number % 250 + 1}", 0)
+            open_.enter_context(socket.create_connection(address, timeout=WAIT_S, source_address=source))
+        with KeyedClient(address, "operator") as client:
+            assert client.call("robot.stop", reason="now")["held"] is True
+
+
 def test_strangers_by_the_hundred_keep_nobody_s_stop_out(come: Connect, address: tuple[str, int]) -> None:
     operator, over = come("operator"), threading.Event()
 
@@ -209,6 +238,24 @@ def test_what_is_decrypted_and_not_yet_read_is_not_forgotten(come: Connect) -> N
     client.send(lines + STOP % b"last")
     assert client.answer("stop")["held"] is True
     assert client.call("clock.read")
+
+
+def test_a_stop_that_comes_with_the_end_of_the_handshake_acts(address: tuple[str, int]) -> None:
+    """No poll tells of it: it has been read with the handshake."""
+    come, goes = ssl.MemoryBIO(), ssl.MemoryBIO()
+    secured = keys.context(keys.pair("viewer")).wrap_bio(come, goes)
+    with raw(address) as bare:
+        while True:
+            try:
+                secured.do_handshake()
+                break
+            except ssl.SSLWantReadError:
+                bare.sendall(goes.read())
+                come.write(bare.recv(4096))
+        secured.write(STOP % b"now")
+        bare.sendall(goes.read())
+        come.write(bare.recv(4096))
+        assert b'"held":true' in secured.read(4096)
 
 
 def test_large_answers_and_streams_come_whole(come: Connect, bench: Bench) -> None:
@@ -250,6 +297,16 @@ def test_a_key_that_cannot_be_used_ends_the_start_and_is_not_told(bench: Bench, 
         Daemon(config(tmp_path), listener)
     assert str(tmp_path / "keys") in str(caught.value)
     assert secret not in f"{caught.value!r}{caught.value.__cause__!r}"
+
+
+@pytest.mark.parametrize(("mode", "warned"), [(0o600, False), (0o640, False), (0o604, True)])
+def test_a_key_that_everybody_may_read_is_warned_about(
+    tmp_path: Path, mode: int, warned: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = AccessFolder(keyed(tmp_path), {})
+    folder.key.chmod(mode)
+    context_of(folder, known_in(folder))
+    assert bool([one for one in caplog.messages if "can be read by everybody" in one]) == warned
 
 
 def test_an_empty_folder_of_keys_is_no_robot_without_keys(bench: Bench, tmp_path: Path) -> None:

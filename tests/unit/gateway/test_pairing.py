@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import shutil
 import socket
 import ssl
 import threading
@@ -216,6 +217,33 @@ def test_another_key_under_a_name_that_is_pinned_is_refused_loudly(
     assert server_file().read_text("utf-8") == before
 
 
+@pytest.mark.parametrize("line", ['"192.0.2.7:7420"', f'{{ address = "192.0.2.7", pin = "{"a" * 64}" }}'])
+@pytest.mark.parametrize("says", ["exo-01", "exo 01", "-exo-01"])
+def test_a_robot_that_says_it_is_another_one_does_not_get_its_line(
+    says: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    server_file().parent.mkdir()
+    server_file().write_text(f"[robots]\nexo-01 = {line}\n", encoding="utf-8")
+    try:
+        assert desk.pin(says, Address("192.0.2.9", 7420, "b" * 64)) == "exo-01-2"
+    except WrongRobot:
+        assert "pin" in line
+    assert f"exo-01 = {line}\n" in server_file().read_text("utf-8")
+
+
+def test_a_port_that_is_none_is_not_written(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"]
+) -> None:
+    """It would leave the file unreadable, and with it every other robot."""
+    waiting = shown.wait()
+    paired = asked(CODE)
+    candidate = waiting.result()
+    candidate.answer(Reply(shown.pairing.proof(candidate), "exo-01", 70_000, "anna", "operator"))
+    with pytest.raises(NotPaired, match="70000"):
+        paired.result()
+
+
 def test_what_else_stands_in_the_server_s_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     server_file().parent.mkdir()
@@ -254,6 +282,26 @@ def test_who_is_removed_is_nobody_and_the_table_is_as_before(tmp_path: Path) -> 
     assert [one.name for one in known_in(folder).by_key.values()] == ["eve"]
     with pytest.raises(KeyProblem, match="there is no anna; known are eve"):
         changes.remove(folder, "anna")
+
+
+def test_who_is_removed_is_nobody_under_another_name_either(tmp_path: Path) -> None:
+    folder = AccessFolder(keyed(tmp_path, {"anna": Role.OPERATOR, "eve": Role.VIEWER}), {})
+    shutil.copy(folder.clients / "anna.crt", folder.clients / "zoe.crt")
+    changes.remove(folder, "anna")
+    assert [one.name for one in known_in(folder).by_key.values()] == ["eve"]
+
+
+def test_nothing_is_removed_but_a_client(tmp_path: Path) -> None:
+    folder = AccessFolder(keyed(tmp_path), {})
+    with pytest.raises(KeyProblem, match="there is no"):
+        changes.remove(folder, "../keys/robot")
+    assert folder.certificate.exists()
+
+
+def test_what_is_no_certificate_is_known_for_none_in_no_time(tmp_path: Path) -> None:
+    """Whoever reaches the port may send it; where it took the square of its length, it took minutes."""
+    with pytest.raises(KeyProblem):
+        der_of(b"-----BEGIN CERTIFICATE-----" + b" " * 400_000)
 
 
 # The two commands
