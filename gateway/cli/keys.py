@@ -12,12 +12,13 @@ from gateway.access.folder import AccessFolder
 from gateway.access.known import known_in
 from gateway.access.pairing import Candidate, Pairing, PairingEnded
 from gateway.certificates import NAME, KeyProblem, grouped
+from gateway.cli import qr_code
 from gateway.cli.connect import NobodyToAsk, choose
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client.address import DEFAULT_PORT
 from gateway.connections.doors import is_loopback
 from gateway.connections.listeners import listen
-from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, new_code
+from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, link, new_code
 from gateway.wire.role import Role
 
 CONFIG = Path("/etc/gwrms/robot.toml")
@@ -90,12 +91,22 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
     where = f"[{shown}]:{port}" if ":" in shown else f"{shown}:{port}"
     say(f"\nOn the desk, within {VALID_S / 60:.0f} minutes ({TRIES} tries):\n\n")
     say(f"  gwrms pair {where} {code}\n\n")
+    say("".join(f"{one}\n" for one in _drawn(link(where, code))))
     say(f"This robot's key: {grouped(own)}\n")
     if is_loopback(listener.getsockname()):
         warn(
             "keys",
             "this listens on this computer only; for other desks set host in [gateway], or give --host",
         )
+
+
+def _drawn(text: str) -> list[str]:
+    """The same for a camera, where this is a terminal that can show it."""
+    try:
+        "█▀▄".encode(sys.stdout.encoding or "ascii")
+        return [*qr_code.lines(text), ""] if sys.stdout.isatty() else []
+    except (UnicodeEncodeError, qr_code.TooLong):
+        return []
 
 
 def _address() -> str:

@@ -22,7 +22,7 @@ from gateway.client import pairing as desk
 from gateway.client.keys import keys_folder, pin_of, server_file
 from gateway.connections.listeners import listen
 from gateway.main import main
-from gateway.wire.pairing import DESK, TRIES, Offer, Reply, new_code, normal, proof
+from gateway.wire.pairing import DESK, TRIES, Offer, Reply, link, new_code, normal, proof
 from gateway.wire.role import Role
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
@@ -201,6 +201,47 @@ def test_what_is_no_code_is_refused_before_it_is_sent(code: str) -> None:
         normal(code)
 
 
+def test_a_desk_that_gives_up_waits_no_longer(shown: Shown) -> None:
+    waiting, given_up = shown.wait(), threading.Event()
+    with ThreadPoolExecutor(1) as pool:
+        paired = pool.submit(desk.pair, shown.where, CODE, given_up=given_up.is_set)
+        candidate = waiting.result()  # nobody confirms it
+        given_up.set()
+        with pytest.raises(NotPaired, match="given up here"):
+            paired.result()
+    candidate.answer(Reply(problem="too late"))
+
+
+@pytest.mark.parametrize(
+    ("typed", "where"),
+    [
+        (("192.0.2.7", CODE), "192.0.2.7:7421"),
+        (("192.0.2.7:7420", CODE), "192.0.2.7:7421"),
+        (("192.0.2.7:9", CODE), "192.0.2.7:9"),
+        ((f" gwrms://192.0.2.7:7421/{CODE}\n",), "192.0.2.7:7421"),
+        ((link("[fe80::1]:7421", CODE),), "[fe80::1]:7421"),
+    ],
+)
+def test_where_and_code_are_typed_or_come_as_one_link(typed: tuple[str, ...], where: str) -> None:
+    found, code = desk.typed(*typed)
+    assert (str(found), code) == (where, normal(CODE))
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        ("192.0.2.7",),
+        ("/run/gwrms.sock", CODE),
+        ("gwrms://192.0.2.7:7421",),
+        ("gwrms:///x",),
+        ("https://x/y",),
+    ],
+)
+def test_what_is_neither_is_refused_before_anything_is_sent(typed: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match=r"HOST:PORT|16 letters"):
+        desk.typed(*typed)
+
+
 # What is written
 
 
@@ -269,7 +310,7 @@ def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(
     with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
         assert robot.stdout is not None
         typed = next(line for line in robot.stdout if line.startswith("  gwrms pair")).split()[1:]
-        assert main(typed) == 0
+        assert main(["pair", link(*typed[1:])]) == 0
         assert "anna is let in from now on, as operator." in robot.stdout.read()
         assert robot.wait() == 0
     assert "Paired with exo-01: it calls this desk anna, as operator." in capsys.readouterr().out
