@@ -6,6 +6,7 @@ import ssl
 import threading
 from typing import Final
 
+from drivers.urgency import lent_urgency
 from gateway.access.folder import AccessFolder
 from gateway.access.known import Known
 from gateway.certificates import KeyProblem
@@ -18,40 +19,56 @@ _WAITS: Final = (ssl.SSLWantReadError, ssl.SSLWantWriteError)
 
 
 class TlsStream:
-    """Encrypts one socket; one thread reads it, and another one writes."""
+    """Encrypts one socket; one thread reads it, and another one writes.
 
-    __slots__ = ("_lock", "_socket")
+    Who reads, and with it every stop, waits for nobody of less urgency: it lends who writes its own until
+    that has written its record.
+    """
+
+    __slots__ = ("_lock", "_socket", "_writer")
 
     def __init__(self, connection: ssl.SSLSocket) -> None:
         self._socket = connection
         self._lock = threading.Lock()  # OpenSSL lets one thread at a time into a connection
+        self._writer = 0  # the thread that wrote last, if any
 
     def fileno(self) -> int:
         return self._socket.fileno()
 
     def recv(self, most: int) -> bytes:
         """As of a socket: raises `BlockingIOError` where nothing has come."""
+        self._lock_to_read()
         try:
-            with self._lock:
-                return self._socket.recv(most)
+            return self._socket.recv(most)
         except _WAITS as error:
             raise BlockingIOError from error
+        finally:
+            self._lock.release()
 
     def pending(self) -> int:
         """Bytes that have been decrypted already, and of which no poll tells."""
-        with self._lock:
+        self._lock_to_read()
+        try:
             return self._socket.pending()
+        finally:
+            self._lock.release()
 
     def send(self, data: bytes | memoryview) -> int:
         """A record at most, so that whoever reads waits no longer than for that."""
         try:
             with self._lock:
+                self._writer = threading.get_native_id()
                 return self._socket.send(data[:RECORD])
         except _WAITS as error:
             raise BlockingIOError from error
 
     def close(self) -> None:
         self._socket.close()
+
+    def _lock_to_read(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            with lent_urgency(self._writer):
+                self._lock.acquire()
 
 
 def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
