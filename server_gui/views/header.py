@@ -8,6 +8,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopProgress, StopState
@@ -26,6 +27,7 @@ STOP_MARKS: Final = {
     StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
 }
 STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
+RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 LEAST: Final = 84  # wide, at text of 100 %: a chip with less says nothing
 # Left out in this order where there is less room; alarms stand below the header too.
 SPARE: Final = ("status", "robot", "link", "drives", "warnings")
@@ -129,7 +131,7 @@ class Header(QWidget):
         self._empty = QWidget()  # takes the room where there is no chip
         self._row.addWidget(self._empty, 1)
         self.reset_button = QPushButton("Reset stop…")
-        self.reset_button.setToolTip("Ends a held stop. Every drive stays switched off: nothing is enabled.")
+        self.reset_button.setToolTip(RESETTING)
         self.reset_button.clicked.connect(lambda: self.reset.emit(self._desk.selected))
         self._row.addWidget(self.reset_button)
         self.menu = menu
@@ -175,6 +177,9 @@ class Header(QWidget):
         self.stop.setEnabled(station is not None)
         stopping = None if station is None else station.stopping
         self.reset_button.setVisible(stopping is not None and stopping.held)
+        why_not = "" if station is None else station.refused(ROBOT_RESET)
+        self.reset_button.setEnabled(not why_not)
+        set_tip(self.reset_button, why_not or RESETTING)
         if stopping is not None:
             self._outcome.say(_outcome(stopping))
 
@@ -241,6 +246,7 @@ def _robot(station: Station) -> Words:
         parts.append(station.called)
     parts.append(station.address)
     parts += [] if description is None else [description.role]
+    parts += [f"you are {station.who}"] if station.who else []
     return Words(mark, station.title, tuple(parts))
 
 
