@@ -22,7 +22,7 @@ from gateway.connections.tls import RECORD
 from gateway.daemon import Daemon
 from gateway.key_making import make
 from gateway.wire.limits import HANDSHAKES
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import CLOCK, STOP, Bench, Client, config, serving
@@ -197,6 +197,28 @@ def test_strangers_by_the_hundred_keep_nobody_s_stop_out(come: Connect, address:
         over.set()
         for one in knocking:
             one.join()
+
+
+def test_a_stop_on_an_open_link_does_not_wait_for_handshakes(
+    come: Connect, address: tuple[str, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their thread hangs in one, as under any load of strangers; 200 more wait, and beyond those none."""
+    operator, hangs, go_on = come("operator"), threading.Event(), threading.Event()
+    assert operator.call("clock.read")
+
+    def hang(_handshake: object) -> None:
+        hangs.set()
+        assert go_on.wait(WAIT_S)
+        raise ConnectionResetError
+
+    monkeypatch.setattr(handshakes._Handshake, "_go_on", hang)
+    with ExitStack() as open_:
+        open_.callback(go_on.set)
+        for _ in range(200):
+            open_.enter_context(raw(address)).sendall(b"\x16\x03\x01\x02\x00\x01")
+        assert hangs.wait(WAIT_S)
+        assert operator.call("robot.stop", reason="now")["held"] is True
+        assert not go_on.is_set()
 
 
 # What TLS does to lines

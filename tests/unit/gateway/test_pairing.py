@@ -122,6 +122,29 @@ def test_a_code_is_for_one_desk_and_replayed_it_is_worth_nothing(shown: Shown) -
     assert "not the code" in str(again._judged(offer, der_of(pem.encode())))
 
 
+def said_to(where: Address, line: bytes) -> Reply:
+    """What the robot answers to that line, over TLS."""
+    with keys.raw((where.host, where.port)) as bare, keys.context(None).wrap_socket(bare) as tls:
+        tls.sendall(line + b"\n")
+        return msgspec.json.decode(tls.makefile("rb").readline(), type=Reply)
+
+
+def test_what_was_said_once_is_refused_when_it_is_said_again(shown: Shown) -> None:
+    pem = keys.pair("anna")[1].read_text("ascii")
+    line = msgspec.json.encode(Offer(pem, "anna", proof(DESK, CODE, shown.own, keys.pin("anna"))))
+    waiting = shown.wait()
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(said_to, shown.where, line)
+        shown.take(waiting)
+        assert first.result().name == "anna"
+    again = Pairing(shown.folder, shown.listener, new_code(), shown.own, clock=lambda: shown.time_s)
+    with ThreadPoolExecutor(1) as pool:
+        second = pool.submit(again.wait)
+        assert "not the code" in str(said_to(shown.where, line).problem)
+        shown.time_s = 1e9
+        assert isinstance(second.exception(), PairingEnded)
+
+
 def test_of_two_at_once_one_is_paired(
     shown: Shown, asked: Callable[[str], "Future[desk.Paired]"], monkeypatch: pytest.MonkeyPatch
 ) -> None:
