@@ -38,11 +38,14 @@ class AdmissionsJournal:
         self._told: People | None = None
 
     def look(self, folder: AccessFolder) -> None:
-        """At who is let in now."""
-        if folder.table.exists() or folder.files() or self._file.exists():
-            from gateway.access.known import known_in  # for robots that know somebody
+        """At who is let in now; what cannot be seen is in nobody's way."""
+        try:
+            if folder.table.exists() or folder.files() or self._file.exists():
+                from gateway.access.known import known_in  # for robots that know somebody
 
-            self.tell(known_in(folder))
+                self.tell(known_in(folder))
+        except OSError as error:
+            log.warning("who is let in cannot be seen, and is not told: %s", error)
 
     def tell(self, known: "Known") -> None:
         """What has changed since it was told last. In one thread at a time."""

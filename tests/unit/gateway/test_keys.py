@@ -354,3 +354,15 @@ def test_a_robot_that_knows_nobody_has_nothing_to_tell(bench: Bench, tmp_path: P
     with serving(config(tmp_path)) as address, Client(address) as client:
         assert not any("whom" in one for one in client.call("journal.tail", n=50)["entries"])
     assert not list(tmp_path.rglob("admitted.json"))
+
+
+def test_what_cannot_be_seen_keeps_no_module_from_starting(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuse(_folder: AccessFolder) -> list[Path]:
+        raise PermissionError("no right")
+
+    monkeypatch.setattr(AccessFolder, "files", refuse)
+    with serving(config(tmp_path)) as address, Client(address) as client:
+        assert client.call("robot.stop", reason="now")["held"] is True
+    assert "who is let in cannot be seen" in caplog.text

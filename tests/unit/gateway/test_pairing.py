@@ -20,6 +20,8 @@ from gateway.access.folder import AccessFolder
 from gateway.access.known import known_in
 from gateway.access.pairing import Candidate, Pairing, PairingEnded
 from gateway.certificates import KeyProblem, der_of, fingerprint, grouped
+from gateway.cli import qr_code
+from gateway.cli.keys import _show as show
 from gateway.client import Address, ClientError, NotPaired, Unreachable, WrongRobot
 from gateway.client import pairing as desk
 from gateway.client.keys import keys_folder, pin_of, server_file
@@ -360,6 +362,31 @@ def test_without_a_terminal_nobody_is_asked_and_nobody_let_in(
     assert main(["keys", "pair", str(file), "--port", "0"]) == 1
     assert "there is no terminal to ask on" in capsys.readouterr().err
     assert not (tmp_path / "keys").exists()
+
+
+class Terminal(io.StringIO):
+    """A terminal with some letters."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_shows_the_link_for_a_camera_and_a_pipe_does_not(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout", terminal := Terminal())
+    show(shown.listener, CODE, shown.own)
+    lines = [line for line in terminal.getvalue().splitlines() if set(line) <= set(" █▀▄") and line]
+    assert lines == qr_code.lines(link(str(shown.where), CODE))
+    for letters, is_terminal in (("ascii", True), ("utf-8", False)):
+        monkeypatch.setattr(Terminal, "encoding", letters)
+        monkeypatch.setattr(Terminal, "isatty", lambda _self, is_terminal=is_terminal: is_terminal)
+        monkeypatch.setattr("sys.stdout", terminal := Terminal())
+        show(shown.listener, CODE, shown.own)
+        assert f"gwrms pair {shown.where} {CODE}" in terminal.getvalue()
+        assert "█" not in terminal.getvalue()
 
 
 # Further robots, over ssh
