@@ -131,7 +131,7 @@ class Header(QWidget):
         self._empty = QWidget()  # takes the room where there is no chip
         self._row.addWidget(self._empty, 1)
         self.reset_button = QPushButton("Reset stop…")
-        self.reset_button.setToolTip(RESETTING)
+        set_tip(self.reset_button, RESETTING)
         self.reset_button.clicked.connect(lambda: self.reset.emit(self._desk.selected))
         self._row.addWidget(self.reset_button)
         self.menu = menu

@@ -30,7 +30,7 @@ class ControlBar(QWidget):
         self.words.setObjectName("dim")
         self.words.setWordWrap(True)
         self._take, self._release = QPushButton("Take control"), QPushButton("Release")
-        self._take.setToolTip(TAKING)
+        set_tip(self._take, TAKING)
         self._release.setToolTip("Let others write; what is on trial goes back")
         self._take.clicked.connect(self.take)
         self._release.clicked.connect(self.release)

@@ -185,7 +185,7 @@ class ParametersPanel(QWidget):
         )
         self._save.setToolTip("Save what the robot holds as a .toml file")
         self.store_button = QPushButton("Store to flash …")
-        self.store_button.setToolTip(STORING)
+        set_tip(self.store_button, STORING)
         grid = QGridLayout()
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
