@@ -186,6 +186,7 @@ class Daemon:
             session.close(_REVOKED)
         elif self._known is None:
             self._known = known
+            self._service.who_is_known(known)
             self._loop.call_later(WATCH_S, self._look_who_is_known)
 
     def _look_who_is_known(self) -> None:
@@ -194,6 +195,8 @@ class Daemon:
             self._known = None
             return
         before, known = self._known, self._entrance.known()
+        if known is not before:
+            self._service.who_is_known(known)
         for session in by_name if known is not before else ():
             if not known.knows(session.identity):
                 session.close(_REVOKED)

@@ -40,6 +40,7 @@ from gateway.wire.stop import ROBOT_STOP
 from gateway.wire.stream import STREAM_START, STREAM_STOP, StreamStarted, StreamStartParams, StreamStopParams
 
 if TYPE_CHECKING:
+    from gateway.access.known import Known
     from gateway.cost import Costs
     from gateway.guard.module import GuardModule
     from gateway.modules.component.module import ComponentModule
@@ -114,6 +115,12 @@ class Service:
         if self._config.guard is not None or not self.registry.off:
             return True
         return RecordsFolder(self._config.records).unfinished
+
+    def who_is_known(self, known: "Known") -> None:
+        """Who may come in, or what they may, is now this."""
+        control = cast("ControlModule | None", self.registry.running("control"))
+        if control is not None:  # else it looks itself when it starts
+            control.who_is_known(known)
 
     def opened(self, session: Session) -> None:
         """A client has come."""

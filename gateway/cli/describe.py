@@ -14,7 +14,7 @@ from gateway.client.blocking import Robot
 from gateway.wire.bus import CLOSED
 from gateway.wire.component import ChannelInfo
 from gateway.wire.parameter import ParameterInfo
-from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo
+from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo, Hello
 from gateway.wire.stop import StopInfo
 
 PAGE = 100  # columns
@@ -30,11 +30,11 @@ def main(argv: list[str]) -> int:
         "on a stop.",
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
-        description = _measured(robot)
+        description, hello = _measured(robot), robot.hello
     if arguments.json:
         say_json(description)
     else:
-        say("\n".join(_chapters(description)))
+        say("\n".join([*_you(hello), *_chapters(description)]))
     return 0
 
 
@@ -47,6 +47,13 @@ def _measured(robot: Robot) -> Description:
         if all(known) or time.monotonic() > deadline_s:
             return description
         time.sleep(LOOK_S)
+
+
+def _you(hello: Hello | None) -> Iterator[str]:
+    """Who asks, and what that one may not."""
+    if hello is not None:
+        not_for_you = f"; not for you: {', '.join(hello.refused)}" if hello.refused else ""
+        yield textwrap.fill(f"you are {hello.who}{not_for_you}", PAGE, subsequent_indent="  ") + "\n"
 
 
 def _chapters(robot: Description) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""`gwrms keys`: who is let in on this robot, and as what. Run on the robot itself."""
+"""`gwrms keys`: who is let in on this robot, and as what. Run on the robot itself, but `push` anywhere."""
 
 import argparse
 import contextlib
@@ -12,12 +12,13 @@ from gateway.access.folder import AccessFolder
 from gateway.access.known import known_in
 from gateway.access.pairing import Candidate, Pairing, PairingEnded
 from gateway.certificates import NAME, KeyProblem, grouped
+from gateway.cli import keys_push, qr_code
 from gateway.cli.connect import NobodyToAsk, choose
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client.address import DEFAULT_PORT
 from gateway.connections.doors import is_loopback
 from gateway.connections.listeners import listen
-from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, new_code
+from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, link, new_code
 from gateway.wire.role import Role
 
 CONFIG = Path("/etc/gwrms/robot.toml")
@@ -25,6 +26,8 @@ USAGE = """usage: gwrms keys COMMAND …
 
   pair [CONFIG]          let one more desk in: shows a code, which is typed there
   list [CONFIG]          who is let in, and as what
+  push HOST… --role ROLE let this desk, or another key, in on further robots, by ssh
+  add [CONFIG] NAME      let a key in whose certificate comes on the standard input
   revoke [CONFIG] NAME   let somebody in no more; whoever is connected with that key is closed at once
 
 CONFIG is the robot's file (default /etc/gwrms/robot.toml); keys and clients are beside it.
@@ -47,7 +50,7 @@ def pair(argv: list[str]) -> int:
     made = _parser("pair", _PAIR)
     made.add_argument("--host", help="address to listen on for the desk (default: [gateway] host)")
     made.add_argument("--port", type=int, default=PAIRING_PORT, help="its port (default %(default)s)")
-    made.add_argument("--name", type=_name, help="of the desk, instead of asking")
+    made.add_argument("--name", type=keys_push.name_of, help="of the desk, instead of asking")
     made.add_argument("--role", type=Role, choices=list(Role), help="what it may, instead of asking")
     made.add_argument(
         "--yes", action="store_true", help="with --name and --role: ask nothing, take who comes"
@@ -90,12 +93,22 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
     where = f"[{shown}]:{port}" if ":" in shown else f"{shown}:{port}"
     say(f"\nOn the desk, within {VALID_S / 60:.0f} minutes ({TRIES} tries):\n\n")
     say(f"  gwrms pair {where} {code}\n\n")
+    say("".join(f"{one}\n" for one in _drawn(link(where, code))))
     say(f"This robot's key: {grouped(own)}\n")
     if is_loopback(listener.getsockname()):
         warn(
             "keys",
             "this listens on this computer only; for other desks set host in [gateway], or give --host",
         )
+
+
+def _drawn(text: str) -> list[str]:
+    """The same for a camera, where this is a terminal that can show it."""
+    try:
+        "█▀▄".encode(sys.stdout.encoding or "ascii")
+        return [*qr_code.lines(text), ""] if sys.stdout.isatty() else []
+    except (UnicodeEncodeError, qr_code.TooLong):
+        return []
 
 
 def _address() -> str:
@@ -158,6 +171,16 @@ def revoke(argv: list[str]) -> int:
     return 0
 
 
+def add(argv: list[str]) -> int:
+    """Exit code: 0 let in, 1 not, 2 usage."""
+    made = _parser("add", keys_push.ADD)
+    made.add_argument("name", metavar="NAME", type=keys_push.name_of)
+    made.add_argument("--role", type=Role, choices=list(Role), required=True, help="what it may")
+    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    arguments = made.parse_args(argv)
+    return keys_push.add(arguments, *_robot(arguments))
+
+
 def _parser(command: str, what: str) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog=f"gwrms keys {command}",
@@ -177,10 +200,4 @@ def _robot(arguments: argparse.Namespace) -> tuple[config.RobotConfig, AccessFol
     return robot, AccessFolder(robot.access, {})
 
 
-def _name(text: str) -> str:
-    if not NAME.fullmatch(text):
-        raise argparse.ArgumentTypeError(f"{text!r} is no name: letters, digits, _, . and -, at most 64")
-    return text
-
-
-COMMANDS = {"pair": pair, "list": list_, "revoke": revoke}
+COMMANDS = {"pair": pair, "list": list_, "add": add, "push": keys_push.push, "revoke": revoke}

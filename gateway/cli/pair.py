@@ -2,12 +2,9 @@
 
 import argparse
 
-from gateway.cli.connect import address
 from gateway.cli.text import say, say_json
 from gateway.client import pairing
-from gateway.client.address import DEFAULT_PORT, Address
 from gateway.client.keys import keys_folder, server_file
-from gateway.wire.pairing import PAIRING_PORT, normal
 
 _DESCRIPTION = """\
 Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk's key is made where it
@@ -24,14 +21,18 @@ def main(argv: list[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    made.add_argument("robot", metavar="HOST:PORT", type=_where, help="as the robot shows it")
-    made.add_argument("code", metavar="CODE", type=_code, help="as the robot shows it")
+    made.add_argument("robot", metavar="HOST:PORT", help="as the robot shows it; or its link, gwrms://…")
+    made.add_argument("code", metavar="CODE", nargs="?", default="", help="as the robot shows it")
     made.add_argument("--name", help="that the robot is to call this desk (default: your user and computer)")
     made.add_argument("--json", action="store_true", help="one JSON object, for machines")
     arguments = made.parse_args(argv)
+    try:
+        where, code = pairing.typed(arguments.robot, arguments.code)
+    except ValueError as error:
+        made.error(str(error))
     if not arguments.json:
-        say(f"Waiting until somebody confirms it on the robot at {arguments.robot} …\n")
-    paired = pairing.pair(arguments.robot, arguments.code, arguments.name)
+        say(f"Waiting until somebody confirms it on the robot at {where} …\n")
+    paired = pairing.pair(where, code, arguments.name)
     name = pairing.pin(paired.robot, paired.address)
     if arguments.json:
         say_json(
@@ -48,15 +49,3 @@ def main(argv: list[str]) -> int:
     say(f"Its key is pinned in {server_file()}, yours is in {keys_folder()}.\n")
     say(f"\n  gwrms describe --robot {paired.address}\n")
     return 0
-
-
-def _where(text: str) -> Address:
-    found = address(text)
-    return Address(found.host, PAIRING_PORT) if found.port == DEFAULT_PORT else found
-
-
-def _code(text: str) -> str:
-    try:
-        return normal(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error

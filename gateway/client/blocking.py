@@ -17,7 +17,7 @@ from gateway.wire.control import JournalEntries
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import Confirmed, ParameterValues, Reverted, Stored, Written
 from gateway.wire.resource import Overruns, ResourceSnapshot, ResourceSnapshotParams
-from gateway.wire.robot import Description
+from gateway.wire.robot import Description, Hello
 from gateway.wire.stop import Enabled, Reset, Stopped
 from gateway.wire.stream import ModuleName
 
@@ -74,6 +74,11 @@ class Robot:
     def clock_offset(self) -> ClockOffset | None:
         """The robot's monotonic clock minus ours; None before the first exchange."""
         return self._client.link.clock.offset
+
+    @property
+    def hello(self) -> Hello | None:
+        """Who this program is on the robot, and what it may not; None before the first greeting."""
+        return self._client.link.hello
 
     def describe(self) -> Description:
         """What the robot is made of."""

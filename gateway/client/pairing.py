@@ -5,21 +5,38 @@ import itertools
 import re
 import socket
 import ssl
+import time
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
 from gateway.certificates import KeyProblem, der_of, fingerprint
-from gateway.client.address import Address
+from gateway.client.address import DEFAULT_PORT, Address
 from gateway.client.errors import ClientError, NotPaired, Unreachable, WrongRobot
 from gateway.client.keys import CERTIFICATE, KEY, keys_folder, server_file
 from gateway.key_making import make, write_file
 from gateway.tables.entries import with_entry
-from gateway.wire.pairing import DESK, LINE_BYTES, ROBOT, SAY_S, VALID_S, Offer, Reply, proof, proves
+from gateway.wire.pairing import (
+    DESK,
+    LINE_BYTES,
+    PAIRING_PORT,
+    ROBOT,
+    SAY_S,
+    SCHEME,
+    VALID_S,
+    Offer,
+    Reply,
+    normal,
+    of_link,
+    proof,
+    proves,
+)
+
+_LOOK_S: Final = 0.2  # between looks whether the desk has given up
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +49,31 @@ class Paired:
     role: str
 
 
-def pair(where: Address, code: str, name: str | None = None) -> Paired:
-    """Pair with the robot that shows `code` at `where`; waits until a person there has confirmed it.
-
-    This desk's key is made where it has none. Nothing is pinned yet: see `pin`.
+def typed(where: str, code: str = "") -> tuple[Address, str]:
+    """What a person typed: HOST:PORT and the code, or the link that has both.
 
     Raises:
-        ClientError: nobody answers, the code is another, or it was not confirmed.
+        ValueError: it is neither; it says which of the two is wrong.
+
+    """
+    if where.strip().startswith(SCHEME):
+        where, code = of_link(where)
+    found = Address.parse(where.strip())
+    if found.path is not None:
+        raise ValueError("a robot pairs at HOST:PORT, as it shows it, not at a path")
+    return Address(found.host, PAIRING_PORT if found.port == DEFAULT_PORT else found.port), normal(code)
+
+
+def pair(
+    where: Address, code: str, name: str | None = None, given_up: Callable[[], bool] = lambda: False
+) -> Paired:
+    """Pair with the robot that shows `code` at `where`; waits until a person there has confirmed it.
+
+    This desk's key is made where it has none. Nothing is pinned yet: see `pin`. It ends within some seconds
+    of `given_up`, which is asked in this thread.
+
+    Raises:
+        ClientError: nobody answers, the code is another, it was not confirmed, or was given up.
         KeyProblem: this desk's key cannot be made or read.
         ValueError: the code is none.
 
@@ -51,7 +86,7 @@ def pair(where: Address, code: str, name: str | None = None) -> Paired:
     try:
         plain = socket.create_connection((where.host, where.port), SAY_S)
         with plain, context.wrap_socket(plain) as secured:
-            return _paired(secured, where, code, pem, name or own_name())
+            return _paired(secured, where, code, pem, name or own_name(), given_up)
     except ClientError:
         raise
     except OSError as error:
@@ -62,13 +97,14 @@ def pair(where: Address, code: str, name: str | None = None) -> Paired:
         ) from error
 
 
-def _paired(secured: ssl.SSLSocket, where: Address, code: str, pem: bytes, name: str) -> Paired:
+def _paired(
+    secured: ssl.SSLSocket, where: Address, code: str, pem: bytes, name: str, given_up: Callable[[], bool]
+) -> Paired:
     robot = fingerprint(secured.getpeercert(binary_form=True) or b"")
     desk = fingerprint(der_of(pem))
     offer = Offer(pem.decode("ascii"), name, proof(DESK, code, robot, desk))
     secured.sendall(msgspec.json.encode(offer) + b"\n")
-    secured.settimeout(VALID_S)
-    reply = _reply(secured, where)
+    reply = _reply(secured, where, given_up)
     if reply.problem is not None:
         raise NotPaired(f"{where} did not pair: {reply.problem}")
     if not proves(reply.proof, ROBOT, code, robot, desk):
@@ -80,10 +116,18 @@ def _paired(secured: ssl.SSLSocket, where: Address, code: str, pem: bytes, name:
     return Paired(reply.robot, Address(where.host, reply.port, robot), reply.name, reply.role)
 
 
-def _reply(secured: ssl.SSLSocket, where: Address) -> Reply:
-    found = b""
+def _reply(secured: ssl.SSLSocket, where: Address, given_up: Callable[[], bool]) -> Reply:
+    found, until_s = b"", time.monotonic() + VALID_S
+    secured.settimeout(_LOOK_S)
     while b"\n" not in found and len(found) <= LINE_BYTES:
-        more = secured.recv(LINE_BYTES)
+        try:
+            more = secured.recv(LINE_BYTES)
+        except TimeoutError:
+            if given_up():
+                raise NotPaired(f"pairing with {where} was given up here") from None
+            if time.monotonic() >= until_s:
+                raise
+            continue
         if not more:
             raise NotPaired(f"{where} ended the pairing")
         found += more

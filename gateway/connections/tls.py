@@ -8,6 +8,7 @@ import stat
 import threading
 from typing import Final
 
+from drivers.urgency import lent_urgency
 from gateway.access.folder import AccessFolder
 from gateway.access.known import Known
 from gateway.certificates import KeyProblem
@@ -28,9 +29,12 @@ class TlsStream:
 
     OpenSSL never has the socket itself: it would read on by itself as long as records come that are for it
     alone (KeyUpdate), and whoever sends nothing else would have the thread. It is given a piece at a time.
+
+    Who reads, and with it every stop, waits for nobody of less urgency: it lends who writes its own until
+    that has written its record.
     """
 
-    __slots__ = ("_come", "_goes", "_lock", "_rest", "_size", "_socket", "_tls")
+    __slots__ = ("_come", "_goes", "_lock", "_rest", "_size", "_socket", "_tls", "_writer")
 
     def __init__(self, connection: socket.socket, context: ssl.SSLContext) -> None:
         self._socket = connection
@@ -38,6 +42,7 @@ class TlsStream:
         self._come, self._goes = ssl.MemoryBIO(), ssl.MemoryBIO()
         self._tls = context.wrap_bio(self._come, self._goes, server_side=True)
         self._rest, self._size = b"", 0  # of a record that is on its way, and what it holds
+        self._writer = 0  # the thread that wrote last, if any
 
     def fileno(self) -> int:
         return self._socket.fileno()
@@ -68,20 +73,25 @@ class TlsStream:
 
     def recv(self, most: int) -> bytes:
         """As of a socket: raises `BlockingIOError` where nothing has come."""
-        with self._lock:
+        self._lock_to_read()
+        try:
             if not self._waiting:
                 self._take(min(most, PIECE))
-            try:
-                return self._tls.read(most)
-            except ssl.SSLWantReadError as error:
-                raise BlockingIOError from error
-            except ssl.SSLEOFError:
-                return b""
+            return self._tls.read(most)
+        except ssl.SSLWantReadError as error:
+            raise BlockingIOError from error
+        except ssl.SSLEOFError:
+            return b""
+        finally:
+            self._lock.release()
 
     def pending(self) -> int:
         """Bytes that have come already, and of which no poll tells."""
-        with self._lock:
+        self._lock_to_read()
+        try:
             return self._waiting
+        finally:
+            self._lock.release()
 
     @property
     def _waiting(self) -> int:
@@ -99,6 +109,7 @@ class TlsStream:
         Raises `BlockingIOError` until all of it has gone: the same is to be sent again until then.
         """
         with self._lock:
+            self._writer = threading.get_native_id()
             if not self._rest:
                 self._size = self._tls.write(data[:RECORD])
                 self._rest = self._goes.read()
@@ -109,6 +120,11 @@ class TlsStream:
 
     def close(self) -> None:
         self._socket.close()
+
+    def _lock_to_read(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            with lent_urgency(self._writer):
+                self._lock.acquire()
 
 
 def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:

@@ -656,7 +656,7 @@ _shtab_gwrms_pair_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--name[that the robot is to call this desk (default\: your user and computer)]:name:"
   "--json[one JSON object, for machines]"
-  ":as the robot shows it:"
+  ":as the robot shows it\; or its link, gwrms\:\/\/\…:"
   ":as the robot shows it:"
 )
 

@@ -19,6 +19,7 @@ _SIGNS: Final = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"  # Crockford's base 32: no I,
 _LENGTH: Final = 16  # of them, five bits each
 _MISREAD: Final = str.maketrans("ILO", "110")
 ROBOT, DESK = "robot", "desk"  # whose proof it is
+SCHEME: Final = "gwrms://"
 
 
 class Offer(Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,6 +53,19 @@ def normal(code: str) -> str:
     if len(signs) != _LENGTH or not set(signs) <= set(_SIGNS):
         raise ValueError(f"a code has {_LENGTH} letters and digits, as the robot shows them")
     return signs
+
+
+def link(where: str, code: str) -> str:
+    """Where a robot pairs and its code in one, as its QR code says it."""
+    return f"{SCHEME}{where}/{code}"
+
+
+def of_link(text: str) -> tuple[str, str]:
+    """Both again; raises `ValueError` where the text is no such link."""
+    where, slash, code = text.strip().removeprefix(SCHEME).partition("/")
+    if not (text.strip().startswith(SCHEME) and where and slash):
+        raise ValueError(f"a robot's link is {SCHEME}HOST:PORT/CODE, as it shows it")
+    return where, normal(code)
 
 
 def proof(whose: str, code: str, robot: str, desk: str) -> str:

@@ -37,6 +37,11 @@ class Hello(Struct, frozen=True):
     identity: str | None = None  # whose key or account it is; None: the robot has no keys
     refused: dict[str, str] = {}  # method → why this client may not ask for it
 
+    @property
+    def who(self) -> str:
+        """Who the client is there, and as what."""
+        return f"{self.identity or 'whoever is on its computer'}, as {self.role}"
+
 
 class Clock(Struct, frozen=True):
     """Result of `clock.read`: one instant on both clocks."""

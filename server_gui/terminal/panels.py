@@ -81,6 +81,7 @@ def header(station: Station, where: str, look: Look) -> RenderableType:
     row.add_column(justify="right")
     name = robot.description.robot if robot.description is not None else where
     known = mark_text(station.mark)
+    where = f"{where}  {station.who}" if station.who else where
     row.add_row(
         Text.assemble((plain(name), "bold"), "  ", known, ("  " + plain(where), DIM)), _link(robot, look)
     )

@@ -7,6 +7,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
+from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopProgress, StopState
@@ -15,7 +16,7 @@ from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import status
 from server_gui.views.recording_chip import NAME, RecordingChip
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
 
 STOP_MARKS: Final = {
@@ -24,6 +25,7 @@ STOP_MARKS: Final = {
     StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
 }
 STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
+RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Left out in this order where there is less room; alarms stand below the header too.
 SPARE: Final = ("status", "robot", "recording", "link", "drives", "warnings")
 
@@ -55,7 +57,7 @@ class Header(QWidget):
         self._empty = QWidget()  # takes the room where there is no chip
         self._row.addWidget(self._empty, 1)
         self.reset_button = QPushButton("Reset stop…")
-        self.reset_button.setToolTip("Ends a held stop. Every drive stays switched off: nothing is enabled.")
+        set_tip(self.reset_button, RESETTING)
         self.reset_button.clicked.connect(lambda: self.reset.emit(self._desk.selected))
         self._row.addWidget(self.reset_button)
         self.menu = menu
@@ -102,6 +104,9 @@ class Header(QWidget):
         self.stop.setEnabled(station is not None)
         stopping = None if station is None else station.stopping
         self.reset_button.setVisible(stopping is not None and stopping.held)
+        why_not = "" if station is None else station.refused(ROBOT_RESET)
+        self.reset_button.setEnabled(not why_not)
+        set_tip(self.reset_button, why_not or RESETTING)
         if stopping is not None:
             self._outcome.say(_outcome(stopping))
 
@@ -168,6 +173,7 @@ def _robot(station: Station) -> Words:
         parts.append(station.called)
     parts.append(station.address)
     parts += [] if description is None else [description.role]
+    parts += [f"you are {station.who}"] if station.who else []
     return Words(mark, station.title, tuple(parts))
 
 

@@ -200,6 +200,7 @@ class MainWindow(QMainWindow):
         self.kept.setValue("scale", round(self._theme.scale * 100))
         self.kept.setValue("units", dict(self._desk.shown.units.by_si))
         self.kept.setValue("pinned", self._desk.pins.to_keep())
+        self.robots.end_pairing()
         super().closeEvent(event)
         self.closed.emit()
 

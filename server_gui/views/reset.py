@@ -2,6 +2,7 @@
 
 from PySide6.QtWidgets import QWidget
 
+from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.station import Station
@@ -15,7 +16,7 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
     why = station.stopping.reason
     held = f"The STOP of {station.title} is held{f': {why}' if why else ''}."
     text = f"{held}\n\n{DOES}\n\nAfterwards, {check_of(Kind.RESET)}"
-    return ask(parent, f"Reset the stop of {station.title}", text, "Reset stop", station.reset)
+    return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
 
 
 def ask_clear(parent: QWidget, station: Station) -> Question:
@@ -31,4 +32,12 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
         more = ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
     text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check_of(Kind.RESET)}"
-    return ask(parent, f"Clear the fault of {station.title}", text, "Clear fault", station.reset)
+    return _asked(parent, f"Clear the fault of {station.title}", text, "Clear fault", station)
+
+
+def _asked(parent: QWidget, title: str, text: str, action: str, station: Station) -> Question:
+    """With no way to do what this desk may not."""
+    why_not = station.refused(ROBOT_RESET)
+    question = ask(parent, title, f"{why_not}.\n\n{text}" if why_not else text, action, station.reset)
+    question.act.setEnabled(not why_not)
+    return question

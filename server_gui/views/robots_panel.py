@@ -1,9 +1,12 @@
 """Every robot: state, age of its data, a stop of its own; add and remove one; STOP ALL."""
 
+from typing import Final
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLineEdit,
+    QPushButton,
     QScrollArea,
     QToolButton,
     QVBoxLayout,
@@ -11,19 +14,23 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.client import Address, BadAddress
+from gateway.wire.pairing import SCHEME
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.ask import ask
 from server_gui.views.marks import age_text
+from server_gui.views.pairing import PairingDialog, show_pairing
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.choosable import Choosable
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.whole import WholeLabel
+
+PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
 class RobotCard(Choosable):
@@ -75,6 +82,7 @@ class RobotCard(Choosable):
         age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
         self._link.say(*dict.fromkeys((f"{age}{live}", age)))
+        set_tip(self, f"You are {station.who} here." if station.who else "")
         if self.property("selected") != selected:
             self.setProperty("selected", selected)
             self.style().polish(self)
@@ -108,6 +116,9 @@ class RobotsPanel(QWidget):
         self.address.setPlaceholderText("Add a robot: HOST:PORT")
         self.address.setAccessibleName("Address of a robot to add")
         self.address.returnPressed.connect(self._add)
+        self.pair = QPushButton("Pair…")
+        self.pair.setToolTip("With a robot that has keys: it shows a code (gwrms keys pair)")
+        self.pair.clicked.connect(lambda: self.begin_pairing(self.address.text().strip()))
         self.said = PlainLabel()
         self.said.setObjectName("dim")
         self.said.setWordWrap(True)
@@ -120,7 +131,10 @@ class RobotsPanel(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addWidget(scroll, 1)
         everything.addWidget(self.said)
-        everything.addWidget(self.address)
+        adding = QHBoxLayout()
+        adding.addWidget(self.address, 1)
+        adding.addWidget(self.pair)
+        everything.addLayout(adding)
         everything.addWidget(self.all_stop)
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -161,6 +175,9 @@ class RobotsPanel(QWidget):
 
     def _add(self) -> None:
         text = self.address.text().strip()
+        if text.startswith(SCHEME):
+            self.begin_pairing(text)
+            return
         try:
             where = str(Address.parse(text)) if text else ""
         except BadAddress as error:
@@ -171,6 +188,22 @@ class RobotsPanel(QWidget):
         elif where:
             self.say("")
             self.address.clear()
+            self.added.emit(where)
+
+    def begin_pairing(self, where: str) -> PairingDialog:
+        """Ask for address and code of a robot that pairs; when it has, it is followed."""
+        self.say("")
+        return show_pairing(self, where, self._paired)
+
+    def end_pairing(self) -> None:
+        """Before the window goes."""
+        for dialog in self.findChildren(PairingDialog):
+            dialog.end(PAIRING_ENDS_S)
+
+    def _paired(self, where: str) -> None:
+        """One that is in the list is reached by its key at the next attempt."""
+        self.address.clear()
+        if not any(station.address == where for station in self._desk):
             self.added.emit(where)
 
     def say(self, text: str) -> None:

@@ -6,7 +6,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
+from gateway.access.folder import AccessFolder
 from gateway.handlers import Handlers, on
+from gateway.modules.control.admitted import AdmissionsJournal
 from gateway.modules.control.lease import RENEWED, TAKEN, Leases
 from gateway.modules.control.storage import RESTORING, STORING
 from gateway.modules.control.tuning import Tuning
@@ -63,6 +65,7 @@ from gateway.wire.stop import (
 )
 
 if TYPE_CHECKING:
+    from gateway.access.known import Known
     from gateway.connections.session import Session
     from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context
@@ -117,6 +120,8 @@ class ControlModule:
                 config, self._component, loop, self._records, self._stop.authority, self._trials_changed
             )
             opened.callback(self._tuning.close)
+            self._admissions = AdmissionsJournal(self._records)
+            self._admissions.look(AccessFolder(config.access))
             self._stop.claim = self._tuning.claim
             left = self._tuning.load()
             self._stop.start()
@@ -155,6 +160,10 @@ class ControlModule:
     def revert_trials(self, why: str) -> None:
         """Take back everything that is on trial. In the loop's thread."""
         self._tuning.trials.revert_all(why)
+
+    def who_is_known(self, known: "Known") -> None:
+        """Who is let in, or what they may, has changed. In the loop's thread."""
+        self._admissions.tell(known)
 
     def _hold_changed(self) -> None:
         self.keep_awake("stop", self._stop.held)

@@ -157,6 +157,7 @@ def _of_link(robot: Robot, address: str) -> Iterator[Alarm]:
     shown = f"what is shown is {age_text(robot.age_s())} old" if robot.age_s() is not None else ""
     if link.state is not ConnectionState.CONNECTED:
         kind = Kind.NO_LINK if link.links else Kind.NEVER_REACHED
+        kind = Kind.ANOTHER if link.is_another else kind
         what = link.problem or f"{address} does not answer yet"
         did = "what it does now is not known" + (f"; {shown}" if shown else "")
         yield Alarm(kind, "", what, did=did, check=check_of(kind), since_s=since_s if link.links else None)

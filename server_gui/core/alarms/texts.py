@@ -14,6 +14,7 @@ class Kind(Enum):
     """What sort of thing is wrong; the worst comes first."""
 
     NOT_STOPPED = "STOP NOT CONFIRMED"
+    ANOTHER = "ANOTHER ROBOT ANSWERS"
     NEVER_REACHED = "never reached"
     NO_LINK = "no link"
     FAULT = "fault"
@@ -50,6 +51,12 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
 TEXTS: Final = dict(
     (
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop, now"),
+        _text(
+            Kind.ANOTHER,
+            "square",
+            "bad",
+            "do not trust what answers there; compare its key on the robot's own screen (gwrms keys list)",
+        ),
         _text(
             Kind.NEVER_REACHED,
             "cross",

@@ -12,6 +12,7 @@ from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
+from gateway.wire.method import AnyMethod
 from gateway.wire.parameter import ParameterInfo, Stored, Written
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
@@ -118,6 +119,16 @@ class Station:
         """The parameters that can be changed, in the robot's order."""
         found = self.robot.description.parameters if self.robot.description is not None else []
         return {info.name: info for info in found if info.read_only is None}
+
+    @property
+    def who(self) -> str:
+        """Who we are there, and as what; empty where the robot has no keys, or has not said."""
+        hello = self.robot.hello
+        return "" if hello is None or hello.identity is None else hello.who
+
+    def refused(self, method: AnyMethod) -> str:
+        """Why we may not ask for this, in the robot's words; empty where we may, as far as is known."""
+        return "" if self.robot.hello is None else self.robot.hello.refused.get(method.name, "")
 
     @property
     def is_linked(self) -> bool:

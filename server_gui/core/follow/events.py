@@ -12,7 +12,7 @@ from gateway.wire.control import JournalEntries
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import ParameterValues
 from gateway.wire.resource import ResourceSnapshot
-from gateway.wire.robot import Description
+from gateway.wire.robot import Description, Hello
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +22,7 @@ class LinkChanged:
     state: ConnectionState
     problem: str | None
     at_ns: int
+    is_another: bool = False  # what answers has another key than the robot that was paired
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,7 @@ class Described:
 
     description: Description
     calendar_ns: int = 0  # the robot's minus ours when it came
+    hello: Hello | None = None  # who we are there
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from gateway.client import (
     NotConnected,
     ProtocolError,
     RemoteError,
+    WrongRobot,
 )
 from gateway.client.backoff import Backoff
 from gateway.wire.resource import ResourceSnapshotParams
@@ -121,7 +122,8 @@ class Feed:
         else:
             self._dropped.set()
         problem = self._client.link.problem
-        self._tell(LinkChanged(state, None if problem is None else str(problem), time.monotonic_ns()))
+        said, is_another = None if problem is None else str(problem), isinstance(problem, WrongRobot)
+        self._tell(LinkChanged(state, said, time.monotonic_ns(), is_another))
 
     async def _follow(self) -> None:
         """Everything that goes on while one link lasts; ends by raising why it cannot go on."""
@@ -130,7 +132,8 @@ class Feed:
         async with asyncio.TaskGroup() as group:
             group.create_task(self._until_dropped())
             description = await self._client.describe()
-            self._admit(Described(description, description.clock.utc_ns - time.time_ns()))
+            calendar_ns = description.clock.utc_ns - time.time_ns()
+            self._admit(Described(description, calendar_ns, self._client.link.hello))
             group.create_task(self._stream(self._channels(description)))
             changeable = (known.name for known in description.parameters if known.read_only is None)
             parameters = _matching(following.parameters, changeable)

@@ -10,7 +10,7 @@ from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo
 from gateway.wire.parameter import ParameterValue
 from gateway.wire.resource import ResourceSnapshot
-from gateway.wire.robot import Description
+from gateway.wire.robot import Description, Hello
 from server_gui.core.follow.events import (
     BusesSeen,
     Described,
@@ -43,6 +43,7 @@ class LinkStatus:
 
     state: ConnectionState = ConnectionState.IDLE
     problem: str | None = None
+    is_another: bool = False  # what answers has another key than the robot that was paired
     since_ns: int = 0
     links: int = 0
     missed: int = 0  # notifications
@@ -60,6 +61,7 @@ class Robot:
 
     link: LinkStatus = field(default_factory=LinkStatus)
     description: Description | None = None
+    hello: Hello | None = None  # who we are there, and what we may not
     values: dict[str, float | None] = field(default_factory=dict)
     parts: dict[str, Part] = field(default_factory=dict)
     parameters: dict[str, ParameterValue] = field(default_factory=dict)
@@ -149,9 +151,11 @@ class Robot:
         link = self.link
         link.links += event.state is ConnectionState.CONNECTED
         link.state, link.problem, link.since_ns = event.state, event.problem, event.at_ns
+        if event.problem is not None or event.state is ConnectionState.CONNECTED:
+            link.is_another = event.is_another
 
     def _described(self, event: Described) -> None:
-        self.description = event.description
+        self.description, self.hello = event.description, event.hello
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {
             part.name: Part(part.name, part.kind, part.state, None, part.problem)

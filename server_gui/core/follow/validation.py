@@ -55,6 +55,9 @@ class Validator:
                 self._telemetry(event)
             case Described():
                 self._described(event.description)
+                if event.hello is not None:
+                    _text("who we are", event.hello.who, LONGEST_TEXT)
+                    _sound("its greeting", event.hello, MOST_BYTES[Looked])
             case Resources():
                 _sound("the look at its computer", event.snapshot, MOST_BYTES[Resources])
             case Looked():

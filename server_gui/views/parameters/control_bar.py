@@ -1,14 +1,19 @@
 """Who may write: take control or release it, and how long it lasts."""
 
+from typing import Final
+
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
+from gateway.wire.control import CONTROL_ACQUIRE
 from server_gui.core.desk.desk import Desk
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
+
+TAKING: Final = "One window or script at a time may write. Stopping needs no control"
 
 
 class ControlBar(QWidget):
@@ -25,7 +30,7 @@ class ControlBar(QWidget):
         self.words.setObjectName("dim")
         self.words.setWordWrap(True)
         self._take, self._release = QPushButton("Take control"), QPushButton("Release")
-        self._take.setToolTip("One window or script at a time may write. Stopping needs no control")
+        set_tip(self._take, TAKING)
         self._release.setToolTip("Let others write; what is on trial goes back")
         self._take.clicked.connect(self.take)
         self._release.clicked.connect(self.release)
@@ -42,7 +47,9 @@ class ControlBar(QWidget):
         self.setEnabled(station is not None and station.is_linked)
         if station is None:
             return
-        left_s = station.control.left_s()
+        left_s, why_not = station.control.left_s(), station.refused(CONTROL_ACQUIRE)
+        self._take.setEnabled(not why_not)
+        set_tip(self._take, why_not or TAKING)
         self._release.setVisible(left_s is not None)
         set_text_of = "Renew" if left_s is not None else "Take control"
         if self._take.text() != set_text_of:
@@ -53,4 +60,4 @@ class ControlBar(QWidget):
         else:
             self._icon.show_mark(Mark("ring", "dim", "not in control"))
             asking = "asking …" if station.control.asking else "Looking only: writing takes control"
-            set_text(self.words, station.control.problem or asking)
+            set_text(self.words, why_not or station.control.problem or asking)

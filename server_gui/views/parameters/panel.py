@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
@@ -15,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.parameter_files.contents import FileProblem
+from gateway.wire.parameter import PARAMETER_STORE, PARAMETER_WRITE
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as
@@ -30,7 +32,9 @@ from server_gui.views.parameters.tree import ParameterTree
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.files import ask_open, ask_save
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
+
+STORING: Final = "Make a device keep its parameters when its power goes; a step of its own"
 
 
 class ParametersPanel(QWidget):
@@ -69,11 +73,17 @@ class ParametersPanel(QWidget):
         staged = 0 if station is None else len(station.difference(self._desk.shown.units))
         editing = self.pages.currentIndex() == 0
         self.review_button.setText(f"Review {staged} …" if staged else "Review …")
-        self.review_button.setEnabled(bool(staged) and editing)
+        not_written = "" if station is None else station.refused(PARAMETER_WRITE)
+        self.review_button.setEnabled(bool(staged) and editing and not not_written)
+        set_tip(self.review_button, not_written)
         self._discard.setEnabled(bool(staged))
         self.undo.setEnabled(station is not None and bool(station.writing.undo) and editing)
         for button in (self._compare, self._save, self.store_button):
             button.setEnabled(station is not None and bool(station.known) and editing)
+        not_stored = "" if station is None else station.refused(PARAMETER_STORE)
+        if not_stored:
+            self.store_button.setEnabled(False)
+        set_tip(self.store_button, not_stored or STORING)
         self._filter()
         self._refresh_banner(station, staged)
         if self.pages.currentWidget() is self.review and station is not None:
@@ -175,9 +185,7 @@ class ParametersPanel(QWidget):
         )
         self._save.setToolTip("Save what the robot holds as a .toml file")
         self.store_button = QPushButton("Store to flash …")
-        self.store_button.setToolTip(
-            "Make a device keep its parameters when its power goes; a step of its own"
-        )
+        set_tip(self.store_button, STORING)
         grid = QGridLayout()
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)

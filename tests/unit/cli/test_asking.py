@@ -42,6 +42,23 @@ def test_describe_names_what_is_wrong(robot: FakeRobot, capsys: pytest.CaptureFi
     assert "gait.step_length" in text
 
 
+def test_describe_says_who_one_is_and_what_that_one_may_not(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused = {"parameter.write": "anna is a viewer on this robot"}
+    hello = {
+        "protocol": 1,
+        "robot": "exo-fake",
+        "role": "viewer",
+        "boot_id": "b",
+        "identity": "anna",
+        "refused": refused,
+    }
+    robot.overrides["hello"] = lambda _params: hello
+    assert run(robot, "describe") == 0
+    assert printed(capsys).startswith("you are anna, as viewer; not for you: parameter.write\n")
+
+
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [

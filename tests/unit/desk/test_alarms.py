@@ -106,6 +106,11 @@ def _never_reached(bench: Bench) -> None:
     bench.station.take([lost])
 
 
+def _another(bench: Bench) -> None:
+    why = "ANOTHER ROBOT ANSWERS AT 127.0.0.1:1, or somebody in between"
+    bench.station.take([LinkChanged(ConnectionState.WAITING, why, time.monotonic_ns(), is_another=True)])
+
+
 def _no_data(bench: Bench) -> None:
     bench.desk.stations.clear()
     bench.add("exo-03").take([described()])
@@ -121,6 +126,7 @@ def _stale(bench: Bench) -> None:
     [
         (_link_lost, Kind.NO_LINK),
         (_never_reached, Kind.NEVER_REACHED),
+        (_another, Kind.ANOTHER),
         (_no_data, Kind.NO_DATA),
         (_stale, Kind.STALE),
     ],

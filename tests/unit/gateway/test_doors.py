@@ -5,6 +5,9 @@ import os
 import pwd
 import socket
 import stat
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -157,6 +160,42 @@ def test_a_stranger_s_uid_is_told_so_and_may_not_even_stop(
             assert client.line() is None
     with LocalClient(local) as client:
         assert client.call("robot.describe")["stop"]["held"] is False
+
+
+AS_A_STRANGER = """
+import os, socket, sys
+path, line = sys.argv[1:]
+os.setgroups([]); os.setgid(65534); os.setuid(65534)
+with socket.socket(socket.AF_UNIX) as made:
+    made.settimeout(30)
+    made.connect(path)
+    try:
+        made.sendall(line.encode())
+    except OSError:
+        pass
+    try:
+        while more := made.recv(4096):
+            sys.stdout.write(more.decode())
+    except ConnectionResetError:
+        pass
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can be somebody else")
+def test_the_kernel_tells_a_stranger_s_uid_and_nothing_of_theirs_is_done(
+    bench: Bench, tmp_path: Path
+) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)  # so that everybody may knock
+        local = Path(folder) / "s"
+        with serving(config(tmp_path), local=listen_locally(local)):
+            stop = (STOP % b"from a stranger").decode()
+            command = [sys.executable, "-P", "-c", AS_A_STRANGER, str(local), stop]
+            ran = subprocess.run(command, capture_output=True, text=True, check=True, timeout=WAIT_S)
+            assert "uid 65534 is a user whom this robot does not know" in ran.stdout
+            assert '"result"' not in ran.stdout
+            with LocalClient(local) as client:
+                assert client.call("robot.describe")["stop"]["held"] is False
 
 
 def test_who_is_in_the_table_is_let_in_and_goes_when_taken_out(

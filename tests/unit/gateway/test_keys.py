@@ -19,7 +19,7 @@ from gateway.access.known import known_in
 from gateway.certificates import KeyProblem
 from gateway.connections import handshakes
 from gateway.connections.listeners import listen
-from gateway.connections.tls import RECORD, context_of
+from gateway.connections.tls import RECORD, TlsStream, context_of
 from gateway.daemon import Daemon
 from gateway.key_making import make
 from gateway.wire.limits import HANDSHAKES, HANDSHAKES_WAITING
@@ -228,6 +228,28 @@ def test_strangers_by_the_hundred_keep_nobody_s_stop_out(come: Connect, address:
             one.join()
 
 
+def test_a_stop_on_an_open_link_does_not_wait_for_handshakes(
+    come: Connect, address: tuple[str, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their thread hangs in one, as under any load of strangers; 200 more wait, and beyond those none."""
+    operator, hangs, go_on = come("operator"), threading.Event(), threading.Event()
+    assert operator.call("clock.read")
+
+    def hang(_stream: object) -> None:
+        hangs.set()
+        assert go_on.wait(WAIT_S)
+        raise ConnectionResetError
+
+    monkeypatch.setattr(TlsStream, "handshake", hang)
+    with ExitStack() as open_:
+        open_.callback(go_on.set)
+        for _ in range(200):
+            open_.enter_context(raw(address)).sendall(b"\x16\x03\x01\x02\x00\x01")
+        assert hangs.wait(WAIT_S)
+        assert operator.call("robot.stop", reason="now")["held"] is True
+        assert not go_on.is_set()
+
+
 # What TLS does to lines
 
 
@@ -347,3 +369,57 @@ def test_a_gateway_that_rests_wakes_for_who_has_a_key_and_rests_again(tmp_path: 
         with socket.create_connection(address) as bare:
             bare.sendall(b"{")
             assert said(bare) == b""
+
+
+# What the journal says of it
+
+
+def test_the_journal_says_who_is_let_in_and_who_no_more(come: Connect, tmp_path: Path) -> None:
+    client = come("maintainer")
+
+    def told() -> list[tuple[str, ...]]:
+        entries = client.call("journal.tail", n=50)["entries"]
+        return [(one["who"], one["what"], one["whom"], one["role"]) for one in entries if "whom" in one]
+
+    assert set(told()) == {("gateway", "let in", f"client {name}", name) for name in keys.PEOPLE}
+    shutil.copy(keys.pair("anna")[1], tmp_path / "clients" / "anna.crt")
+    (tmp_path / "clients" / "viewer.crt").unlink()
+    table = (tmp_path / "access.toml").read_text("utf-8")
+    (tmp_path / "access.toml").write_text(table.replace('operator = "operator"', 'operator = "viewer"'))
+    expected = {
+        ("gateway", "let in", "client anna", "viewer"),
+        ("gateway", "let in no more", "client viewer", "viewer"),
+        ("gateway", "role changed from operator", "client operator", "viewer"),
+    }
+    until(lambda: set(told()) >= expected, "it is told")
+    entries = client.call("journal.tail", n=50)["entries"]
+    assert [one["key"] for one in entries if one.get("whom") == "client anna"] == [keys.pin("anna")]
+
+
+def test_what_changed_while_no_gateway_ran_is_told_once(bench: Bench, tmp_path: Path) -> None:
+    keyed(tmp_path)
+    for times in range(3):
+        with serving(config(tmp_path)) as address, KeyedClient(address, "maintainer") as client:
+            entries = client.call("journal.tail", n=50)["entries"]
+            told = [(one["what"], one["whom"]) for one in entries if "whom" in one]
+        assert told.count(("let in", "client operator")) == 1
+        assert told.count(("let in no more", "client operator")) == (times > 0)
+        (tmp_path / "clients" / "operator.crt").unlink(missing_ok=True)
+
+
+def test_a_robot_that_knows_nobody_has_nothing_to_tell(bench: Bench, tmp_path: Path) -> None:
+    with serving(config(tmp_path)) as address, Client(address) as client:
+        assert not any("whom" in one for one in client.call("journal.tail", n=50)["entries"])
+    assert not list(tmp_path.rglob("admitted.json"))
+
+
+def test_what_cannot_be_seen_keeps_no_module_from_starting(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuse(_folder: AccessFolder) -> list[Path]:
+        raise PermissionError("no right")
+
+    monkeypatch.setattr(AccessFolder, "files", refuse)
+    with serving(config(tmp_path)) as address, Client(address) as client:
+        assert client.call("robot.stop", reason="now")["held"] is True
+    assert "who is let in cannot be seen" in caplog.text

@@ -2,6 +2,8 @@
 
 import io
 import itertools
+import os
+import shlex
 import shutil
 import socket
 import ssl
@@ -17,13 +19,15 @@ from gateway.access import changes
 from gateway.access.folder import AccessFolder
 from gateway.access.known import known_in
 from gateway.access.pairing import Candidate, Pairing, PairingEnded
-from gateway.certificates import KeyProblem, der_of, grouped
+from gateway.certificates import KeyProblem, der_of, fingerprint, grouped
+from gateway.cli import qr_code
+from gateway.cli.keys import _show as show
 from gateway.client import Address, ClientError, NotPaired, Unreachable, WrongRobot
 from gateway.client import pairing as desk
 from gateway.client.keys import keys_folder, pin_of, server_file
 from gateway.connections.listeners import listen
 from gateway.main import main
-from gateway.wire.pairing import DESK, TRIES, Offer, Reply, new_code, normal, proof
+from gateway.wire.pairing import DESK, TRIES, Offer, Reply, link, new_code, normal, proof
 from gateway.wire.role import Role
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
@@ -120,6 +124,29 @@ def test_a_code_is_for_one_desk_and_replayed_it_is_worth_nothing(shown: Shown) -
     assert "not the code" in str(again._judged(offer, der_of(pem.encode())))
 
 
+def said_to(where: Address, line: bytes) -> Reply:
+    """What the robot answers to that line, over TLS."""
+    with keys.raw((where.host, where.port)) as bare, keys.context(None).wrap_socket(bare) as tls:
+        tls.sendall(line + b"\n")
+        return msgspec.json.decode(tls.makefile("rb").readline(), type=Reply)
+
+
+def test_what_was_said_once_is_refused_when_it_is_said_again(shown: Shown) -> None:
+    pem = keys.pair("anna")[1].read_text("ascii")
+    line = msgspec.json.encode(Offer(pem, "anna", proof(DESK, CODE, shown.own, keys.pin("anna"))))
+    waiting = shown.wait()
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(said_to, shown.where, line)
+        shown.take(waiting)
+        assert first.result().name == "anna"
+    again = Pairing(shown.folder, shown.listener, new_code(), shown.own, clock=lambda: shown.time_s)
+    with ThreadPoolExecutor(1) as pool:
+        second = pool.submit(again.wait)
+        assert "not the code" in str(said_to(shown.where, line).problem)
+        shown.time_s = 1e9
+        assert isinstance(second.exception(), PairingEnded)
+
+
 def test_of_two_at_once_one_is_paired(
     shown: Shown, asked: Callable[[str], "Future[desk.Paired]"], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -200,6 +227,47 @@ def test_where_nobody_pairs_that_is_said(tmp_path: Path, monkeypatch: pytest.Mon
 def test_what_is_no_code_is_refused_before_it_is_sent(code: str) -> None:
     with pytest.raises(ValueError, match="16 letters and digits"):
         normal(code)
+
+
+def test_a_desk_that_gives_up_waits_no_longer(shown: Shown) -> None:
+    waiting, given_up = shown.wait(), threading.Event()
+    with ThreadPoolExecutor(1) as pool:
+        paired = pool.submit(desk.pair, shown.where, CODE, given_up=given_up.is_set)
+        candidate = waiting.result()  # nobody confirms it
+        given_up.set()
+        with pytest.raises(NotPaired, match="given up here"):
+            paired.result()
+    candidate.answer(Reply(problem="too late"))
+
+
+@pytest.mark.parametrize(
+    ("typed", "where"),
+    [
+        (("192.0.2.7", CODE), "192.0.2.7:7421"),
+        (("192.0.2.7:7420", CODE), "192.0.2.7:7421"),
+        (("192.0.2.7:9", CODE), "192.0.2.7:9"),
+        ((f" gwrms://192.0.2.7:7421/{CODE}\n",), "192.0.2.7:7421"),
+        ((link("[fe80::1]:7421", CODE),), "[fe80::1]:7421"),
+    ],
+)
+def test_where_and_code_are_typed_or_come_as_one_link(typed: tuple[str, ...], where: str) -> None:
+    found, code = desk.typed(*typed)
+    assert (str(found), code) == (where, normal(CODE))
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        ("192.0.2.7",),
+        ("/run/gwrms.sock", CODE),
+        ("gwrms://192.0.2.7:7421",),
+        ("gwrms:///x",),
+        ("https://x/y",),
+    ],
+)
+def test_what_is_neither_is_refused_before_anything_is_sent(typed: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match=r"HOST:PORT|16 letters"):
+        desk.typed(*typed)
 
 
 # What is written
@@ -317,7 +385,7 @@ def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(
     with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
         assert robot.stdout is not None
         typed = next(line for line in robot.stdout if line.startswith("  gwrms pair")).split()[1:]
-        assert main(typed) == 0
+        assert main(["pair", link(*typed[1:])]) == 0
         assert "anna is let in from now on, as operator." in robot.stdout.read()
         assert robot.wait() == 0
     assert "Paired with exo-01: it calls this desk anna, as operator." in capsys.readouterr().out
@@ -341,3 +409,102 @@ def test_without_a_terminal_nobody_is_asked_and_nobody_let_in(
     assert main(["keys", "pair", str(file), "--port", "0"]) == 1
     assert "there is no terminal to ask on" in capsys.readouterr().err
     assert not (tmp_path / "keys").exists()
+
+
+class Terminal(io.StringIO):
+    """A terminal with some letters."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_shows_the_link_for_a_camera_and_a_pipe_does_not(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout", terminal := Terminal())
+    show(shown.listener, CODE, shown.own)
+    lines = [line for line in terminal.getvalue().splitlines() if set(line) <= set(" █▀▄") and line]
+    assert lines == qr_code.lines(link(str(shown.where), CODE))
+    for letters, is_terminal in (("ascii", True), ("utf-8", False)):
+        monkeypatch.setattr(Terminal, "encoding", letters)
+        monkeypatch.setattr(Terminal, "isatty", lambda _self, is_terminal=is_terminal: is_terminal)
+        monkeypatch.setattr("sys.stdout", terminal := Terminal())
+        show(shown.listener, CODE, shown.own)
+        assert f"gwrms pair {shown.where} {CODE}" in terminal.getvalue()
+        assert "█" not in terminal.getvalue()
+
+
+# Further robots, over ssh
+
+
+SSH = """#!/bin/sh
+# Called as: ssh -T -- HOST COMMAND
+case "$3" in
+*gone) echo "ssh: connect to host $3 port 22: No route to host" >&2; exit 255 ;;
+esac
+echo "Welcome to $3"
+exec sh -c "$4"
+"""
+
+
+@pytest.fixture
+def by_ssh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A robot with keys that this desk logs in to; its file."""
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    (programs / "ssh").write_text(SSH)
+    (programs / "ssh").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    robot = tmp_path / "a robot"
+    robot.mkdir()
+    keyed(robot, {})
+    (robot / "robot.toml").write_text('[robot]\nname = "exo-02"\n', encoding="utf-8")
+    return robot / "robot.toml"
+
+
+def push(file: Path, *more: str) -> int:
+    remote = shlex.join(processes.GATEWAY[:-1])
+    return main(["keys", "push", *more, "--config", str(file), "--remote", remote])
+
+
+def test_a_desk_is_let_in_on_a_further_robot_and_pins_it(by_ssh: Path) -> None:
+    assert push(by_ssh, "root@192.0.2.8", "--role", "operator", "--name", "anna") == 0
+    (who,) = known_in(AccessFolder(by_ssh.parent, {})).by_key.values()
+    own = der_of((keys_folder() / "desk.crt").read_bytes())
+    assert (who.name, who.role, who.fingerprint) == ("anna", Role.OPERATOR, fingerprint(own))
+    assert pin_of(Address("192.0.2.8", 7420)) == keys.pin(keys.ROBOT)
+
+
+def test_of_many_robots_those_that_fail_are_named_and_the_others_done(
+    by_ssh: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    somebody = str(keys.pair("bert")[1])
+    assert push(by_ssh, "exo-gone", "exo-02", "exo-02", "--certificate", somebody, "--role", "viewer") == 1
+    said = capsys.readouterr()
+    assert "exo-02: exo-02 lets bert in from now on, as viewer." in said.out
+    assert "exo-gone: ssh: connect to host" in said.err
+    assert "bert is known already" in said.err
+    assert not server_file().exists(), "another's robot is not pinned here"
+
+
+@pytest.mark.parametrize(
+    "more", [["-oProxyCommand=x"], ["exo-02", "--name", "../x"], ["exo-02", "--role", "root"]]
+)
+def test_what_is_no_host_name_or_role_reaches_no_ssh(by_ssh: Path, more: list[str]) -> None:
+    with pytest.raises(SystemExit):
+        push(by_ssh, "--role", "viewer", "--", *more[:1]) if more[0][0] == "-" else push(
+            by_ssh, "--role", "viewer", *more
+        )
+
+
+def test_what_is_no_certificate_and_a_robot_without_keys_let_nobody_in(
+    by_ssh: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert push(by_ssh, "exo-02", "--certificate", str(by_ssh), "--role", "viewer") == 1
+    shutil.rmtree(by_ssh.parent / "keys")
+    assert push(by_ssh, "exo-02", "--certificate", str(keys.pair("bert")[1]), "--role", "viewer") == 1
+    assert "has no keys yet" in capsys.readouterr().err
+    assert known_in(AccessFolder(by_ssh.parent, {})).by_key == {}

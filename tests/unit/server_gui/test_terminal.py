@@ -16,7 +16,7 @@ from gateway.client import Batch, ConnectionState, LinkLost
 from gateway.wire.component import ChannelInfo, ComponentInfo, QualityInfo, Snapshot
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Written
 from gateway.wire.resource import MemoryUse
-from gateway.wire.robot import Clock, Description, GuardInfo
+from gateway.wire.robot import Clock, Description, GuardInfo, Hello
 from gateway.wire.stop import Reset, StopInfo, Stopped
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, LinkChanged, Looked, Telemetry
@@ -458,3 +458,11 @@ def test_dashboard_shows_how_the_wearer_walks(
 
 def _feed(station: Station, columns: dict[str, list[float | None]]) -> None:
     station.take([Telemetry(1, Batch([0], columns, 0, 0, 0, 1, 0), None)])
+
+
+@pytest.mark.parametrize("size", [(118, 27), (80, 24)])
+def test_the_dashboard_says_who_one_is(size: tuple[int, int]) -> None:
+    station = a_station()
+    assert " as " not in screen(station, size=size).splitlines()[1]
+    station.robot.hello = Hello(1, "exo-01", "viewer", "b", identity="anna")
+    assert "anna, as viewer" in screen(station, size=size)
