@@ -5,10 +5,16 @@ import logging
 import signal
 import socket
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
+from gateway.access.folder import AccessFolder
+from gateway.access.identity import ANYBODY
 from gateway.config.robot import RobotConfig
 from gateway.connections.classic import ClassicPort
+from gateway.connections.doors import check_classic
+from gateway.connections.entrance import Entrance
 from gateway.connections.intake import Inlet, Intake
 from gateway.connections.places import Places
 from gateway.connections.session import Session
@@ -19,10 +25,18 @@ from gateway.registry import MODULES, Spec
 from gateway.service import Service
 from gateway.wire import framing
 
+if TYPE_CHECKING:
+    from gateway.access.known import Known
+
 log = logging.getLogger(__name__)
 
 MUCH_BYTES = 64 * 1024  # that a client has sent or got
 TIDY_S = 5.0  # after it has gone
+WATCH_S = 0.2  # between looks whether those who are connected are still known
+
+_REVOKED = framing.refuse(
+    framing.Kind.NOT_ALLOWED, "what you may do on this robot has changed, so this connection ends"
+)
 
 
 class Daemon:
@@ -34,12 +48,18 @@ class Daemon:
         listener: socket.socket,
         specs: Mapping[str, Spec] = MODULES,
         classic: socket.socket | None = None,
+        local: socket.socket | None = None,
         *,
         ends_idle: bool = False,
     ) -> None:
-        """`classic` is where the paper's own exchange is served.
+        """`classic` is where the paper's own exchange is served, `local` a Unix socket.
 
         With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`.
+
+        Raises:
+            DoorProblem: one of these sockets must not be served.
+            KeyProblem: the robot's key cannot be used.
+
         """
         self._config = config
         self._listener = listener
@@ -53,9 +73,15 @@ class Daemon:
         self._tidying = False
         self._ends_idle = ends_idle
         self._idle: Timer | None = None
-        self._intake = Intake(self._loop, listener, self._open, lambda: self._service.registry.stop_now)
+        self._sockets = [listener] if local is None else [listener, local]
+        folder = AccessFolder(config.access)
+        self._entrance = Entrance(self._sockets, folder, self._complain, lambda: self._loop.post(self._left))
+        self._known: Known | None = None  # of the last look, while somebody is there by a key or account
+        doors, registry = self._entrance.doors, self._service.registry
+        self._intake = Intake(self._loop, doors, self._open, lambda: registry.stop_now)
         self._classic: ClassicPort | None = None
         if classic is not None:
+            check_classic(classic)
             self._classic = ClassicPort(
                 self._loop, classic, self._service.use_resource, self._service.registry.leave, self._left
             )
@@ -81,6 +107,7 @@ class Daemon:
 
         Where it has ended because it was idle, the sockets stay open: somebody may just be coming.
         """
+        self._entrance.start(self._intake.admit)
         self._intake.start()
         self._loop.post(self._service.resume)
         self._loop.post(ready)
@@ -88,10 +115,12 @@ class Daemon:
         try:
             self._loop.run()
         finally:
+            self._intake.shut()  # nobody comes to the entrance any more …
+            self._entrance.end()  # … and nobody from there to the intake
             self._intake.end()
             self._service.close()
             if self._told:
-                self._listener.close()
+                self._give_back()
             if self._classic is not None:
                 self._classic.close(given_back=self._told)
             self._loop.close()
@@ -135,6 +164,41 @@ class Daemon:
             opened.on_close(self._left)
             opened.on_close(lambda: self._tidy_after(opened))
             self._service.opened(opened)
+            self._watch_over(opened)
+
+    def _give_back(self) -> None:
+        for one in self._sockets:
+            if one.family == socket.AF_UNIX:
+                with contextlib.suppress(OSError):
+                    Path(one.getsockname()).unlink()
+            one.close()
+
+    def _complain(self, address: str, what: str) -> None:
+        """From any thread."""
+        self._loop.post(lambda: self._sharing.complain(address, what))
+
+    def _watch_over(self, session: Session) -> None:
+        """Whoever is there by a key or account goes as soon as that is taken away."""
+        if session.identity is ANYBODY:
+            return
+        known = self._entrance.known()
+        if not known.knows(session.identity):
+            session.close(_REVOKED)
+        elif self._known is None:
+            self._known = known
+            self._loop.call_later(WATCH_S, self._look_who_is_known)
+
+    def _look_who_is_known(self) -> None:
+        by_name = [one for one in self._places.taken if one.identity is not ANYBODY]
+        if not by_name:
+            self._known = None
+            return
+        before, known = self._known, self._entrance.known()
+        for session in by_name if known is not before else ():
+            if not known.knows(session.identity):
+                session.close(_REVOKED)
+        self._known = known
+        self._loop.call_later(WATCH_S, self._look_who_is_known)
 
     def _tidy_after(self, gone: Session) -> None:
         """Where somebody who moved much has gone, the system soon gets back what that took."""
@@ -164,7 +228,9 @@ class Daemon:
         """Nobody is there, nothing runs, and nothing is left that must."""
         if not self._ends_idle or self._ending or self._idle is not None or self._places.taken:
             return False
-        return not self._service.needed and not (self._classic is not None and self._classic.busy)
+        return not (self._entrance.busy or self._service.needed) and not (
+            self._classic is not None and self._classic.busy
+        )
 
     def _look_whether_idle(self) -> None:
         """End where it is idle; before that nobody more is accepted, because whoever was is to be served."""

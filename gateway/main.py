@@ -16,6 +16,8 @@ from gateway import __version__
 COMMANDS: dict[str, tuple[str, str]] = {
     "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
     "install-service": ("gateway.cli.install_service:main", "systemd units for a robot's file"),
+    "keys": ("gateway.cli.keys:main", "on the robot: who is let in, and as what"),
+    "pair": ("gateway.cli.pair:main", "let a robot know this desk, and this desk the robot"),
     "check": ("gateway.cli.check:main", "what is wrong with a robot's or server's file, or a scenario"),
     "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
     "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),

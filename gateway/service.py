@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING, Protocol, cast
 
 from gateway import __version__
+from gateway.access import roles
 from gateway.always_on import Standing
 from gateway.config.robot import RobotConfig
 from gateway.connections.session import Answer, Session
@@ -46,8 +47,6 @@ if TYPE_CHECKING:
     from gateway.modules.resource.module import ResourceModule
 
 log = logging.getLogger(__name__)
-
-CLIENT_ROLE = "operator"  # what every client is, as long as no credentials are configured
 
 MAY_MOVE = ("component", "status")  # who looks at these may have to stop the robot
 
@@ -135,7 +134,9 @@ class Service:
         method = METHODS.get(request.method)
         if method is None:
             raise framing.unknown_method(request.method)
+        roles.check(session.identity, method)
         params = framing.decode_params(request.params, method.params)
+        roles.check_params(session.identity, method, params)
         if method.module is None:
             return self.handlers.answer(method, session, params)
         if method is ROBOT_STOP and self.registry.running(method.module) is None:
@@ -173,9 +174,12 @@ class Service:
                 f"this connection has called itself {session.named!r} already; keep to it",
             )
         session.named = params.client
-        session.who = f"{params.client} ({session.peer})"
-        robot = self._config.robot.name
-        return Hello(framing.PROTOCOL, robot, CLIENT_ROLE, self._boot_id, __version__)
+        who, robot = session.identity, self._config.robot.name
+        by_name = "" if who.name is None else f"{who.name}, "
+        session.who = f"{by_name}{params.client} ({session.peer})"
+        return Hello(
+            framing.PROTOCOL, robot, who.role, self._boot_id, __version__, who.name, roles.refused(who)
+        )
 
     def _read_clock(self, _session: Session, _params: Params) -> Clock:
         return self._clock()

@@ -34,6 +34,7 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     sync_period_s: Seconds | None = None  # master only
     node_id: NodeId | None = None  # our own, for our heartbeat
     heartbeat_s: Seconds | None = None  # how often we send it; master only
+    trusted_network: bool = False  # of an interface over a network: whoever is on it may command the drives
     more: dict[str, Any] = {}
 
     @classmethod
@@ -43,6 +44,19 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         Raises `msgspec.ValidationError`, which names the key and what is allowed.
         """
         return msgspec.convert(cls.parted(table), cls)
+
+    @property
+    def network(self) -> str | None:
+        """Beyond this computer, in words: whoever is on it could send frames; None: there is none.
+
+        A multicast that goes no further than this computer (`hop_limit = 0`) has none.
+        """
+        if self.interface == "socketcand":
+            host = str(self.more.get("host", ""))
+            return None if host in ("", "localhost", "::1") or host.startswith("127.") else host
+        if self.interface == "udp_multicast" and self.more.get("hop_limit") != 0:
+            return f"the multicast group {self.channel}"
+        return None
 
     @classmethod
     def parted(cls, table: Mapping[str, Any]) -> dict[str, Any]:

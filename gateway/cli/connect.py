@@ -41,7 +41,7 @@ def add_robot(made: argparse.ArgumentParser) -> None:
     made.add_argument(
         "--robot",
         metavar="HOST:PORT",
-        type=_address,
+        type=address,
         default=Address(),
         help=f"the gateway to ask (default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
@@ -150,7 +150,7 @@ def parameter_names(description: Description) -> list[str]:
     return [one.name for one in parameters] + [f"{one.component}.{one.object}" for one in parameters]
 
 
-def _address(text: str) -> Address:
+def address(text: str) -> Address:
     try:
         return Address.parse(text)
     except BadAddress as error:

@@ -6,6 +6,7 @@ import gc
 import logging
 import os
 import signal
+import socket
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +14,9 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from gateway import config
-from gateway.connections.listeners import Listeners, inherited, listen, rest
+from gateway.certificates import KeyProblem
+from gateway.connections.doors import DoorProblem, is_loopback
+from gateway.connections.listeners import Listeners, default_socket, inherited, listen, listen_locally, rest
 from gateway.daemon import Daemon
 from gateway.process import notify
 from gateway.process.memory import share_heap
@@ -45,8 +48,8 @@ SIGINT and SIGTERM end it cleanly. A stop stays held, also over its end and rest
 Where [guard] heartbeat_ms has armed the drives, they are freed first, and the end is refused
 while one is enabled: gwrms stop, then end it.
 
-Anybody who can connect can stop the robot and change its parameters: listen on
-127.0.0.1, or on a network of which you know every computer.
+Without keys it is served on 127.0.0.1 and its Unix socket only. `gwrms keys pair CONFIG` makes
+them: from then on every TCP connection is TLS, and lets in only whose key is known (gwrms docs pair).
 
 exit status: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
 """
@@ -88,7 +91,14 @@ def main(arguments: Sequence[str]) -> int:
     share_heap()
     sockets = _listeners(robot, handed)
     by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
-    daemon = Daemon(robot, sockets.port, classic=sockets.classic, ends_idle=watched is None)
+    idle = watched is None
+    try:
+        daemon = Daemon(robot, sockets.port, classic=sockets.classic, local=sockets.local, ends_idle=idle)
+    except (DoorProblem, KeyProblem) as error:
+        if handed is None:
+            sockets.close()
+            raise
+        return _refuse(handed, error)
     if watched is not None:
         daemon.repeat(watched / 2, lambda: notify.tell("WATCHDOG=1"))
     gc.freeze()  # what was loaded so far lives as long as the process
@@ -131,11 +141,30 @@ def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners
         except OSError:
             port.close()
             raise
-    return Listeners(port, classic, handed is not None and handed.woken)
+    local = _local(robot) if handed is None else handed.local
+    return Listeners(port, classic, local, woken=handed is not None and handed.woken)
 
 
-def _refuse(handed: Listeners, error: config.ConfigError) -> int:
-    """Tell everybody who has come why they are not served; where it was woken, rest again."""
+def _local(robot: config.RobotConfig) -> socket.socket | None:
+    """The Unix socket that the robot's file names, or one in the folder that we are given for such."""
+    given = robot.gateway.socket
+    folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
+    if given == "" or (given is None and not folder):
+        return None
+    if given is not None:
+        return listen_locally(robot.path.parent / given)
+    try:
+        return listen_locally(default_socket(Path(folder or ""), robot.robot.name))
+    except OSError as error:  # nobody has asked for it
+        log.warning("%s", error)
+        return None
+
+
+def _refuse(handed: Listeners, error: Exception) -> int:
+    """Tell everybody who has come from this computer why they are not served; where it was woken, rest again.
+
+    Whoever comes from elsewhere is told nothing: nobody knows who that is.
+    """
     log.error("%s", error)
     line = framing.encode_error(None, framing.refuse(framing.Kind.UNAVAILABLE, str(error)))
     for listener in handed.all:
@@ -144,7 +173,8 @@ def _refuse(handed: Listeners, error: config.ConfigError) -> int:
             while True:
                 connection, _ = listener.accept()
                 with connection, contextlib.suppress(OSError):
-                    connection.send(line)
+                    if listener.family == socket.AF_UNIX or is_loopback(listener.getsockname()):
+                        connection.send(line)
     if handed.woken:
         rest(handed)
     return 1

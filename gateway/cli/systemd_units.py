@@ -7,17 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from gateway.access.folder import AccessFolder
 from gateway.config.robot import RobotConfig
 from gateway.connections.listeners import BACKLOG, CLASSIC, PORT
 
 MARK = "# Written by gwrms install-service; put changes into `systemctl edit`, or write it again."
 STATE = "gwrms"  # under /var/lib
+RUNTIME = "/run/gwrms"  # where its Unix socket is
 LEAST_LINGER_S = 2.0  # a gateway that ends sooner may be started more often than it is allowed to
 MOST_STARTS = "StartLimitBurst=30"
 
 _WATCHED = "Restart=on-failure\nRestartSec=1\nWatchdogSec=10\nCPUWeight=500"
 _CALLED = "Restart=on-abnormal\nRestartSec=1\nCPUWeight=20"  # with a wrong file it waits for the next client
-_BOUNDS = "MemoryMax=256M\nTasksMax=64\nLimitNOFILE=8192\nEnvironment=MALLOC_ARENA_MAX=1"
+_BOUNDS = "MemoryMax=256M\nTasksMax=64\nLimitNOFILE=8192\nLimitCORE=0\nEnvironment=MALLOC_ARENA_MAX=1"
 _URGENT = "LimitRTPRIO=30\nLimitMEMLOCK=infinity"  # for the threads that stop the drives
 
 # What a gateway can do without. It reads other processes and serial ports, and speaks CAN and TCP.
@@ -72,7 +74,7 @@ class Service:
             _fits(_HOST, config.gateway.host, f"host in {config.path}", "an address without a zone")
         if self.user is not None:
             _fits(_ACCOUNT, self.user, "the account", "letters, digits, _ . and -, at most 32")
-        for path in (Path(sys.executable), config.path.absolute(), self._records):
+        for path in (Path(sys.executable), config.path.absolute(), self._records, config.access.absolute()):
             _readable(str(path), "the path")
         _readable(" ".join(config.robot.name.split()), f"name in {config.path}")
 
@@ -113,8 +115,21 @@ class Service:
             f"ExecStart={self._command}",
             _WATCHED if self.at_boot else _CALLED,
         ]
-        lines += [_BOUNDS, _URGENT, _HARDENED_USER if self.of_user else f"{self._account}\n{_HARDENED}"]
+        lines += [
+            *self._keys,
+            _BOUNDS,
+            _URGENT,
+            _HARDENED_USER if self.of_user else f"{self._account}\n{_HARDENED}",
+        ]
         return "\n".join(lines) + "\n" + (self._wanted if self.at_boot else "")
+
+    @property
+    def _keys(self) -> list[str]:
+        """The robot's own, which the account that it runs as could not read."""
+        folder = AccessFolder(self.config.access.absolute(), {})
+        if self.of_user or not folder.has_keys:
+            return []
+        return [f"LoadCredential={one.name}:{_escaped(one)}" for one in (folder.key, folder.certificate)]
 
     @property
     def _gateway(self) -> str:
@@ -127,9 +142,10 @@ class Service:
     def _socket(self, port: int, name: str) -> str:
         host = self.config.gateway.host
         address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        local = f"ListenStream={RUNTIME}/{self.name}.sock\n" if name == PORT and not self.of_user else ""
         return (
-            f"{MARK}\n[Unit]\nDescription=Port {port} of the {self._gateway}\n\n"
-            f"[Socket]\nListenStream={address}\nFileDescriptorName={name}\nService={self.name}.service\n"
+            f"{MARK}\n[Unit]\nDescription=Port {port} of the {self._gateway}\n\n[Socket]\n"
+            f"ListenStream={address}\n{local}FileDescriptorName={name}\nService={self.name}.service\n"
             f"Backlog={BACKLOG}\nFreeBind=yes\n\n[Install]\nWantedBy=sockets.target\n"
         )
 
@@ -158,6 +174,8 @@ class Service:
     def _account(self) -> str:
         who = "DynamicUser=yes" if self.user is None else f"User={self.user}"
         lines = [who, "SupplementaryGroups=dialout", f"StateDirectory={STATE}", "StateDirectoryMode=0750"]
+        if self.at_boot:  # else systemd itself listens there
+            lines.append("RuntimeDirectory=gwrms\nRuntimeDirectoryMode=0755")
         if self.config.gateway.records is not None:
             lines.append(f"ReadWritePaths={_quoted(f'-{self._records}')}")
         return "\n".join(lines)

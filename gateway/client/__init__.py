@@ -14,9 +14,11 @@ from gateway.client.errors import (
     ClientError,
     LinkLost,
     NotConnected,
+    NotPaired,
     ProtocolError,
     RemoteError,
     Unreachable,
+    WrongRobot,
 )
 from gateway.client.link import ConnectionState, LinkSettings
 from gateway.client.subscription import Batch, StreamCounters, Subscription
@@ -33,10 +35,12 @@ __all__ = [
     "LinkLost",
     "LinkSettings",
     "NotConnected",
+    "NotPaired",
     "ProtocolError",
     "RemoteError",
     "Robot",
     "StreamCounters",
     "Subscription",
     "Unreachable",
+    "WrongRobot",
 ]

@@ -1,6 +1,6 @@
-"""Where a robot listens: HOST:PORT as people type it."""
+"""Where a robot listens: HOST:PORT as people type it, or the path of its Unix socket."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gateway.client.errors import BadAddress
 
@@ -10,14 +10,23 @@ DEFAULT_PORT = 7420
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """A robot's TCP address."""
+    """A robot's TCP address, or the path of its Unix socket as `host`.
+
+    `pin` is the SHA-256 of the certificate that it must have; None: the one in the server's file, if any.
+    """
 
     host: str = DEFAULT_HOST
     port: int = DEFAULT_PORT
+    pin: str | None = field(default=None, compare=False)
+
+    @property
+    def path(self) -> str | None:
+        """Of its Unix socket."""
+        return self.host if "/" in self.host else None
 
     @classmethod
     def parse(cls, text: str) -> "Address":
-        """Read `HOST`, `HOST:PORT`, `:PORT` or `[IPV6]:PORT`.
+        """Read `HOST`, `HOST:PORT`, `:PORT` or `[IPV6]:PORT`; what has a slash is a path.
 
         Raises:
             BadAddress: the text is none of these; an empty one may be a variable that was not set.
@@ -25,6 +34,8 @@ class Address:
         """
         if not text:
             raise BadAddress(f"an address is missing; write HOST:PORT, such as {DEFAULT_HOST}:{DEFAULT_PORT}")
+        if "/" in text:
+            return cls(text, 0)
         host, colon, port = text.rpartition(":") if not text.endswith("]") else (text, "", "")
         if not colon:
             host, port = (text, "")
@@ -41,4 +52,6 @@ class Address:
         return cls(host or DEFAULT_HOST, int(port) if port else DEFAULT_PORT)
 
     def __str__(self) -> str:
+        if self.path is not None:
+            return self.path
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"

@@ -1,4 +1,4 @@
-"""One TCP connection: lines out, lines in, each call matched to its answer. No reconnection here."""
+"""One connection: lines out, lines in, each call matched to its answer. No reconnection here."""
 
 import asyncio
 import itertools
@@ -16,10 +16,12 @@ from gateway.client.errors import (
     ClientError,
     LinkLost,
     NotConnected,
+    NotPaired,
     ProtocolError,
     RemoteError,
     Unreachable,
 )
+from gateway.client.keys import check_pin, context_for, pin_of
 from gateway.plain import plain
 from gateway.wire import framing
 
@@ -55,8 +57,9 @@ class Connection(asyncio.Protocol):
     its answer, it does not undo the request. For one event loop only.
     """
 
-    def __init__(self, address: Address, on_notification: OnNotification) -> None:
+    def __init__(self, address: Address, on_notification: OnNotification, pin: str | None = None) -> None:
         self.address = address
+        self._pin = pin
         self.closed: asyncio.Future[ClientError] = asyncio.get_running_loop().create_future()
         self.received_ns = time.monotonic_ns()
         self.received_bytes = 0
@@ -69,24 +72,44 @@ class Connection(asyncio.Protocol):
 
     @classmethod
     async def open(cls, address: Address, on_notification: OnNotification, timeout_s: float) -> Self:
-        """Connect.
+        """Connect; by TLS with this desk's key where the robot is pinned.
 
         Raises:
             Unreachable: nobody listens there, or nobody answers within `timeout_s`.
+            NotPaired, WrongRobot: it is not let in, or would not go in there.
 
         """
-        loop = asyncio.get_running_loop()
+        pin = pin_of(address)
         try:
             async with asyncio.timeout(timeout_s):
-                _, connection = await loop.create_connection(
-                    lambda: cls(address, on_notification), address.host, address.port
-                )
+                connection = await cls._opened(address, on_notification, pin)
         except TimeoutError as error:
             raise Unreachable(
                 f"nothing answers at {address} within {timeout_s:g} s; is the robot on?"
             ) from error
+        except ClientError:
+            raise
         except OSError as error:
+            if pin is not None and not isinstance(error, ConnectionRefusedError):
+                raise Unreachable(
+                    f"{address} is paired, and what answers there ended the handshake ({_reason(error)}): it "
+                    "is another program, or is busy. Nothing was sent"
+                ) from error
             raise Unreachable(f"no gateway at {address} ({_reason(error)}); is it running there?") from error
+        if connection.closed.done():
+            raise connection.closed.result()
+        return connection
+
+    @classmethod
+    async def _opened(cls, address: Address, on_notification: OnNotification, pin: str | None) -> Self:
+        loop = asyncio.get_running_loop()
+        if address.path is not None:
+            _, opened = await loop.create_unix_connection(lambda: cls(address, on_notification), address.path)
+            return opened
+        context = None if pin is None else context_for(address, pin)
+        _, connection = await loop.create_connection(
+            lambda: cls(address, on_notification, pin), address.host, address.port, ssl=context
+        )
         return connection
 
     async def call(
@@ -133,7 +156,14 @@ class Connection(asyncio.Protocol):
             raise TypeError(f"{transport!r} cannot both read and write")
         self._transport = transport
         sock: socket.socket = transport.get_extra_info("socket")
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self.address.path is None:
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._pin is not None:
+            found = transport.get_extra_info("ssl_object")
+            try:
+                check_pin(self.address, self._pin, found and found.getpeercert(binary_form=True))
+            except ClientError as error:
+                self.close(error)
 
     def data_received(self, data: bytes) -> None:
         self.received_ns = time.monotonic_ns()
@@ -145,7 +175,12 @@ class Connection(asyncio.Protocol):
             self.close(error)
 
     def connection_lost(self, exc: Exception | None) -> None:
+        if self._pin is not None and not self.received_bytes:
+            self._end(NotPaired(_not_let_in(self.address)))  # TLS 1.3 tells it only after the handshake
+            return
         why = f" ({_reason(exc)})" if isinstance(exc, OSError) else ""
+        if not self.received_bytes and self.address.path is None:
+            why += "; if it has keys, it is to be paired with first (gwrms pair)"
         self._end(LinkLost(f"{self.address} closed the link{why}"))
 
     # --- matching
@@ -182,8 +217,17 @@ class Connection(asyncio.Protocol):
         for answer, _ in self._waiting.values():
             if not answer.done():
                 answer.set_exception(
-                    LinkLost(f"{reason}; a request was under way, and whether it was done is unknown")
+                    reason  # it was never let in, and nothing was done
+                    if isinstance(reason, NotConnected)
+                    else LinkLost(f"{reason}; a request was under way, and whether it was done is unknown")
                 )
+
+
+def _not_let_in(address: Address) -> str:
+    return (
+        f"{address} does not let this desk in: its key is not known there, or was revoked; "
+        "pair it (gwrms keys pair on the robot, then gwrms pair here)"
+    )
 
 
 def _said(refusal: Refusal) -> str:

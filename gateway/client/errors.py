@@ -4,6 +4,8 @@
     ├── BadAddress         the text is not HOST:PORT (also a ValueError)
     ├── NotConnected       there is no link, so nothing was sent (also a ConnectionError)
     │   └── Unreachable    the link could not be made
+    │       ├── NotPaired  the robot does not know this desk's key, or the desk has none
+    │       └── WrongRobot the robot's certificate is not the one that was paired
     ├── LinkLost           the link dropped before the answer: the outcome is unknown (also a ConnectionError)
     ├── CallTimeout        no answer in time: the outcome is unknown (also a TimeoutError)
     ├── ProtocolError      what answers does not speak this protocol
@@ -30,6 +32,14 @@ class NotConnected(ClientError, ConnectionError):
 
 class Unreachable(NotConnected):
     """The link could not be made."""
+
+
+class NotPaired(Unreachable):
+    """The robot lets in only whom it has paired with."""
+
+
+class WrongRobot(Unreachable):
+    """Another certificate than the pinned one: another robot, or somebody in between."""
 
 
 class LinkLost(ClientError, ConnectionError):

@@ -50,6 +50,12 @@ def _about_buses(config: RobotConfig) -> Iterator[Finding]:
     for name, bus in config.can.items():
         if not is_interface(bus.interface):
             yield Finding(header("can", name), "interface", unknown(bus.interface, interfaces()))
+        if bus.network is not None and not bus.trusted_network:
+            text = (
+                f"goes over {bus.network}, and whoever is on that network can command the drives: write "
+                "trusted_network = true where nobody else is on it, or take a bus of this computer"
+            )
+            yield Finding(header("can", name), "interface", text)
 
 
 def no_bus(config: RobotConfig, where: str, bus: str) -> Iterator[Finding]:

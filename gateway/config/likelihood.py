@@ -2,9 +2,11 @@
 
 import fnmatch
 import math
+import re
 from collections.abc import Iterator, Mapping
 
 from drivers.bus.settings import CanSettings, Role
+from gateway.access.folder import AccessFolder
 from gateway.config.robot import RobotConfig, header
 from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.tables.finding import Finding, meant, warning
@@ -22,6 +24,7 @@ _LARGEST: Mapping[str, tuple[float, str, float]] = {
     "rad/s": (100.0, "°/s", math.pi / 180.0),
 }
 _EVERYWHERE = ("", "0.0.0.0", "::", "*")
+_LOCAL = re.compile(r"localhost$|127\.|::1$")
 
 
 def warnings(config: RobotConfig) -> Iterator[Finding]:
@@ -48,10 +51,11 @@ def _about_names(config: RobotConfig) -> Iterator[Finding]:
 
 
 def _about_host(config: RobotConfig) -> Iterator[Finding]:
-    if config.gateway.host in _EVERYWHERE:
+    host = config.gateway.host
+    if (host in _EVERYWHERE or not _LOCAL.match(host)) and not AccessFolder(config.access).has_keys:
         text = (
-            f"{config.gateway.host!r} lets anybody who reaches this computer stop the robot and change it: "
-            "take 127.0.0.1 and an SSH tunnel, or the address of a network of which you know every computer"
+            f"{host!r} is open to other computers, and this robot has no keys yet: until `gwrms keys pair "
+            f"{config.path}` has made them, it is not served there"
         )
         yield warning("[gateway]", "host", text)
 

@@ -37,6 +37,8 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client.
 
     `records` is the folder of journal, held stop and pending reverts, relative to the robot's file.
+    `access` is the folder of keys, clients and roles, beside the robot's file unless named; `socket` a Unix
+    socket for people on the robot, "" for none.
     `classic_port` serves the process list as the paper's daemon does, for comparison.
     Beyond `max_cpu_percent` of a core, streams send fewer rows. For a client that is slow, `buffer_kb` of its
     streams wait; one that takes nothing for `stuck_s` is dropped.
@@ -47,6 +49,8 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     role: Role = Role.OBSERVER
     linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
     records: str | None = None
+    access: str = "."
+    socket: str | None = None  # None: in the folder that the service manager gives for it, if any
     classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None
     max_cpu_percent: Annotated[float, Meta(gt=0)] | None = None
     buffer_kb: Annotated[int, Meta(ge=64, le=65_536)] = 1024
@@ -164,6 +168,11 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         """The folder of this robot's records."""
         given = self.gateway.records
         return default_folder(self.robot.name) if given is None else self.path.parent / given
+
+    @property
+    def access(self) -> Path:
+        """The folder of keys, clients and roles."""
+        return self.path.parent / self.gateway.access
 
 
 def header(table: str, name: str) -> str:

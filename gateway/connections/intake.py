@@ -8,12 +8,15 @@ import logging
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 from drivers.urgency import make_urgent
+from gateway.access.identity import Identity
 from gateway.connections.acceptor import Acceptor
+from gateway.connections.doors import Stream
 from gateway.connections.sharing import TimeSharing
 from gateway.connections.stop_lines import StopSplitter
 from gateway.process.loop import HANGUP, READ, Loop, Timer
@@ -24,6 +27,8 @@ from gateway.wire.stop import Stopped
 log = logging.getLogger(__name__)
 
 StopNow = Callable[[str, str], Future[Stopped]]  # carries out a stop for whom, and why; from any thread
+Admit = Callable[[Stream, str, Identity], object]  # lets somebody in, with whence they come
+Came = Callable[[socket.socket, Any], object]  # somebody at a door, with their address
 
 RECEIVE_BYTES = 16 * 1024  # at once, so that no other client's stop waits long behind it …
 UNKNOWN_BYTES = 2 * 1024  # … and of whoever has just come, or has cost something just now
@@ -102,8 +107,9 @@ class Inlet:
         self,
         front: Loop,
         loop: Loop,
-        connection: socket.socket,
+        connection: Stream,
         peer: str,
+        identity: Identity,
         stop_now: Callable[[], StopNow | None],
         spent: Callable[[], int],
         finished: "Callable[[Inlet], None]",
@@ -111,7 +117,8 @@ class Inlet:
     ) -> None:
         self.socket = connection
         self.peer = peer
-        self.who = peer  # how the journal calls it
+        self.identity = identity
+        self.who = peer if identity.name is None else f"{identity.name} ({peer})"  # how the journal calls it
         self.received_bytes = self.unanswered = 0
         self.receiver: Callable[[Heard], object] = bool  # in the loop; set before anything is heard
         self._front = front
@@ -131,7 +138,8 @@ class Inlet:
         self._cpu_ns = 0
         self._owed_ns = self._owed_at_ns = 0  # of the thread's time
         self._stops, self._stops_at_s = 0.0, 0.0  # stops that are not forgotten yet
-        _prepare(connection)
+        # Bytes that are decrypted already: no poll tells of them. A bare socket has none.
+        self._pending: Callable[[], int] | None = getattr(connection, "pending", None)
         front.watch(connection, READ, self._on_ready)
 
     # In the loop's thread.
@@ -214,7 +222,18 @@ class Inlet:
             self._receive(UNKNOWN_BYTES)
 
     def _receive(self, most: int) -> bool:
-        """Read once; false where there was nothing."""
+        """Read once; false where there was nothing. What of it is decrypted and left has another turn."""
+        read = self._read(most)
+        if read and self._pending is not None and not self._ended and self._pending():
+            self._front.post(self._look_again)
+        return read
+
+    def _look_again(self) -> None:
+        """At what no poll tells of; who rests or waits for a turn is looked at after that."""
+        if not (self._ended or self._closed or self._waits or self._rests):
+            self._on_ready(READ)
+
+    def _read(self, most: int) -> bool:
         self._spent()  # what was worked for others
         try:
             data = self.socket.recv(most)
@@ -292,6 +311,8 @@ class Inlet:
         self._wake()
         if not (self._ended or self._closed or self._waits):
             self._front.watch(self.socket, READ, self._on_ready)
+            if self._pending is not None and self._pending():
+                self._front.post(self._look_again)
 
     def _hand_over(self, heard: Heard) -> None:
         heard.cpu_ns, self._cpu_ns = self._cpu_ns, 0
@@ -351,16 +372,19 @@ class Inlet:
 
 
 class Intake:
-    """The thread, and the listening socket. `opened` is called in the loop with each client that comes."""
+    """The thread, and the doors. `opened` is called in the loop with each client that is let in."""
 
     def __init__(
         self,
         loop: Loop,
-        listener: socket.socket,
+        doors: Mapping[socket.socket, Came],
         opened: Callable[[Inlet], None],
         stop_now: Callable[[], StopNow | None],
     ) -> None:
-        """`stop_now` gives what carries out a stop at once, from any thread, where there is something."""
+        """`stop_now` gives what carries out a stop at once, from any thread, where there is something.
+
+        `doors` says of each listening socket what is called, in the thread, with who comes there.
+        """
         self._loop = loop
         self._front = Loop()
         self._opened = opened
@@ -368,25 +392,39 @@ class Intake:
         self._inlets: set[Inlet] = set()
         self._spent_ns = 0
         self._pace = Pace(self._front)
-        self._acceptor = Acceptor(self._front, listener, self._accepted)
+        self._acceptors = [
+            Acceptor(self._front, one, partial(self._came, came)) for one, came in doors.items()
+        ]
         self._thread = threading.Thread(target=self._run, name="intake")
 
     def start(self) -> None:
         """Begin to accept."""
-        self._acceptor.start()
+        for one in self._acceptors:
+            one.start()
         self._thread.start()
+
+    def admit(self, connection: Stream, peer: str, identity: Identity) -> None:
+        """Let somebody in; from any thread."""
+        self._front.post(lambda: self._admit(connection, peer, identity))
 
     def listen(self, *, on: bool, then: Callable[[], object] = lambda: None) -> None:
         """Accept, or accept nobody more; `then` runs in the loop once everybody accepted so far is there."""
 
         def change() -> None:
-            (self._acceptor.start if on else self._acceptor.end)()
+            for one in self._acceptors:
+                (one.start if on else one.end)()
             self._loop.post(then)
 
         self._front.post(change)
 
+    def shut(self) -> None:
+        """Accept nobody more, from now on: returns when that is so."""
+        shut = threading.Event()
+        self._front.post(lambda: self._shut(shut))
+        shut.wait()
+
     def end(self) -> None:
-        """Close every connection, and join the thread; the listening socket stays open."""
+        """Close every connection, and join the thread; the listening sockets stay open."""
         self._front.post(self._finish)
         self._thread.join()
         self._front.close()
@@ -395,8 +433,14 @@ class Intake:
         make_urgent()
         self._front.run()
 
+    def _shut(self, shut: threading.Event) -> None:
+        for one in self._acceptors:
+            one.end()
+        shut.set()
+
     def _finish(self) -> None:
-        self._acceptor.end()
+        for one in self._acceptors:
+            one.end()
         for inlet in tuple(self._inlets):
             inlet.finish()
         self._front.stop()
@@ -406,21 +450,29 @@ class Intake:
         before_ns, self._spent_ns = self._spent_ns, time.thread_time_ns()
         return self._spent_ns - before_ns
 
-    def _accepted(self, connection: socket.socket, address: Any) -> None:
-        peer = f"{address[0]}:{address[1]}"
+    @staticmethod
+    def _came(came: Came, connection: socket.socket, address: Any) -> None:
+        _prepare(connection)
+        came(connection, address)
+
+    def _admit(self, connection: Stream, peer: str, identity: Identity) -> None:
         stop_now, spent, finished = self._stop_now, self._spent, self._inlets.discard
-        inlet = Inlet(self._front, self._loop, connection, peer, stop_now, spent, finished, self._pace)
+        inlet = Inlet(
+            self._front, self._loop, connection, peer, identity, stop_now, spent, finished, self._pace
+        )
         self._inlets.add(inlet)
         self._loop.post(lambda: self._opened(inlet))
 
 
 def _prepare(connection: socket.socket) -> None:
     connection.setblocking(False)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     # What waits in the kernel is old when it arrives: keep it short.
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 256 * 1024)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 128 * 1024)
+    if connection.family == socket.AF_UNIX:
+        return
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in _KEEPALIVE.items():
         option = getattr(socket, name, None)  # not every system has every one
         if option is not None:

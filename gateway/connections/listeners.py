@@ -6,15 +6,17 @@ the environment. A gateway that nobody needs hands them to `resting.py` in the s
 
 import fcntl
 import os
+import re
 import socket
 import sys
 from collections.abc import MutableMapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from gateway.process import resting
 
 BACKLOG = 1024  # who comes while it wakes up; where there is no room, TCP tries again a second later
-PORT, CLASSIC = "port", "classic_port"  # how systemd's units name them
+PORT, CLASSIC, LOCAL = "port", "classic_port", "socket"  # how they are named; the last by what it is
 _NUMBER, _PROCESS, _NAMES, _RESTING = "LISTEN_FDS", "LISTEN_PID", "LISTEN_FDNAMES", "GWRMS_RESTING"
 _SPARE = 64  # above every number that sockets are handed over with
 
@@ -25,15 +27,28 @@ class HandoverError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Listeners:
-    """The gateway's own port, and the paper's where it has one; `woken` where it has rested with them."""
+    """The gateway's own port, the paper's and the Unix socket where it has them.
+
+    `woken` where it has rested with them.
+    """
 
     port: socket.socket
     classic: socket.socket | None = None
+    local: socket.socket | None = None
     woken: bool = False
 
     @property
+    def named(self) -> dict[str, socket.socket]:
+        given = {PORT: self.port, CLASSIC: self.classic, LOCAL: self.local}
+        return {name: one for name, one in given.items() if one is not None}
+
+    @property
     def all(self) -> list[socket.socket]:
-        return [self.port] if self.classic is None else [self.port, self.classic]
+        return list(self.named.values())
+
+    def close(self) -> None:
+        for one in self.all:
+            one.close()
 
 
 def listen(host: str, port: int, setting: str = "--host or --port") -> socket.socket:
@@ -53,6 +68,43 @@ def listen(host: str, port: int, setting: str = "--host or --port") -> socket.so
         raise OSError(f"cannot listen on {host}:{port}: {reason}; choose another with {setting}") from error
 
 
+def listen_locally(path: Path) -> socket.socket:
+    """A listening Unix socket. What a gateway that has gone has left there is taken away.
+
+    Raises:
+        OSError: another gateway serves there, or the path cannot be used; the message names it.
+
+    """
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        path.parent.mkdir(parents=True, mode=0o755, exist_ok=True)
+        if path.is_socket() and not _answers(path):
+            path.unlink()
+        made.bind(str(path))
+        path.chmod(0o666)  # who may come in is judged by who they are
+        made.listen(BACKLOG)
+    except OSError as error:
+        made.close()
+        reason = error.strerror or str(error)
+        raise OSError(f"cannot listen on {path}: {reason}; choose another with [gateway] socket") from error
+    return made
+
+
+def default_socket(folder: Path, robot: str) -> Path:
+    """Where one robot's is, in the folder that the system gives for such: of a service, or of a user."""
+    own = folder if folder.name == "gwrms" else folder / "gwrms"
+    return own / f"{re.sub('[^A-Za-z0-9_.-]', '-', robot)}.sock"
+
+
+def _answers(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as trying:
+        try:
+            trying.connect(str(path))
+        except OSError:
+            return False
+    return True
+
+
 def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
     """The sockets that were handed to this process, `None` where there are none; they are taken only once.
 
@@ -66,15 +118,18 @@ def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
         return None
     found: dict[str, socket.socket] = {}
     for place in range(int(number)):
+        adopted = _adopted(resting.FIRST + place)
         name = CLASSIC if names[place : place + 1] == [CLASSIC] else PORT
+        if adopted.family == socket.AF_UNIX:
+            name = LOCAL
         if name in found:
             raise HandoverError(
                 f"two sockets were handed over as {name}; name one FileDescriptorName={CLASSIC}"
             )
-        found[name] = _adopted(resting.FIRST + place)
+        found[name] = adopted
     if PORT not in found:
         raise HandoverError(f"no socket was handed over as {PORT}; give one ListenStream= that name")
-    return Listeners(found[PORT], found.get(CLASSIC), woken)
+    return Listeners(found[PORT], found.get(CLASSIC), found.get(LOCAL), woken)
 
 
 def _adopted(descriptor: int) -> socket.socket:
@@ -109,7 +164,7 @@ def rest(listeners: Listeners) -> None:
         **os.environ,
         _NUMBER: str(len(spare)),
         _PROCESS: str(os.getpid()),
-        _NAMES: ":".join([PORT, CLASSIC][: len(spare)]),
+        _NAMES: ":".join(listeners.named),
         _RESTING: "1",
     }
     ourselves = [sys.executable, *sys.orig_argv[1:]]

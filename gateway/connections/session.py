@@ -84,6 +84,7 @@ class Session:
         refusal: framing.RpcError | None = None,
     ) -> None:
         self.peer = inlet.peer
+        self.identity = inlet.identity
         self.cpu_ns = 0  # that was worked for it
         self.requests = self.sent_bytes = 0
         self.outlets: dict[int, Outlet] = {}

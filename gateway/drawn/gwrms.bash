@@ -5,6 +5,7 @@
 #    source ~/.local/share/bash_completion/gwrms
 # See also: https://github.com/scop/bash-completion/blob/main/doc/configuration.md
 
+_shtab_gwrms_keys_subparsers=(pair list revoke)
 _shtab_gwrms_params_subparsers=(save compare apply)
 _shtab_gwrms_journal_subparsers=(tail verify)
 _shtab_gwrms_sensor_subparsers=(record replay decode)
@@ -13,10 +14,15 @@ _shtab_gwrms_sessions_subparsers=(ls show gait resources compare export)
 _shtab_gwrms_cloud_subparsers=(ls du verify mend upload download compact retain vacuum)
 _shtab_gwrms_models_subparsers=(ls show promote rollback history export)
 _shtab_gwrms_sim_subparsers=(run)
-_shtab_gwrms_subparsers=(gateway install-service check describe snapshot cost bench blame watch top plot get set params store restore journal stop reset enable completion docs eds scan sensor calibrate collect sessions label train cloud query models predict gui evaluate demo sim sim-record sim-fault)
+_shtab_gwrms_subparsers=(gateway install-service keys pair check describe snapshot cost bench blame watch top plot get set params store restore journal stop reset enable completion docs eds scan sensor calibrate collect sessions label train cloud query models predict gui evaluate demo sim sim-record sim-fault)
 
 _shtab_gwrms_gateway_option_strings=(-h --help --host --port)
 _shtab_gwrms_install_service_option_strings=(-h --help --print --user --run-as --name)
+_shtab_gwrms_keys_pair_option_strings=(-h --help --host --port --name --role --yes)
+_shtab_gwrms_keys_list_option_strings=(-h --help --json)
+_shtab_gwrms_keys_revoke_option_strings=(-h --help)
+_shtab_gwrms_keys_option_strings=(-h --help)
+_shtab_gwrms_pair_option_strings=(-h --help --name --json)
 _shtab_gwrms_check_option_strings=(-h --help --kind --no-machine --strict --json --schema)
 _shtab_gwrms_describe_option_strings=(-h --help --robot --json)
 _shtab_gwrms_snapshot_option_strings=(-h --help --robot --json --sort --ascending --descending --limit --include)
@@ -91,6 +97,9 @@ _shtab_gwrms_option_strings=(-h --help)
 
 _shtab_gwrms_gateway_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_gwrms_install_service_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_gwrms_keys_pair_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_gwrms_keys_list_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_gwrms_keys_revoke_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_gwrms_check_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_gwrms_params_save_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_gwrms_params_save___eds_COMPGEN=_shtab_compgen_files
@@ -151,6 +160,8 @@ _shtab_gwrms_sim___truth_COMPGEN=_shtab_compgen_files
 _shtab_gwrms_sim_record___out_COMPGEN=_shtab_compgen_files
 _shtab_gwrms_sim_fault___dir_COMPGEN=_shtab_compgen_files
 
+_shtab_gwrms_keys_pair___role_choices=(viewer operator maintainer)
+_shtab_gwrms_keys_pos_0_choices=(pair list revoke)
 _shtab_gwrms_check___kind_choices=(robot server scenario)
 _shtab_gwrms_check___schema_choices=(robot server scenario)
 _shtab_gwrms_snapshot_pos_0_choices=(resource component status)
@@ -184,7 +195,7 @@ _shtab_gwrms_sim___scenario_choices=(walk stand sit sit_to_stand stairs_up stair
 _shtab_gwrms_sim___imu_choices=(bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can)
 _shtab_gwrms_sim___insole_choices=(brilliant-star insole-cobs insole-csv insole-frame)
 _shtab_gwrms_sim_record___scenario_choices=(practice walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)
-_shtab_gwrms_pos_0_choices=(gateway install-service check describe snapshot cost bench blame watch top plot get set params store restore journal stop reset enable completion docs eds scan sensor calibrate collect sessions label train cloud query models predict gui evaluate demo sim sim-record sim-fault)
+_shtab_gwrms_pos_0_choices=(gateway install-service keys pair check describe snapshot cost bench blame watch top plot get set params store restore journal stop reset enable completion docs eds scan sensor calibrate collect sessions label train cloud query models predict gui evaluate demo sim sim-record sim-fault)
 
 _shtab_gwrms_gateway__h_nargs=0
 _shtab_gwrms_gateway___help_nargs=0
@@ -192,6 +203,20 @@ _shtab_gwrms_install_service__h_nargs=0
 _shtab_gwrms_install_service___help_nargs=0
 _shtab_gwrms_install_service___print_nargs=0
 _shtab_gwrms_install_service___user_nargs=0
+_shtab_gwrms_keys_pair__h_nargs=0
+_shtab_gwrms_keys_pair___help_nargs=0
+_shtab_gwrms_keys_pair___yes_nargs=0
+_shtab_gwrms_keys_list__h_nargs=0
+_shtab_gwrms_keys_list___help_nargs=0
+_shtab_gwrms_keys_list___json_nargs=0
+_shtab_gwrms_keys_revoke__h_nargs=0
+_shtab_gwrms_keys_revoke___help_nargs=0
+_shtab_gwrms_keys_pos_0_nargs=A...
+_shtab_gwrms_keys__h_nargs=0
+_shtab_gwrms_keys___help_nargs=0
+_shtab_gwrms_pair__h_nargs=0
+_shtab_gwrms_pair___help_nargs=0
+_shtab_gwrms_pair___json_nargs=0
 _shtab_gwrms_check_pos_0_nargs='*'
 _shtab_gwrms_check__h_nargs=0
 _shtab_gwrms_check___help_nargs=0

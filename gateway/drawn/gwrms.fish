@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
+set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -69,6 +69,27 @@ complete -c gwrms -n '_shtab_gwrms_using install-service' -l user -d 'for your o
 complete -c gwrms -n '_shtab_gwrms_using install-service' -l run-as -x -d 'the account (default: one that systemd makes up)'
 complete -c gwrms -n '_shtab_gwrms_using install-service' -l name -x -d 'of the units (default: gwrms)'
 complete -c gwrms -n '_shtab_gwrms_using install-service; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a keys -d 'on the robot: who is let in, and as what'
+complete -c gwrms -n '_shtab_gwrms_using keys' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0' -a pair -d 'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT CODE` proves to know it; then you say'
+complete -c gwrms -n '_shtab_gwrms_using keys pair' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using keys pair' -l host -x -d 'address to listen on for the desk (default: [gateway] host)'
+complete -c gwrms -n '_shtab_gwrms_using keys pair' -l port -x -d 'its port (default 7421)'
+complete -c gwrms -n '_shtab_gwrms_using keys pair' -l name -x -d 'of the desk, instead of asking'
+complete -c gwrms -n '_shtab_gwrms_using keys pair' -l role -xka "viewer operator maintainer" -d 'what it may, instead of asking'
+complete -c gwrms -n '_shtab_gwrms_using keys pair' -l yes -d 'with --name and --role: ask nothing, take who comes'
+complete -c gwrms -n '_shtab_gwrms_using keys pair; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
+complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0' -a list -d 'Who is let in on this robot, and as what.'
+complete -c gwrms -n '_shtab_gwrms_using keys list' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using keys list' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using keys list; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
+complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0' -a revoke -d 'Let somebody in no more. A gateway that runs closes their connections at once.'
+complete -c gwrms -n '_shtab_gwrms_using keys revoke' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using keys revoke; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a pair -d 'Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk'"'"'s key is made where it'
+complete -c gwrms -n '_shtab_gwrms_using pair' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using pair' -l name -x -d 'that the robot is to call this desk (default: your user and computer)'
+complete -c gwrms -n '_shtab_gwrms_using pair' -l json -d 'one JSON object, for machines'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a check -d 'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
 complete -c gwrms -n '_shtab_gwrms_using check' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using check' -l kind -xka "robot server scenario" -d 'what the files are, whatever their tables show'

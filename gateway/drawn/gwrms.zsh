@@ -29,8 +29,10 @@ _shtab_gwrms_commands() {
     gui:'The window: robots live, their parameters changed safely, STOP always in sight.'
     install-service:'Writes systemd units for the gateway of CONFIG.'
     journal:'who did what to the robot; is the record whole'
+    keys:'on the robot: who is let in, and as what'
     label:'What robot and wearer did in a recorded session.'
     models:'learned models: look at, promote, roll back, export'
+    pair:'Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk'"'"'s key is made where it'
     params:'parameters as files: save, compare, apply'
     plot:'Channels over time, live, until q, or Ctrl-C.'
     predict:'What robot and wearer are doing, and how far to believe that.'
@@ -83,6 +85,15 @@ _shtab_gwrms_journal_commands() {
     verify:'Check every entry of a journal'"'"'s file. Exit status 0: intact; 1: not; 2: not there.'
   )
   _describe 'gwrms journal commands' _commands
+}
+
+_shtab_gwrms_keys_commands() {
+  local _commands=(
+    list:'Who is let in on this robot, and as what.'
+    pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT CODE` proves to know it; then you say'
+    revoke:'Let somebody in no more. A gateway that runs closes their connections at once.'
+  )
+  _describe 'gwrms keys commands' _commands
 }
 
 _shtab_gwrms_models_commands() {
@@ -499,6 +510,44 @@ _shtab_gwrms_journal_verify_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_journal_verify_defaults_added=0
 
+_shtab_gwrms_keys_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_keys_defaults_added=0
+
+_shtab_gwrms_keys_list_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--json[one JSON object a line, for machines]"
+  ":the robot\'s file:_files"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_keys_list_defaults_added=0
+
+_shtab_gwrms_keys_pair_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--host[address to listen on for the desk (default\: \[gateway\] host)]:host:"
+  "--port[its port (default 7421)]:port:"
+  "--name[of the desk, instead of asking]:name:"
+  "--role[what it may, instead of asking]:role:(viewer operator maintainer)"
+  "--yes[with --name and --role\: ask nothing, take who comes]"
+  ":the robot\'s file:_files"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_keys_pair_defaults_added=0
+
+_shtab_gwrms_keys_revoke_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  ":the robot\'s file:_files"
+  ":NAME:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_keys_revoke_defaults_added=0
+
 _shtab_gwrms_label_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
@@ -602,6 +651,17 @@ _shtab_gwrms_models_show_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_models_show_defaults_added=0
+
+_shtab_gwrms_pair_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--name[that the robot is to call this desk (default\: your user and computer)]:name:"
+  "--json[one JSON object, for machines]"
+  ":as the robot shows it:"
+  ":as the robot shows it:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_pair_defaults_added=0
 
 _shtab_gwrms_params_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1042,8 +1102,10 @@ _shtab_gwrms() {
         gui) _arguments -C -s $_shtab_gwrms_gui_options ;;
         install-service) _arguments -C -s $_shtab_gwrms_install_service_options ;;
         journal) _shtab_gwrms_journal ;;
+        keys) _shtab_gwrms_keys ;;
         label) _arguments -C -s $_shtab_gwrms_label_options ;;
         models) _shtab_gwrms_models ;;
+        pair) _arguments -C -s $_shtab_gwrms_pair_options ;;
         params) _shtab_gwrms_params ;;
         plot) _arguments -C -s $_shtab_gwrms_plot_options ;;
         predict) _arguments -C -s $_shtab_gwrms_predict_options ;;
@@ -1142,6 +1204,31 @@ _shtab_gwrms_journal() {
       case $line[1] in
         tail) _arguments -C -s $_shtab_gwrms_journal_tail_options ;;
         verify) _arguments -C -s $_shtab_gwrms_journal_verify_options ;;
+      esac
+  esac
+}
+
+_shtab_gwrms_keys() {
+  local context state line curcontext="$curcontext" one_or_more='(*)' remainder='(-)*:' default='*::: :->keys'
+
+  # Add default positional/remainder specs only if none exist, and only once per session
+  if (( ! _shtab_gwrms_keys_defaults_added )); then
+    if (( ${_shtab_gwrms_keys_options[(I)${(q)one_or_more}*]} +          ${_shtab_gwrms_keys_options[(I)${(q)remainder}*]} +          ${_shtab_gwrms_keys_options[(I)${(q)default}]} == 0 )); then
+      _shtab_gwrms_keys_options+=(': :_shtab_gwrms_keys_commands' '*::: :->keys')
+    fi
+    _shtab_gwrms_keys_defaults_added=1
+  fi
+  _arguments -C -s $_shtab_gwrms_keys_options
+
+  case $state in
+    keys)
+      words=($line[1] "${words[@]}")
+      (( CURRENT += 1 ))
+      curcontext="${curcontext%:*:*}:_shtab_gwrms_keys-$line[1]:"
+      case $line[1] in
+        list) _arguments -C -s $_shtab_gwrms_keys_list_options ;;
+        pair) _arguments -C -s $_shtab_gwrms_keys_pair_options ;;
+        revoke) _arguments -C -s $_shtab_gwrms_keys_revoke_options ;;
       esac
   esac
 }

@@ -4,6 +4,7 @@ from msgspec import UNSET, Struct, UnsetType
 
 from gateway.wire.finding import FindingInfo
 from gateway.wire.method import Globs, Method, Params
+from gateway.wire.role import Role
 
 QualityInfo = dict[str, str | int | float | None]  # state, age_ms, problem, and the component's own counters
 
@@ -65,6 +66,8 @@ class Snapshot(Struct, frozen=True):
     quality: dict[str, QualityInfo]
 
 
-COMPONENT_SNAPSHOT = Method("component.snapshot", SnapshotParams, Snapshot, module="component")
-STATUS_SNAPSHOT = Method("status.snapshot", Params, Snapshot, module="status", in_turn=True)
+COMPONENT_SNAPSHOT = Method(
+    "component.snapshot", SnapshotParams, Snapshot, module="component", role=Role.VIEWER
+)
+STATUS_SNAPSHOT = Method("status.snapshot", Params, Snapshot, module="status", in_turn=True, role=Role.VIEWER)
 METHODS = (COMPONENT_SNAPSHOT, STATUS_SNAPSHOT)

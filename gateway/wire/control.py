@@ -5,12 +5,14 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct
 
 from gateway.wire.method import Done, Method, Params, Seconds
+from gateway.wire.role import Role
 
 
 class AcquireParams(Params, frozen=True):
-    """`control.acquire`."""
+    """`control.acquire`; with `take_over` a maintainer gets it though another client holds it."""
 
     ttl_s: Seconds
+    take_over: bool = False
 
 
 class ReleaseParams(Params, frozen=True):
@@ -46,7 +48,9 @@ class RecordsInfo(Struct, frozen=True):
     problem: str | None = None
 
 
-CONTROL_ACQUIRE = Method("control.acquire", AcquireParams, Lease, module="control")
-CONTROL_RELEASE = Method("control.release", ReleaseParams, Done, module="control", needs_lease=True)
-JOURNAL_TAIL = Method("journal.tail", TailParams, JournalEntries, module="control")
+CONTROL_ACQUIRE = Method("control.acquire", AcquireParams, Lease, module="control", role=Role.OPERATOR)
+CONTROL_RELEASE = Method(
+    "control.release", ReleaseParams, Done, module="control", needs_lease=True, role=Role.OPERATOR
+)
+JOURNAL_TAIL = Method("journal.tail", TailParams, JournalEntries, module="control", role=Role.VIEWER)
 METHODS = (CONTROL_ACQUIRE, CONTROL_RELEASE, JOURNAL_TAIL)

@@ -3,6 +3,7 @@
 from msgspec import Struct
 
 from gateway.wire.method import Method, Params
+from gateway.wire.role import Role
 
 
 class BudgetInfo(Struct, frozen=True):
@@ -62,5 +63,5 @@ class GatewayCost(Struct, frozen=True):
     budget: BudgetInfo | None = None
 
 
-GATEWAY_COST = Method("gateway.cost", Params, GatewayCost)
+GATEWAY_COST = Method("gateway.cost", Params, GatewayCost, role=Role.VIEWER)
 METHODS = (GATEWAY_COST,)

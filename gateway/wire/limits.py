@@ -10,6 +10,10 @@ CLIENTS_OF_ONE_ADDRESS = 56  # … and how many of these from one address
 STOPPERS = 256  # beyond them, who may only stop; half of them at most from one address
 SPEAK_S = 20.0  # how long a client may say nothing at first
 BAD_LINES = 8  # that are no requests, and the connection is ended
+HANDSHAKES = 8  # of TLS at a time …
+HANDSHAKE_S = 3.0  # … each for so long
+HANDSHAKES_WAITING = 64  # for their turn; who comes then is closed at once …
+HANDSHAKES_WAITING_OF_ONE_ADDRESS = 16  # … and how many of these from one address
 
 # Requests
 LINE_LIMIT = 64 * 1024  # without its newline

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Generic, TypeVar
 
 from msgspec import Meta, Struct
 
+from gateway.wire.role import Role
+
 P = TypeVar("P", bound=Struct)
 R = TypeVar("R", bound=Struct)
 
@@ -26,9 +28,9 @@ class Done(Struct, frozen=True):
 class Method(Struct, Generic[P, R], frozen=True):
     """One method: `params` in, `result` out.
 
-    Of who may ask, the gateway enforces `needs_lease` and nothing else. An urgent method acts in the thread
-    that reads the clients, past all that waits. In turn means: devices or the kernel are asked, for one
-    client after the other.
+    Of who may ask, the gateway enforces `role`, the least that may, and `needs_lease`. An urgent method acts
+    in the thread that reads the clients, past all that waits. In turn means: devices or the kernel are asked,
+    for one client after the other.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Method(Struct, Generic[P, R], frozen=True):
     needs_lease: bool = False
     urgent: bool = False
     in_turn: bool = False
+    role: Role = Role.MAINTAINER  # what does not say it is for few
 
 
 AnyMethod = Method[Any, Any]  # of a table

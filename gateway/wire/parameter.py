@@ -5,6 +5,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from gateway.wire.method import Globs, Method, Number, Params, Seconds
+from gateway.wire.role import Role
 
 
 class ParameterInfo(Struct, frozen=True):
@@ -123,13 +124,25 @@ class Stored(Struct, frozen=True):
 
 
 _CONTROL = "control"
-PARAMETER_LIST = Method("parameter.list", ParameterParams, ParameterValues, _CONTROL)
-PARAMETER_READ = Method("parameter.read", ParameterParams, ParameterValues, _CONTROL, in_turn=True)
-PARAMETER_WRITE = Method("parameter.write", ParameterWriteParams, Written, _CONTROL, needs_lease=True)
-PARAMETER_CONFIRM = Method("parameter.confirm", WriteNumberParams, Confirmed, _CONTROL, needs_lease=True)
-PARAMETER_REVERT = Method("parameter.revert", WriteNumberParams, Reverted, _CONTROL, needs_lease=True)
-PARAMETER_STORE = Method("parameter.store", ComponentParams, Stored, _CONTROL, needs_lease=True)
-PARAMETER_RESTORE = Method("parameter.restore", ComponentParams, Stored, _CONTROL, needs_lease=True)
+PARAMETER_LIST = Method("parameter.list", ParameterParams, ParameterValues, _CONTROL, role=Role.VIEWER)
+PARAMETER_READ = Method(
+    "parameter.read", ParameterParams, ParameterValues, _CONTROL, in_turn=True, role=Role.VIEWER
+)
+PARAMETER_WRITE = Method(
+    "parameter.write", ParameterWriteParams, Written, _CONTROL, needs_lease=True, role=Role.OPERATOR
+)
+PARAMETER_CONFIRM = Method(
+    "parameter.confirm", WriteNumberParams, Confirmed, _CONTROL, needs_lease=True, role=Role.OPERATOR
+)
+PARAMETER_REVERT = Method(
+    "parameter.revert", WriteNumberParams, Reverted, _CONTROL, needs_lease=True, role=Role.OPERATOR
+)
+PARAMETER_STORE = Method(
+    "parameter.store", ComponentParams, Stored, _CONTROL, needs_lease=True, role=Role.MAINTAINER
+)
+PARAMETER_RESTORE = Method(
+    "parameter.restore", ComponentParams, Stored, _CONTROL, needs_lease=True, role=Role.MAINTAINER
+)
 METHODS = (
     PARAMETER_LIST,
     PARAMETER_READ,

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from gateway.wire.method import Method, Params
+from gateway.wire.role import Role
 
 Include = Literal["disk", "network", "thermal", "kernel", "cmdline", "control"]
 
@@ -174,7 +175,12 @@ class Overruns(Struct, frozen=True):
 
 
 RESOURCE_SNAPSHOT = Method(
-    "resource.snapshot", ResourceSnapshotParams, ResourceSnapshot, module="resource", in_turn=True
+    "resource.snapshot",
+    ResourceSnapshotParams,
+    ResourceSnapshot,
+    module="resource",
+    in_turn=True,
+    role=Role.VIEWER,
 )
-RESOURCE_OVERRUNS = Method("resource.overruns", Params, Overruns, module="blame")
+RESOURCE_OVERRUNS = Method("resource.overruns", Params, Overruns, module="blame", role=Role.VIEWER)
 METHODS = (RESOURCE_SNAPSHOT, RESOURCE_OVERRUNS)

@@ -12,6 +12,7 @@ from gateway.wire.framing import PROTOCOL
 from gateway.wire.limits import NAME_LENGTH
 from gateway.wire.method import Method, Params
 from gateway.wire.parameter import ParameterInfo, TrialInfo
+from gateway.wire.role import Role
 from gateway.wire.stop import StopInfo
 
 ClientName = Annotated[str, Meta(max_length=NAME_LENGTH)]
@@ -30,9 +31,11 @@ class Hello(Struct, frozen=True):
 
     protocol: int
     robot: str
-    role: str
+    role: str  # of the client: viewer, operator, maintainer
     boot_id: str
     version: str | None = None  # of the gateway's software; None: from before gateways told it
+    identity: str | None = None  # whose key or account it is; None: the robot has no keys
+    refused: dict[str, str] = {}  # method → why this client may not ask for it
 
 
 class Clock(Struct, frozen=True):
@@ -90,7 +93,7 @@ class Description(Struct, frozen=True):
     buses: list[BusInfo] = []
 
 
-HELLO = Method("hello", HelloParams, Hello)
-CLOCK_READ = Method("clock.read", Params, Clock)
-ROBOT_DESCRIBE = Method("robot.describe", Params, Description)
+HELLO = Method("hello", HelloParams, Hello, role=Role.VIEWER)
+CLOCK_READ = Method("clock.read", Params, Clock, role=Role.VIEWER)
+ROBOT_DESCRIBE = Method("robot.describe", Params, Description, role=Role.VIEWER)
 METHODS = (HELLO, CLOCK_READ, ROBOT_DESCRIBE)

@@ -5,6 +5,7 @@ from typing import Any, Literal
 from msgspec import Struct
 
 from gateway.wire.method import Globs, Method, Params
+from gateway.wire.role import Role
 
 StopOutcome = Literal["confirmed", "unconfirmed", "unreachable"]
 
@@ -74,7 +75,9 @@ class StopInfo(Struct, frozen=True):
     problem: str | None = None  # why the held stop will not outlive this gateway
 
 
-ROBOT_STOP = Method("robot.stop", StopParams, Stopped, module="control", urgent=True)
-ROBOT_RESET = Method("robot.reset", Params, Reset, module="control", needs_lease=True)
-ROBOT_ENABLE = Method("robot.enable", EnableParams, Enabled, module="control", needs_lease=True)
+ROBOT_STOP = Method("robot.stop", StopParams, Stopped, module="control", urgent=True, role=Role.VIEWER)
+ROBOT_RESET = Method("robot.reset", Params, Reset, module="control", needs_lease=True, role=Role.MAINTAINER)
+ROBOT_ENABLE = Method(
+    "robot.enable", EnableParams, Enabled, module="control", needs_lease=True, role=Role.MAINTAINER
+)
 METHODS = (ROBOT_STOP, ROBOT_RESET, ROBOT_ENABLE)

@@ -5,6 +5,7 @@ from typing import Annotated, Final, Literal
 from msgspec import Meta, Struct
 
 from gateway.wire.method import Done, Globs, Method, Params
+from gateway.wire.role import Role
 
 ModuleName = Literal["component", "status", "resource"]
 
@@ -41,6 +42,6 @@ class StreamData(Struct, frozen=True):
 
 
 STREAM_DATA: Final = "stream.data"  # the notification
-STREAM_START = Method("stream.start", StreamStartParams, StreamStarted)
-STREAM_STOP = Method("stream.stop", StreamStopParams, Done)
+STREAM_START = Method("stream.start", StreamStartParams, StreamStarted, role=Role.VIEWER)
+STREAM_STOP = Method("stream.stop", StreamStopParams, Done, role=Role.VIEWER)
 METHODS = (STREAM_START, STREAM_STOP)

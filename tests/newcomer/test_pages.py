@@ -23,15 +23,18 @@ READY: Final = '{"ready": true, …'
 
 # Blocks that a test cannot run, a page in their order, and why not.
 NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
+    "README.md: You have a robot and want it monitored": ("two computers",),
     "how-to/bench.md": (
         "a recorded robot's own bus",
         "root, to make an interface of the kernel",
         "a CAN adapter with real drives",
     ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
+    "how-to/first-robot.md": ("two computers, and root",),
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),
+    "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),

@@ -17,6 +17,7 @@ PAGE: Final = "commands.md"
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "params": ("save", "compare", "apply"),
     "journal": ("tail", "verify"),
+    "keys": ("pair", "list", "revoke"),
     "sensor": ("record", "replay", "decode"),
     "calibrate": ("insole", "imu"),
     "sessions": ("ls", "show", "gait", "resources", "compare", "export"),

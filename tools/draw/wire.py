@@ -15,7 +15,8 @@ PAGE: Final = "wire.md"
 SERVICE: Final = "the gateway"  # which answers what no module does
 _HEAD: Final = f"""# The wire
 
-JSON-RPC 2.0 over TCP, protocol {PROTOCOL}: one message a line, in UTF-8, many requests and streams at once
+JSON-RPC 2.0 over TLS 1.3 where the robot has keys, over TCP on its own computer where it has none, or at its
+Unix socket; protocol {PROTOCOL}: one message a line, in UTF-8, many requests and streams at once
 over one connection. The gateway says nothing without being asked, apart from the notifications of streams.
 Parameters forbid unknown fields; results may grow, so a reader ignores fields that it does not know.
 Whatever is missing or stale is `null`. In Python, [`gateway.client`](../how-to/write-a-script.md) speaks it.
@@ -25,7 +26,10 @@ Whatever is missing or stale is `null`. In Python, [`gateway.client`](../how-to/
 ```
 
 *Module* says which part of the gateway answers; it is started by the first request, and stopped after the
-last client has left. *lease*: only the client that holds it may ask. *urgent*: acts before all that waits.
+last client has left. *Role*: the least that a client must be to ask, of viewer, operator and maintainer; a robot
+may let operators reset and enable ([pair](../how-to/pair.md#what-a-role-may)). What is for maintainers within a
+method for others: command lines in `resource.snapshot`, `take_over` in `control.acquire`. `hello` says what one
+is and what that refuses. *lease*: only the client that holds it may ask. *urgent*: acts before all that waits.
 *in turn*: devices or the kernel are asked, for one client after the other. What a client may ask for is
 bounded: [limits](limits.md)."""
 _STREAM: Final = f"""## Streams
@@ -46,12 +50,12 @@ def draw() -> str:
 
 
 def _overview(declared: list[AnyMethod]) -> str:
-    lines = ["| method | module | | takes |", "|---|---|---|---|"]
+    lines = ["| method | module | role | | takes |", "|---|---|---|---|---|"]
     for one in declared:
         anchor = one.name.replace(".", "")
         known = ", ".join(word for word, holds in _words(one) if holds)
         module = one.module or SERVICE
-        lines.append(f"| [`{one.name}`](#{anchor}) | {module} | {known} | {_parameters(one)} |")
+        lines.append(f"| [`{one.name}`](#{anchor}) | {module} | {one.role} | {known} | {_parameters(one)} |")
     return "\n".join(lines)
 
 

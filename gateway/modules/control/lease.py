@@ -34,9 +34,15 @@ class Leases:
         self._changed = changed
         self._lease: _Held | None = None
 
-    def acquire(self, session: "Session", ttl_s: float) -> Lease:
-        """Take or renew the lease; raises `RpcError` (lease_held) where another connection has it."""
+    def acquire(self, session: "Session", ttl_s: float, *, take_over: bool = False) -> Lease:
+        """Take or renew the lease; raises `RpcError` (lease_held) where another connection has it.
+
+        With `take_over` that one loses it, and with it what it has on trial.
+        """
         held = self._lease
+        if take_over and held is not None and held.session is not session and not session.closed:
+            self._end(held.session, f"lease taken over by {session.who}")
+            held = self._lease
         if held is not None and held.session is not session:
             left_s = (held.expires_ns - time.monotonic_ns()) / 1e9
             raise refuse(

@@ -172,7 +172,7 @@ class ControlModule:
     # What clients ask for
 
     def _acquire(self, session: "Session", params: AcquireParams) -> Lease:
-        return self._leases.acquire(session, params.ttl_s)
+        return self._leases.acquire(session, params.ttl_s, take_over=params.take_over)
 
     def _release(self, session: "Session", params: ReleaseParams) -> Done:
         self._leases.release(session, params.lease)

@@ -20,7 +20,7 @@ for_ms = 60
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar
@@ -29,6 +29,7 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from gateway.client import Address, BadAddress
+from gateway.client.keys import checked_pin
 from gateway.tables.decoding import Decoding
 from gateway.tables.finding import Finding, Told, in_order, lines, mistakes, told, warning
 from gateway.tables.reading import Unreadable, read
@@ -64,14 +65,24 @@ def default_spool() -> Path:
 
 
 class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """An entry of `[robots]`, which may be just the address."""
+    """An entry of `[robots]`, which may be just the address; `gwrms pair` adds the pin of the robot's key."""
 
     address: str
+    pin: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.pin is not None:
+            checked_pin(self.pin)
+
+    @property
+    def pinned(self) -> dict[str, str]:
+        """Its pin as it stands in the file."""
+        return {} if self.pin is None else {"pin": self.pin}
 
     @property
     def where(self) -> Address:
         """The address, taken apart."""
-        return Address.parse(self.address)
+        return replace(Address.parse(self.address), pin=self.pin)
 
 
 class StoreSettings(Struct, frozen=True, forbid_unknown_fields=True):
@@ -166,9 +177,10 @@ def findings(file: Path, tables: dict[str, Any], *, machine: bool) -> Iterator[T
 
 def add_robots(settings: ServerSettings, robots: dict[str, str]) -> ServerSettings:
     """Return the same settings with further robots, or other addresses for some; raises `SettingsError`."""
-    known = {name: robot.address for name, robot in settings.robots.items()}
+    known = {name: {"address": robot.address} | robot.pinned for name, robot in settings.robots.items()}
+    given = {name: known.get(name, {}) | {"address": address} for name, address in robots.items()}
     reading = _Reading(Decoding())
-    added = msgspec.structs.replace(settings, robots=reading.robots(known | robots))
+    added = msgspec.structs.replace(settings, robots=reading.robots(known | given))
     if reading.findings:
         raise SettingsError("\n".join(one.words for one in reading.findings))
     return added

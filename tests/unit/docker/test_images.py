@@ -106,6 +106,7 @@ def programs(tmp_path: Path) -> dict[str, str]:
         "ROBOT_DIR": str(tmp_path / "robot"),
         "ROBOT_HOST": "127.0.0.1",
         "ROBOT_PORT": "0",
+        "ROBOT_PAIRING_PORT": "0",
     }
 
 

@@ -51,11 +51,14 @@ class Client:
     """One connection; notifications are kept apart from answers."""
 
     def __init__(self, address: tuple[str, int]) -> None:
-        self.socket = socket.create_connection(address, timeout=WAIT_S)
+        self.socket = self._connected(address)
         self.notifications: deque[dict[str, Any]] = deque()
         self._answers: dict[Any, dict[str, Any]] = {}
         self._reader = self.socket.makefile("rb")
         self._id = 0
+
+    def _connected(self, address: tuple[str, int]) -> socket.socket:
+        return socket.create_connection(address, timeout=WAIT_S)
 
     def __enter__(self) -> Self:
         return self

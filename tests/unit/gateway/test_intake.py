@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from gateway.access.identity import ANYBODY
 from gateway.connections import intake, stop_lines
 from gateway.connections.intake import Heard, Inlet, Pace
 from gateway.connections.listeners import listen
@@ -43,6 +44,7 @@ class Turned:
         self.heard: list[Heard] = []
         self.spent: list[int] = []  # what the thread will have worked, the last first
         answer: Future[Any] = Future()
+        intake._prepare(accepted)
 
         def stop_now(_who: str, reason: str) -> "Future[Any]":
             self.asked.append(reason)
@@ -53,6 +55,7 @@ class Turned:
             self.loop,
             accepted,
             "x",
+            ANYBODY,
             lambda: stop_now,
             lambda: self.spent.pop() if self.spent else 0,
             lambda _inlet: None,

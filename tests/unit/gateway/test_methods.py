@@ -139,7 +139,10 @@ def test_modules_and_names_are_known() -> None:
 
 
 def test_the_contract_is_as_it_was_published() -> None:
-    """Programs of others rely on what stands in that file: only to results may fields be added."""
+    """Programs of others rely on what stands in that file: only to results may fields be added.
+
+    To parameters only what can be left out, and then means what it meant before.
+    """
     found = _contract()
     known = json.loads(CONTRACT.read_text(encoding="utf-8"))
     assert found["methods"] == known["methods"]

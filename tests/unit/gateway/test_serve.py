@@ -70,7 +70,7 @@ def test_what_is_likely_wrong_with_its_file_is_logged_at_its_start_and_not_each_
     file = tmp_path / "robot.toml"
     file.write_text('[robot]\nname = "x"\n[gateway]\nhost = "0.0.0.0"\n', encoding="utf-8")
     _robot(_parser().parse_args([str(file)]), tell=tell)
-    assert [record.getMessage().partition(" lets ")[0] for record in caplog.records] == (
+    assert [record.getMessage().partition(" is open ")[0] for record in caplog.records] == (
         [f"{file}: [gateway] host: '0.0.0.0'"] if tell else []
     )
 

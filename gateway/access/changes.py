@@ -1,0 +1,97 @@
+"""What is changed in a robot's access folder: keys made, clients added and taken away."""
+
+import contextlib
+from collections.abc import Callable
+
+from gateway.access.folder import CERTIFICATE, KEY, AccessFolder
+from gateway.certificates import NAME, KeyProblem, der_of, fingerprint, pem_of
+from gateway.key_making import make, write_file
+from gateway.tables.entries import NoSuchLine, with_entry, without_entry
+from gateway.wire.role import Role
+
+_HEAD = """\
+# Who may do what on this robot. viewer: look, and stop. operator: also take the lease, write, try.
+# maintainer: also store, restore, reset, enable, command lines, and take a lease over.
+# gwrms keys pair, list and revoke change it; it counts at once.
+
+[users]    # of this computer, at the gateway's Unix socket
+[groups]
+[operators]
+may = []   # "reset", "enable"
+[clients]  # by the names of their certificates in clients/
+"""
+
+
+def ensure_keys(folder: AccessFolder, robot: str) -> bool:
+    """Make the robot's key where it has none; whether it was made now. Raises `KeyProblem`."""
+    if folder.key.exists():
+        return False
+    make(_file_name(robot), folder.folder / "keys" / KEY, folder.folder / "keys" / CERTIFICATE)
+    return True
+
+
+def own_fingerprint(folder: AccessFolder) -> str:
+    """The robot's; raises `KeyProblem`."""
+    try:
+        return fingerprint(der_of(folder.certificate.read_bytes()))
+    except OSError as error:
+        raise KeyProblem(f"{folder.certificate} cannot be read: {error.strerror}") from error
+
+
+def add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
+    """Make a client known: first its role, then its certificate, so that it is never more than meant.
+
+    Raises:
+        KeyProblem: there is one of that name, or with that certificate, or it cannot be written.
+
+    """
+    if not NAME.fullmatch(name):
+        raise KeyProblem(f"{name!r} is no name: letters, digits, _, . and -, at most 64")
+    file = folder.clients / f"{name}.crt"
+    if file.exists():
+        raise KeyProblem(f"{name} is known already; take another name, or revoke that one first")
+    if (other := _known_as(folder, der)) is not None:
+        raise KeyProblem(f"this key is known already, as {other}; revoke that one first")
+    _edit(folder, lambda text: with_entry(text or _HEAD, "clients", name, role.value))
+    try:
+        folder.clients.mkdir(parents=True, mode=0o755, exist_ok=True)
+        write_file(file, pem_of(der), 0o644)
+    except OSError as error:
+        raise KeyProblem(f"{file} cannot be written: {error.strerror or error}") from error
+
+
+def remove(folder: AccessFolder, name: str) -> None:
+    """Forget a client: first its certificate. Raises `KeyProblem` where there is none, or it stays."""
+    file = folder.clients / f"{name}.crt"
+    try:
+        file.unlink()
+    except FileNotFoundError as error:
+        known = ", ".join(one.stem for one in folder.files()) or "nobody"
+        raise KeyProblem(f"there is no {name}; known are {known}") from error
+    except OSError as error:
+        raise KeyProblem(f"{file} cannot be removed: {error.strerror}; {name} IS STILL LET IN") from error
+    _edit(folder, lambda text: without_entry(text, "clients", name))
+
+
+def _known_as(folder: AccessFolder, der: bytes) -> str | None:
+    for file in folder.files():
+        with contextlib.suppress(OSError, KeyProblem):
+            if der_of(file.read_bytes()) == der:
+                return file.stem
+    return None
+
+
+def _edit(folder: AccessFolder, change: Callable[[str], str]) -> None:
+    try:
+        before = folder.table.read_text(encoding="utf-8") if folder.table.exists() else ""
+        after = change(before)
+        if after != before:
+            folder.folder.mkdir(parents=True, exist_ok=True)
+            write_file(folder.table, after.encode("utf-8"), 0o644)
+    except (OSError, NoSuchLine) as error:
+        raise KeyProblem(f"{folder.table}: {error}") from error
+
+
+def _file_name(robot: str) -> str:
+    safe = "".join(one if NAME.fullmatch(one) or one in "_.-" else "-" for one in robot)[:64]
+    return safe if NAME.fullmatch(safe) else "robot"

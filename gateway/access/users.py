@@ -1,0 +1,61 @@
+"""People on the robot itself: who is at the other end of a Unix socket, as the kernel says (SO_PEERCRED)."""
+
+import grp
+import os
+import pwd
+import socket
+import struct
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.access.identity import Identity, Peer
+from gateway.access.table import AccessTable
+from gateway.wire.role import Role
+
+_CREDENTIALS: Final = struct.Struct("iII")  # pid, uid, gid: struct ucred of unix(7)
+ROOT: Final = 0
+
+
+def peer_of(connection: socket.socket) -> Peer:
+    """Raises `OSError` where the system does not say."""
+    option = getattr(socket, "SO_PEERCRED", None)
+    if option is None:
+        raise OSError("this system does not tell who is at a Unix socket")
+    _pid, uid, gid = _CREDENTIALS.unpack(connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size))
+    return Peer(uid, gid)
+
+
+def identity_of(peer: Peer, table: AccessTable) -> Identity | None:
+    """The highest role that the user or one of their groups has; `None` for a stranger.
+
+    Root, and the account that the gateway runs as, could do all of it anyway: they are maintainers.
+    """
+    name = _user(peer.uid)
+    roles = [Role.MAINTAINER] if peer.uid in (ROOT, os.geteuid()) else []
+    roles += [role for user, role in table.users.items() if user in (name, str(peer.uid))]
+    if table.groups:
+        groups = set(_groups(name, peer.gid))
+        roles += [role for group, role in table.groups.items() if group in groups]
+    highest = next((role for role in reversed(Role) if role in roles), None)
+    return None if highest is None else Identity(highest, name, peer=peer, granted=table.operators.may)
+
+
+def _user(uid: int) -> str:
+    try:
+        return pwd.getpwuid(uid).pw_name
+    except KeyError:
+        return str(uid)
+
+
+def _groups(name: str, gid: int) -> Iterator[str]:
+    """By the computer's own table: a process may have given up groups that its user has."""
+    try:
+        numbers = os.getgrouplist(name, gid)
+    except (KeyError, OSError):
+        numbers = [gid]
+    for number in numbers:
+        yield str(number)
+        try:
+            yield grp.getgrgid(number).gr_name
+        except KeyError:
+            continue

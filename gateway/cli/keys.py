@@ -1,0 +1,186 @@
+"""`gwrms keys`: who is let in on this robot, and as what. Run on the robot itself."""
+
+import argparse
+import contextlib
+import socket
+import sys
+from pathlib import Path
+
+from gateway import config
+from gateway.access import changes
+from gateway.access.folder import AccessFolder
+from gateway.access.known import known_in
+from gateway.access.pairing import Candidate, Pairing, PairingEnded
+from gateway.certificates import NAME, KeyProblem, grouped
+from gateway.cli.connect import NobodyToAsk, choose
+from gateway.cli.text import say, say_json, table, warn
+from gateway.client.address import DEFAULT_PORT
+from gateway.connections.doors import is_loopback
+from gateway.connections.listeners import listen
+from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, new_code
+from gateway.wire.role import Role
+
+CONFIG = Path("/etc/gwrms/robot.toml")
+USAGE = """usage: gwrms keys COMMAND …
+
+  pair [CONFIG]          let one more desk in: shows a code, which is typed there
+  list [CONFIG]          who is let in, and as what
+  revoke [CONFIG] NAME   let somebody in no more; whoever is connected with that key is closed at once
+
+CONFIG is the robot's file (default /etc/gwrms/robot.toml); keys and clients are beside it.
+gwrms keys COMMAND --help says more.
+"""
+_PAIR = """\
+Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT CODE` proves to know it; then you say
+here how that desk is called and what it may do. The robot's own key is made where it has none: from
+its gateway's next start on, every TCP connection is TLS.
+"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms keys`."""
+    return choose(argv, COMMANDS, USAGE)
+
+
+def pair(argv: list[str]) -> int:
+    """Exit code: 0 paired, 1 nobody was, 2 usage."""
+    made = _parser("pair", _PAIR)
+    made.add_argument("--host", help="address to listen on for the desk (default: [gateway] host)")
+    made.add_argument("--port", type=int, default=PAIRING_PORT, help="its port (default %(default)s)")
+    made.add_argument("--name", type=_name, help="of the desk, instead of asking")
+    made.add_argument("--role", type=Role, choices=list(Role), help="what it may, instead of asking")
+    made.add_argument(
+        "--yes", action="store_true", help="with --name and --role: ask nothing, take who comes"
+    )
+    arguments = made.parse_args(argv)
+    if arguments.yes and not (arguments.name and arguments.role):
+        made.error("--yes needs --name and --role: who comes is taken as that")
+    robot, folder = _robot(arguments)
+    if changes.ensure_keys(folder, robot.robot.name):
+        say(f"The robot's key was made in {folder.keys}. Start its gateway again: it speaks TLS only then.\n")
+    host = arguments.host or robot.gateway.host
+    with listen(host, arguments.port, "--host and --port") as listener:
+        code, own = new_code(), changes.own_fingerprint(folder)
+        pairing = Pairing(folder, listener, code, own)
+        _show(listener, code, own)
+        candidate = pairing.wait()
+    name, role = _confirmed(candidate, arguments)
+    if role is None:
+        candidate.answer(Reply(problem="it was not confirmed on the robot"))
+        raise PairingEnded("nobody was paired")
+    try:
+        changes.add(folder, name, candidate.der, role)
+    except KeyProblem as error:
+        candidate.answer(Reply(problem=str(error)))
+        raise
+    candidate.answer(
+        Reply(
+            pairing.proof(candidate), robot.robot.name, robot.gateway.port or DEFAULT_PORT, name, role.value
+        )
+    )
+    say(f"{name} is let in from now on, as {role.value}.\n")
+    return 0
+
+
+def _show(listener: socket.socket, code: str, own: str) -> None:
+    host, port = listener.getsockname()[:2]
+    shown = _address() if host in ("0.0.0.0", "::") else host
+    where = f"[{shown}]:{port}" if ":" in shown else f"{shown}:{port}"
+    say(f"\nOn the desk, within {VALID_S / 60:.0f} minutes ({TRIES} tries):\n\n")
+    say(f"  gwrms pair {where} {code}\n\n")
+    say(f"This robot's key: {grouped(own)}\n")
+    if is_loopback(listener.getsockname()):
+        warn(
+            "keys",
+            "this listens on this computer only; for other desks set host in [gateway], or give --host",
+        )
+
+
+def _address() -> str:
+    """How others reach this computer, as far as it knows itself."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
+        probe.connect(("192.0.2.1", 9))  # nothing is sent (RFC 5737)
+        return str(probe.getsockname()[0])
+    return socket.gethostname()
+
+
+def _confirmed(candidate: Candidate, arguments: argparse.Namespace) -> tuple[str, Role | None]:
+    """What the person here says; no role where they refuse."""
+    if arguments.yes:
+        return arguments.name, arguments.role
+    if not sys.stdin.isatty():
+        raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
+    wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")
+    say(f"\nA desk has proved the code. It calls itself {candidate.name!r}, its key is\n")
+    say(f"{grouped(candidate.fingerprint)}\n\n")
+    name = arguments.name or _asked(f"Its name [{wished}]: ") or wished
+    roles = ", ".join(Role)
+    said = arguments.role or _asked(f"Its role ({roles}; nothing: it is not let in): ")
+    if not NAME.fullmatch(name) or said not in list(Role):
+        return name, None
+    return name, Role(said)
+
+
+def _asked(question: str) -> str:
+    say(question)
+    return sys.stdin.readline().strip()
+
+
+def list_(argv: list[str]) -> int:
+    """Exit code: 0 all is well, 1 something in it is not."""
+    made = _parser("list", "Who is let in on this robot, and as what.")
+    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    arguments = made.parse_args(argv)
+    _, folder = _robot(arguments)
+    known = known_in(folder)
+    if arguments.json:
+        for who in known.by_key.values():
+            say_json({"name": who.name, "role": who.role, "fingerprint": who.fingerprint})
+    else:
+        say(f"robot  {grouped(changes.own_fingerprint(folder))}\n" if folder.has_keys else "no keys yet\n")
+        rows = [(who.name or "", who.role, grouped(who.fingerprint or "")) for who in known.by_key.values()]
+        rows += [(f"user {name}", role, "") for name, role in known.table.users.items()]
+        rows += [(f"group {name}", role, "") for name, role in known.table.groups.items()]
+        say(table(("NAME", "ROLE", "KEY"), rows))
+    for problem in known.problems:
+        warn("keys", problem)
+    return 1 if known.problems else 0
+
+
+def revoke(argv: list[str]) -> int:
+    """Exit code: 0 gone, 1 there is nobody of that name, or it could not be removed."""
+    made = _parser("revoke", "Let somebody in no more. A gateway that runs closes their connections at once.")
+    made.add_argument("name", metavar="NAME")
+    arguments = made.parse_args(argv)
+    _, folder = _robot(arguments)
+    changes.remove(folder, arguments.name)
+    say(f"{arguments.name} is let in no more; what it had on trial is taken back.\n")
+    return 0
+
+
+def _parser(command: str, what: str) -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(
+        prog=f"gwrms keys {command}",
+        description=what,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    made.add_argument(
+        "config", metavar="CONFIG", nargs="?", type=Path, default=CONFIG, help="the robot's file"
+    )
+    return made
+
+
+def _robot(arguments: argparse.Namespace) -> tuple[config.RobotConfig, AccessFolder]:
+    """The robot of the file, and its folder on the disk, whoever runs this."""
+    robot = config.load(arguments.config)
+    return robot, AccessFolder(robot.access, {})
+
+
+def _name(text: str) -> str:
+    if not NAME.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no name: letters, digits, _, . and -, at most 64")
+    return text
+
+
+COMMANDS = {"pair": pair, "list": list_, "revoke": revoke}

@@ -1,0 +1,124 @@
+"""A desk's own key, and the robots that it has paired with: their certificates are pinned in server.toml.
+
+~/.config/gwrms/keys/desk.key and desk.crt; [robots] NAME = { address = "HOST:PORT", pin = "SHA-256" }.
+"""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.certificates import fingerprint
+from gateway.client.address import Address
+from gateway.client.errors import BadAddress, NotPaired, WrongRobot
+
+if TYPE_CHECKING:
+    import ssl
+
+KEY, CERTIFICATE = "desk.key", "desk.crt"
+PIN_LENGTH: Final = 64  # hexadecimal digits of a SHA-256
+_HERE: Final = ("127.", "localhost", "::1")
+
+
+def user_folder() -> Path:
+    """The user's own configuration (XDG base directories)."""
+    folder = os.environ.get("XDG_CONFIG_HOME")
+    return (Path(folder) if folder else Path.home() / ".config") / "gwrms"
+
+
+def keys_folder() -> Path:
+    return user_folder() / "keys"
+
+
+def server_file() -> Path:
+    """The user's own `server.toml`, in which robots are pinned."""
+    return user_folder() / "server.toml"
+
+
+def pin_of(address: Address) -> str | None:
+    """The certificate that a robot must have, by its address; None where it is not paired.
+
+    Raises:
+        NotPaired: the server's file cannot be read, so nobody knows whether it is.
+
+    """
+    if address.pin is not None or address.path is not None:
+        return address.pin
+    try:
+        robots = _robots(server_file())
+    except (OSError, ValueError, RecursionError) as error:
+        if address.host.startswith(_HERE):
+            return None  # this computer needs no pin, and a stop must come through
+        raise NotPaired(
+            f"{server_file()} cannot be read ({error}), so which key is {address}'s is unknown"
+        ) from error
+    return next((pin for pin, where in robots if where == address), None)
+
+
+def context_for(address: Address, pin: str) -> "ssl.SSLContext":
+    """TLS 1.3 with this desk's key. Whoever answers is held against the pin, and against nothing else.
+
+    Raises:
+        NotPaired: this desk has no key, or it cannot be read.
+
+    """
+    import ssl  # for who has paired
+
+    folder = keys_folder()
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_3
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE  # `check_pin` is stricter
+    try:
+        context.load_cert_chain(folder / CERTIFICATE, folder / KEY, password=_no_password)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is no key pair"
+        raise NotPaired(
+            f"{address} is pinned to {pin[:16]}…, but this desk's key in {folder} cannot be used ({reason}): "
+            "pair it anew with gwrms pair"
+        ) from None
+    return context
+
+
+def check_pin(address: Address, pin: str, der: bytes | None) -> None:
+    """Before a byte is said: raises `WrongRobot` where another one answers than was paired."""
+    found = fingerprint(der) if der else None
+    if found == pin.lower():
+        return
+    raise WrongRobot(
+        f"ANOTHER ROBOT ANSWERS AT {address}, or somebody in between: its key is {found or 'none'}, and that "
+        f"of the robot that was paired is {pin.lower()}. Nothing was sent. Where its keys were made anew, "
+        f"look at them there (gwrms keys list), remove the pin from {server_file()}, and pair again"
+    )
+
+
+def checked_pin(text: str) -> str:
+    """Raises `ValueError` where a pin is none."""
+    if len(text) != PIN_LENGTH or not set(text.lower()) <= set("0123456789abcdef"):
+        raise ValueError(f"pin is the SHA-256 of the robot's certificate, {PIN_LENGTH} hexadecimal digits")
+    return text.lower()
+
+
+def _robots(file: Path) -> list[tuple[str, Address]]:
+    """Pins, and the addresses that they are of."""
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return []
+    table = document.get("robots", {})
+    entries: list[Any] = list(table.values()) if isinstance(table, Mapping) else []
+    return [pinned for entry in entries if (pinned := _pinned(entry)) is not None]
+
+
+def _pinned(entry: Any) -> tuple[str, Address] | None:
+    if not isinstance(entry, Mapping) or "pin" not in entry:
+        return None
+    try:
+        return checked_pin(str(entry["pin"])), Address.parse(str(entry.get("address", "")))
+    except BadAddress as error:
+        raise ValueError(str(error)) from error
+
+
+def _no_password() -> str:
+    raise ValueError("it is encrypted")

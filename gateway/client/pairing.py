@@ -1,0 +1,151 @@
+"""The desk's side of pairing: proves a robot's code, and pins its key in the server's file."""
+
+import getpass
+import re
+import socket
+import ssl
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from gateway.certificates import KeyProblem, der_of, fingerprint
+from gateway.client.address import Address
+from gateway.client.errors import ClientError, NotPaired, Unreachable, WrongRobot
+from gateway.client.keys import CERTIFICATE, KEY, keys_folder, server_file
+from gateway.key_making import make, write_file
+from gateway.tables.entries import with_entry
+from gateway.wire.pairing import DESK, LINE_BYTES, ROBOT, SAY_S, VALID_S, Offer, Reply, proof, proves
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """A robot that this desk knows now, and that knows this desk."""
+
+    robot: str  # its own name
+    address: Address  # of its gateway, pinned
+    name: str  # what it calls this desk
+    role: str
+
+
+def pair(where: Address, code: str, name: str | None = None) -> Paired:
+    """Pair with the robot that shows `code` at `where`; waits until a person there has confirmed it.
+
+    This desk's key is made where it has none. Nothing is pinned yet: see `pin`.
+
+    Raises:
+        ClientError: nobody answers, the code is another, or it was not confirmed.
+        KeyProblem: this desk's key cannot be made or read.
+        ValueError: the code is none.
+
+    """
+    pem = own_certificate()
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_3
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE  # the proof is bound to the certificate, whichever it is
+    try:
+        plain = socket.create_connection((where.host, where.port), SAY_S)
+        with plain, context.wrap_socket(plain) as secured:
+            return _paired(secured, where, code, pem, name or own_name())
+    except ClientError:
+        raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise Unreachable(
+            f"no robot pairs at {where} ({reason}): does `gwrms keys pair` wait there, and is it the address "
+            "that it shows?"
+        ) from error
+
+
+def _paired(secured: ssl.SSLSocket, where: Address, code: str, pem: bytes, name: str) -> Paired:
+    robot = fingerprint(secured.getpeercert(binary_form=True) or b"")
+    desk = fingerprint(der_of(pem))
+    offer = Offer(pem.decode("ascii"), name, proof(DESK, code, robot, desk))
+    secured.sendall(msgspec.json.encode(offer) + b"\n")
+    secured.settimeout(VALID_S)
+    reply = _reply(secured, where)
+    if reply.problem is not None:
+        raise NotPaired(f"{where} did not pair: {reply.problem}")
+    if not proves(reply.proof, ROBOT, code, robot, desk):
+        raise WrongRobot(
+            f"what answers at {where} does not know the code: somebody is in between, or it is another robot"
+        )
+    return Paired(reply.robot, Address(where.host, reply.port, robot), reply.name, reply.role)
+
+
+def _reply(secured: ssl.SSLSocket, where: Address) -> Reply:
+    found = b""
+    while b"\n" not in found and len(found) <= LINE_BYTES:
+        more = secured.recv(LINE_BYTES)
+        if not more:
+            raise NotPaired(f"{where} ended the pairing")
+        found += more
+    try:
+        return msgspec.json.decode(found.partition(b"\n")[0], type=Reply)
+    except msgspec.MsgspecError as error:
+        raise NotPaired(f"what answers at {where} does not pair as a robot does: {error}") from error
+
+
+def own_certificate() -> bytes:
+    """A desk's own (PEM), made with its key where there is none; raises `KeyProblem`."""
+    folder = keys_folder()
+    if not (folder / KEY).exists():
+        make(own_name(), folder / KEY, folder / CERTIFICATE)
+    try:
+        return (folder / CERTIFICATE).read_bytes()
+    except OSError as error:
+        raise KeyProblem(f"{folder / CERTIFICATE} cannot be read: {error.strerror}") from error
+
+
+def own_name() -> str:
+    """What a robot may call this desk: its user and computer."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):
+        user = "desk"
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", f"{user}-{socket.gethostname()}").lstrip("_.-")[:64] or "desk"
+
+
+def pin(robot: str, address: Address, file: Path | None = None) -> str:
+    """Write a paired robot into the server's file; the name that it has there.
+
+    That is the one under which its address stands there already, else its own. What else is there stays.
+
+    Raises:
+        WrongRobot: another key is pinned under that name.
+        ClientError: the file cannot be read or written.
+
+    """
+    file = file or server_file()
+    entry = {"address": str(address), "pin": address.pin or ""}
+    try:
+        before = file.read_text(encoding="utf-8") if file.exists() else ""
+        name, known = _entry_of(tomllib.loads(before), robot, address)
+        if known not in (None, address.pin):
+            raise WrongRobot(
+                f"{name} IS PINNED TO ANOTHER KEY in {file}: {known}, and this robot has {address.pin}. "
+                "Where its keys were made anew, remove that line and pair again"
+            )
+        text = with_entry(before, "robots", name, entry)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        if text != before:
+            write_file(file, text.encode("utf-8"), file.stat().st_mode & 0o777 if file.exists() else 0o644)
+    except ClientError:
+        raise
+    except (OSError, ValueError) as error:
+        raise ClientError(f"{file} cannot be changed: {error}") from error
+    return name
+
+
+def _entry_of(document: Mapping[str, Any], robot: str, address: Address) -> tuple[str, str | None]:
+    """Its name in the file, and the pin that stands there."""
+    robots = document.get("robots", {})
+    for name, entry in robots.items() if isinstance(robots, Mapping) else ():
+        table = entry if isinstance(entry, Mapping) else {"address": entry}
+        if name == robot or Address.parse(str(table.get("address", ""))) == address:
+            return str(name), table.get("pin")
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", robot).strip("-._") or "robot", None

@@ -1,0 +1,104 @@
+"""Key pairs and self-signed certificates (EC P-256), made by the program `openssl`."""
+
+import contextlib
+import os
+import secrets
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from gateway.certificates import NAME, KeyProblem
+
+DAYS: Final = 36_500  # who is no longer trusted is revoked; no clock decides about a stop
+_CURVE: Final = "prime256v1"  # NIST P-256
+_EXTENSIONS: Final = """\
+[req]
+distinguished_name = name
+x509_extensions = own
+prompt = no
+[name]
+CN = {name}
+[own]
+basicConstraints = critical, CA:FALSE
+keyUsage = critical, digitalSignature
+"""
+
+
+def make(name: str, key: Path, certificate: Path) -> None:
+    """Make a key pair for `name`; what is there already is not touched.
+
+    The folder is made for its owner alone (0700), and so is the key (0600).
+
+    Raises:
+        KeyProblem: there is one already, it cannot be written, or nothing here can make one.
+
+    """
+    if not NAME.fullmatch(name):
+        raise KeyProblem(f"{name!r} is no name for a key: letters, digits, _, . and -, at most 64")
+    for one in (key, certificate):
+        if one.exists():
+            raise KeyProblem(f"{one} is there already; a key is made once, and removed by hand only")
+    try:
+        _make(name, key, certificate)
+    except OSError as error:
+        raise KeyProblem(f"no key can be written to {key.parent}: {error.strerror or error}") from error
+
+
+def _make(name: str, key: Path, certificate: Path) -> None:
+    key.parent.mkdir(parents=True, mode=0o755, exist_ok=True)
+    if not any(key.parent.iterdir()):
+        key.parent.chmod(0o700)
+    key_pem, certificate_pem = _made(name)
+    write_file(certificate, certificate_pem, 0o644)
+    write_file(key, key_pem, 0o600)
+
+
+def write_file(file: Path, content: bytes, mode: int) -> None:
+    """There whole, in the place of what was there, or not at all; never readable for more than `mode`."""
+    draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
+    descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    try:
+        os.fchmod(descriptor, mode)
+        with open(descriptor, "wb") as out:  # noqa: PTH123 - of a descriptor
+            out.write(content)
+            out.flush()
+            os.fsync(descriptor)
+        draft.rename(file)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            draft.unlink()
+        raise
+
+
+def _made(name: str) -> tuple[bytes, bytes]:
+    """A key and its certificate, both as PEM; through pipes, so that no file is ever readable for others."""
+    program = shutil.which("openssl")
+    if program is None:
+        raise KeyProblem("keys are made by the program openssl, which is not here: apt install openssl")
+    key = _run([program, "ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
+    settings = _EXTENSIONS.format(name=name).encode("ascii")
+    with _piped(settings) as read_settings:
+        command = [program, "req", "-x509", "-new", "-key", "/dev/stdin", "-sha256", "-days", str(DAYS)]
+        command += ["-config", f"/dev/fd/{read_settings}"]
+        return key, _run(command, key, read_settings)
+
+
+@contextlib.contextmanager
+def _piped(content: bytes) -> Iterator[int]:
+    reader, writer = os.pipe()
+    try:
+        os.write(writer, content)
+        os.close(writer)
+        yield reader
+    finally:
+        os.close(reader)
+
+
+def _run(command: list[str], given: bytes, *descriptors: int) -> bytes:
+    found = subprocess.run(command, input=given, capture_output=True, check=False, pass_fds=descriptors)
+    if found.returncode or not found.stdout:
+        said = found.stderr.decode("utf-8", "replace").strip().splitlines()
+        raise KeyProblem(f"{command[0]} {command[1]} made no key: {said[-1] if said else found.returncode}")
+    return found.stdout

@@ -1,0 +1,66 @@
+"""Pairing: what desk and robot say once, over TLS, to know each other's keys from then on. Pure.
+
+A code of 80 bits is read from the robot's screen and typed at the desk. Each proves to know it, bound to both
+certificates as that side sees them: whoever is in between has another one, and cannot make up the proof.
+"""
+
+import hmac
+import secrets
+from typing import Final
+
+from msgspec import Struct
+
+PAIRING_PORT: Final = 7421
+VALID_S: Final = 300.0
+TRIES: Final = 5
+SAY_S: Final = 5.0  # how long one side may take for its handshake and its line
+LINE_BYTES: Final = 8192
+_SIGNS: Final = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"  # Crockford's base 32: no I, L, O, U
+_LENGTH: Final = 16  # of them, five bits each
+_MISREAD: Final = str.maketrans("ILO", "110")
+ROBOT, DESK = "robot", "desk"  # whose proof it is
+
+
+class Offer(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the desk says: its certificate (PEM), the name that it would like, and its proof."""
+
+    certificate: str
+    name: str
+    proof: str
+
+
+class Reply(Struct, frozen=True):
+    """What the robot says; `problem` where nothing came of it."""
+
+    proof: str = ""
+    robot: str = ""
+    port: int = 0  # of its gateway
+    name: str = ""  # of the desk, from now on
+    role: str = ""
+    problem: str | None = None
+
+
+def new_code() -> str:
+    """A code that nobody guesses, as people read it."""
+    signs = "".join(secrets.choice(_SIGNS) for _ in range(_LENGTH))
+    return "-".join(signs[at : at + 4] for at in range(0, _LENGTH, 4))
+
+
+def normal(code: str) -> str:
+    """A code as it was typed, with what is easily misread; raises `ValueError` where it is none."""
+    signs = code.upper().translate(_MISREAD).replace("-", "").replace(" ", "")
+    if len(signs) != _LENGTH or not set(signs) <= set(_SIGNS):
+        raise ValueError(f"a code has {_LENGTH} letters and digits, as the robot shows them")
+    return signs
+
+
+def proof(whose: str, code: str, robot: str, desk: str) -> str:
+    """That `whose` side knows the code, where these are the fingerprints of both."""
+    message = f"gwrms pair 1 {whose} {robot} {desk}".encode("ascii")
+    return hmac.new(normal(code).encode("ascii"), message, "sha256").hexdigest()
+
+
+def proves(given: str, whose: str, code: str, robot: str, desk: str) -> bool:
+    """Whether a proof is right, in a time that tells nothing of it."""
+    expected = proof(whose, code, robot, desk)
+    return hmac.compare_digest(given.encode("utf-8", "replace"), expected.encode("ascii"))

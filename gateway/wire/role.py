@@ -1,0 +1,18 @@
+"""Who a client is on a robot: three roles, each of which may do what those before it may."""
+
+from enum import StrEnum
+
+
+class Role(StrEnum):
+    """Of a person or program; a stop is for all of them."""
+
+    VIEWER = "viewer"  # looks, and stops
+    OPERATOR = "operator"  # takes the lease, writes, tries
+    MAINTAINER = "maintainer"  # stores, restores, resets, enables, takes a lease over
+
+    def includes(self, other: "Role") -> bool:
+        """Whether it may do what that one may."""
+        return _RANKS[self] >= _RANKS[other]
+
+
+_RANKS = {role: rank for rank, role in enumerate(Role)}

@@ -1,0 +1,242 @@
+"""Which socket is served, and who comes in there: by where it listens, and at a Unix socket by account."""
+
+import contextlib
+import os
+import pwd
+import socket
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.access.identity import Identity, Peer
+from gateway.access.table import AccessTable
+from gateway.access.users import identity_of, peer_of
+from gateway.cli.serve import _local
+from gateway.connections.doors import DoorProblem, Kind, kind_of
+from gateway.connections.listeners import Listeners, inherited, listen, listen_locally
+from gateway.daemon import Daemon
+from gateway.main import main
+from gateway.wire.role import Role
+from tests.support.waiting import WAIT_S, until
+from tests.unit.gateway.harness import HEAD, STOP, Bench, Client, config, serving
+from tests.unit.gateway.keyed import KeyedClient, keyed, raw, said
+
+SOMEBODY = Peer(12_345, 12_345)  # whom no computer of a test knows
+
+
+class LocalClient(Client):
+    """One connection by a Unix socket."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        super().__init__(("", 0))
+
+    def _connected(self, _address: tuple[str, int]) -> socket.socket:
+        made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        made.settimeout(WAIT_S)
+        made.connect(str(self.path))
+        return made
+
+
+@pytest.fixture
+def local(tmp_path: Path) -> Iterator[Path]:
+    """A gateway's Unix socket; nothing is said of anybody yet."""
+    path = tmp_path / "s"
+    with serving(config(tmp_path), local=listen_locally(path)):
+        yield path
+    assert not path.exists(), "it goes with its gateway"
+
+
+# Which sockets are served
+
+
+@pytest.mark.parametrize("has_keys", [False, True])
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "::1"])
+def test_this_computer_is_served_with_keys_and_without(host: str, has_keys: bool) -> None:
+    with listen(host, 0) as listener:
+        assert kind_of(listener, has_keys=has_keys) is (Kind.TLS if has_keys else Kind.PLAIN)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+def test_other_computers_are_served_with_keys_only(host: str) -> None:
+    with listen(host, 0) as listener:
+        assert kind_of(listener, has_keys=True) is Kind.TLS
+        with pytest.raises(
+            DoorProblem, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT CODE`"
+        ):
+            kind_of(listener, has_keys=False)
+
+
+def test_without_keys_the_command_refuses_other_computers_and_says_what_leads_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "robot.toml").write_text(HEAD, encoding="utf-8")
+    assert main(["gateway", str(tmp_path / "robot.toml"), "--host", "0.0.0.0"]) == 1
+    error = capsys.readouterr().err
+    assert "gwrms keys pair" in error
+    assert "gwrms pair HOST:PORT CODE" in error
+
+
+def test_a_socket_that_was_handed_over_is_judged_by_where_it_listens(bench: Bench, tmp_path: Path) -> None:
+    """Its robot's file says 127.0.0.1."""
+    with listen("0.0.0.0", 0) as handed, pytest.raises(DoorProblem):
+        Daemon(config(tmp_path), handed)
+
+
+def test_the_paper_s_port_is_for_this_computer_only(bench: Bench, tmp_path: Path) -> None:
+    keyed(tmp_path)
+    robot, refused = config(tmp_path), pytest.raises(DoorProblem, match="classic_port")
+    with listen("127.0.0.1", 0) as port, listen("0.0.0.0", 0) as classic, refused:
+        Daemon(robot, port, classic=classic)
+
+
+def test_with_keys_every_tcp_connection_is_tls_and_the_unix_socket_is_not(
+    bench: Bench, tmp_path: Path
+) -> None:
+    keyed(tmp_path)
+    with serving(config(tmp_path), local=listen_locally(tmp_path / "s")) as address:
+        with raw(address) as bare:
+            bare.sendall(b"{}\n")
+            assert said(bare) == b""
+        with KeyedClient(address, "viewer") as client, LocalClient(tmp_path / "s") as here:
+            assert client.call("clock.read")["boot_id"] == here.call("clock.read")["boot_id"]
+
+
+# Which CAN buses are
+
+
+@pytest.mark.parametrize(
+    ("bus", "refused"),
+    [
+        ('interface = "socketcand"\nchannel = "can0"\nhost = "192.0.2.7"\nport = 29536', "192.0.2.7"),
+        ('interface = "socketcand"\nchannel = "can0"\nhost = "127.0.0.1"\nport = 29536', None),
+        ('interface = "udp_multicast"\nchannel = "239.74.163.2"', "the multicast group 239.74.163.2"),
+        ('interface = "udp_multicast"\nchannel = "239.74.163.2"\nhop_limit = 0', None),
+        ('interface = "socketcan"\nchannel = "can0"', None),
+    ],
+)
+def test_a_bus_over_a_network_is_refused_unless_the_file_trusts_that_network(
+    tmp_path: Path, bus: str, refused: str | None
+) -> None:
+    text = f'[robot]\nname = "x"\n[can.main]\n{bus}\n'
+    if refused is None:
+        assert config(tmp_path, text).can
+        return
+    with pytest.raises(ValueError, match=f"goes over {refused}.*trusted_network = true"):
+        config(tmp_path, text)
+    assert config(tmp_path, f"{text}trusted_network = true\n").can["main"].trusted_network
+
+
+# People on the robot
+
+
+def test_the_account_that_the_gateway_runs_as_may_everything(bench: Bench, local: Path) -> None:
+    with LocalClient(local) as client:
+        hello = client.call("hello", client="test")
+        assert (hello["role"], hello["identity"]) == ("maintainer", pwd.getpwuid(os.geteuid()).pw_name)
+        assert client.call("robot.stop", reason="now")["held"] is True
+        who = client.call("journal.tail", n=1)["entries"][0]["who"]
+        assert f"(uid {os.geteuid()}:" in who
+
+
+def test_a_stranger_s_uid_is_told_so_and_may_not_even_stop(
+    bench: Bench, local: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("gateway.access.users.peer_of", lambda _connection: SOMEBODY)
+        with LocalClient(local) as client, contextlib.suppress(OSError):
+            client.send(STOP % b"from a stranger")
+            assert "result" not in (client.line() or {})
+        with LocalClient(local) as client:
+            error = (client.line() or {})["error"]
+            assert error["data"]["kind"] == "not_allowed"
+            assert "uid 12345 is a user whom this robot does not know" in error["message"]
+            assert client.line() is None
+    with LocalClient(local) as client:
+        assert client.call("robot.describe")["stop"]["held"] is False
+
+
+def test_who_is_in_the_table_is_let_in_and_goes_when_taken_out(
+    bench: Bench, local: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.access.users.peer_of", lambda _connection: SOMEBODY)
+    (tmp_path / "access.toml").write_text('[users]\n12345 = "viewer"\n', encoding="utf-8")
+    with LocalClient(local) as client:
+        assert client.refused("control.acquire", ttl_s=10).kind == "not_allowed"
+        (tmp_path / "access.toml").unlink()
+        until(lambda: client.line() is None, "it is closed")
+
+
+@pytest.mark.parametrize(
+    ("table", "role"),
+    [
+        ({}, None),
+        ({"users": {"12345": Role.VIEWER}}, Role.VIEWER),
+        ({"groups": {"12345": Role.OPERATOR}}, Role.OPERATOR),
+        ({"users": {"12345": Role.VIEWER}, "groups": {"12345": Role.OPERATOR}}, Role.OPERATOR),
+        ({"users": {"somebody": Role.MAINTAINER}, "groups": {"else": Role.MAINTAINER}}, None),
+    ],
+)
+def test_the_highest_role_of_user_and_groups_counts(table: dict[str, Any], role: Role | None) -> None:
+    found = identity_of(SOMEBODY, AccessTable(**table))
+    assert found == (None if role is None else Identity(role, "12345", peer=SOMEBODY))
+
+
+def test_who_is_at_the_other_end_is_what_the_kernel_says() -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX)
+    with ours, theirs:
+        assert peer_of(ours) == Peer(os.getuid(), os.getgid())
+
+
+# The Unix socket itself
+
+
+def test_everybody_may_knock_and_what_a_gateway_has_left_is_taken_away(tmp_path: Path) -> None:
+    path = tmp_path / "run" / "exo.sock"
+    for _ in range(2):
+        with listen_locally(path):
+            assert stat.S_IMODE(path.stat().st_mode) == 0o666
+    with listen_locally(path), pytest.raises(OSError, match=r"cannot listen on .*exo\.sock.*choose another"):
+        listen_locally(path)
+
+
+@pytest.mark.parametrize(
+    ("more", "environ", "expected"),
+    [
+        ("", {}, None),
+        ("", {"XDG_RUNTIME_DIR": "run"}, "run/gwrms/exo-test.sock"),
+        ("", {"RUNTIME_DIRECTORY": "run/gwrms", "XDG_RUNTIME_DIR": "other"}, "run/gwrms/exo-test.sock"),
+        ('socket = ""', {"XDG_RUNTIME_DIR": "run"}, None),
+        ('socket = "here.sock"', {"XDG_RUNTIME_DIR": "run"}, "here.sock"),
+    ],
+)
+def test_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: str, environ: dict[str, str], expected: str | None
+) -> None:
+    for name in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, folder in environ.items():
+        monkeypatch.setenv(name, str(tmp_path / folder))
+    made = _local(config(tmp_path, HEAD.replace("[gateway]", f"[gateway]\n{more}")))
+    if expected is None:
+        assert made is None
+    else:
+        assert made is not None
+        with made:
+            assert made.getsockname() == str(tmp_path / expected)
+
+
+def test_a_unix_socket_is_handed_over_by_what_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with listen("127.0.0.1", 0) as port, listen_locally(tmp_path / "s") as local:
+        at = iter([port.detach(), local.detach()])
+        monkeypatch.setattr("gateway.connections.listeners.resting.FIRST", 0)
+        adopt = "gateway.connections.listeners._adopted"
+        monkeypatch.setattr(adopt, lambda _place: socket.socket(fileno=next(at)))
+        environ = {"LISTEN_PID": str(os.getpid()), "LISTEN_FDS": "2", "LISTEN_FDNAMES": "port:port"}
+        found = inherited(environ)
+        assert isinstance(found, Listeners)
+        assert list(found.named) == ["port", "socket"]
+        found.close()

@@ -1,0 +1,253 @@
+"""Pairing, both sides over real sockets: who proves the code is let in, once, and nobody in between."""
+
+import itertools
+import socket
+import ssl
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from gateway.access import changes
+from gateway.access.folder import AccessFolder
+from gateway.access.known import known_in
+from gateway.access.pairing import Candidate, Pairing, PairingEnded
+from gateway.certificates import KeyProblem, der_of
+from gateway.client import Address, ClientError, NotPaired, Unreachable, WrongRobot
+from gateway.client import pairing as desk
+from gateway.client.keys import keys_folder, pin_of, server_file
+from gateway.connections.listeners import listen
+from gateway.wire.pairing import DESK, TRIES, Offer, Reply, new_code, normal, proof
+from gateway.wire.role import Role
+from tests.unit.gateway import keyed as keys
+from tests.unit.gateway.keyed import keyed
+
+CODE = "0123-4567-89AB-CDEF"
+
+
+class Shown:
+    """A robot that shows `CODE`, and takes whoever proves it for an operator."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = AccessFolder(keyed(folder, {}), {})
+        self.listener = listen("127.0.0.1", 0)
+        self.time_s = 0.0
+        self.own = keys.pin(keys.ROBOT)
+        self.pairing = Pairing(self.folder, self.listener, CODE, self.own, clock=lambda: self.time_s)
+        self.where = Address("127.0.0.1", self.listener.getsockname()[1])
+        self._pool = ThreadPoolExecutor(1)
+
+    def wait(self) -> "Future[Candidate]":
+        return self._pool.submit(self.pairing.wait)
+
+    def take(self, waiting: "Future[Candidate]", name: str = "anna") -> None:
+        candidate = waiting.result()
+        changes.add(self.folder, name, candidate.der, Role.OPERATOR)
+        candidate.answer(Reply(self.pairing.proof(candidate), "exo-01", 7420, name, "operator"))
+
+    def close(self) -> None:
+        self.time_s = 1e9
+        self._pool.shutdown()
+        self.listener.close()
+
+
+@pytest.fixture
+def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Shown]:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    made = Shown(tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def asked(shown: Shown) -> Iterator[Callable[[str], "Future[desk.Paired]"]]:
+    """A desk that types a code."""
+    with ThreadPoolExecutor(4) as pool:
+        yield lambda code: pool.submit(desk.pair, shown.where, code)
+
+
+def test_who_proves_the_code_is_known_and_knows_the_robot(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"]
+) -> None:
+    waiting = shown.wait()
+    paired = asked("o123 4567 89ab cdef")  # as people type it
+    shown.take(waiting)
+    found = paired.result()
+    assert (found.robot, found.name, found.role) == ("exo-01", "anna", "operator")
+    (who,) = known_in(shown.folder).by_key.values()
+    assert (who.name, who.role) == ("anna", Role.OPERATOR)
+    assert desk.pin(found.robot, found.address) == "exo-01"
+    assert pin_of(Address("127.0.0.1", 7420)) == keys.pin(keys.ROBOT)
+    assert der_of((keys_folder() / "desk.crt").read_bytes()) == waiting.result().der
+
+
+def test_five_wrong_codes_void_the_right_one(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"]
+) -> None:
+    waiting = shown.wait()
+    for _ in range(TRIES):
+        with pytest.raises(NotPaired, match="not the code"):
+            asked(new_code()).result()
+    with pytest.raises(PairingEnded, match="5 wrong codes"):
+        waiting.result()
+    assert known_in(shown.folder).by_key == {}
+
+
+def test_a_hundred_guesses_at_once_are_no_more_tries(shown: Shown) -> None:
+    robot, (_, certificate) = shown.own, keys.pair("guesser")
+    own, pem = keys.pin("guesser"), certificate.read_text("ascii")
+    codes = [new_code() for _ in range(100)] + [CODE]
+    offers = [Offer(pem, "guesser", proof(DESK, code, robot, own)) for code in codes]
+    with ThreadPoolExecutor(16) as pool:
+        judged = list(pool.map(lambda offer: shown.pairing._judged(offer, der_of(pem.encode())), offers[:-1]))
+    assert sum("not the code" in str(one) for one in judged) == TRIES
+    assert shown.pairing._judged(offers[-1], der_of(pem.encode())) is not None, "the right one is too late"
+
+
+def test_a_code_is_for_one_desk_and_replayed_it_is_worth_nothing(shown: Shown) -> None:
+    robot, pem = shown.own, keys.pair("anna")[1].read_text("ascii")
+    offer = Offer(pem, "anna", proof(DESK, CODE, robot, keys.pin("anna")))
+    assert shown.pairing._judged(offer, der_of(pem.encode())) is None
+    assert "another desk has used this code" in str(shown.pairing._judged(offer, der_of(pem.encode())))
+    again = Pairing(shown.folder, shown.listener, new_code(), robot)
+    assert "not the code" in str(again._judged(offer, der_of(pem.encode())))
+
+
+def test_of_two_at_once_one_is_paired(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = itertools.count()
+    monkeypatch.setattr(desk, "own_certificate", lambda: keys.pair(f"desk-{next(names)}")[1].read_bytes())
+    keys.pair("desk-0"), keys.pair("desk-1")
+    waiting = shown.wait()
+    both = [asked(CODE), asked(CODE)]
+    shown.take(waiting)
+    shown.listener.close()
+    results = [one.exception() for one in both]
+    assert sorted(one is None for one in results) == [False, True]
+    assert len(known_in(shown.folder).by_key) == 1
+
+
+def test_nobody_in_between_passes_a_proof_on(shown: Shown) -> None:
+    """It has another certificate, so that what the desk proves there is wrong at the robot."""
+    pem = keys.pair("anna")[1].read_text("ascii")
+    offer = Offer(pem, "anna", proof(DESK, CODE, keys.pin("between"), keys.pin("anna")))
+    assert "somebody is in between" in str(shown.pairing._judged(offer, der_of(pem.encode())))
+
+
+def test_who_answers_without_the_code_is_not_pinned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    key, certificate = keys.pair("between")
+    context.load_cert_chain(certificate, key)
+
+    def answer(listener: socket.socket) -> None:
+        connection, _ = listener.accept()
+        with context.wrap_socket(connection, server_side=True) as secured:
+            secured.recv(8192)
+            secured.sendall(
+                msgspec.json.encode(Reply("f" * 64, "exo-01", 7420, "anna", "maintainer")) + b"\n"
+            )
+
+    with listen("127.0.0.1", 0) as listener:
+        answering = threading.Thread(target=answer, args=(listener,))
+        answering.start()
+        with pytest.raises(WrongRobot, match="does not know the code"):
+            desk.pair(Address("127.0.0.1", listener.getsockname()[1]), CODE)
+        answering.join()
+
+
+def test_after_five_minutes_the_code_is_void(shown: Shown) -> None:
+    waiting = shown.wait()
+    shown.time_s = 300.0
+    with pytest.raises(PairingEnded, match="nobody came in time"):
+        waiting.result()
+
+
+def test_who_says_nothing_or_rubbish_is_no_try_and_in_nobody_s_way(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"]
+) -> None:
+    waiting = shown.wait()
+    with keys.raw(("127.0.0.1", shown.where.port)) as silent:
+        for _ in range(2 * TRIES):
+            with (
+                keys.raw(("127.0.0.1", shown.where.port)) as bare,
+                keys.context(None).wrap_socket(bare) as tls,
+            ):
+                tls.sendall(b"{}\n")
+        paired = asked(CODE)
+        silent.close()
+        shown.take(waiting)
+        assert paired.result().name == "anna"
+
+
+def test_where_nobody_pairs_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with listen("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+    with pytest.raises(Unreachable, match=r"no robot pairs at 127\.0\.0\.1"):
+        desk.pair(Address("127.0.0.1", port), CODE)
+
+
+@pytest.mark.parametrize("code", ["", "0123", "0123-4567-89AB-CDEU", "0123-4567-89AB-CDEF-0"])
+def test_what_is_no_code_is_refused_before_it_is_sent(code: str) -> None:
+    with pytest.raises(ValueError, match="16 letters and digits"):
+        normal(code)
+
+
+# What is written
+
+
+def test_another_key_under_a_name_that_is_pinned_is_refused_loudly(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    desk.pin("exo-01", Address("192.0.2.7", 7420, "a" * 64))
+    before = server_file().read_text("utf-8")
+    for name, host in (("exo-01", "192.0.2.8"), ("exo-02", "192.0.2.7")):
+        with pytest.raises(WrongRobot, match="IS PINNED TO ANOTHER KEY"):
+            desk.pin(name, Address(host, 7420, "b" * 64))
+    assert server_file().read_text("utf-8") == before
+
+
+def test_what_else_stands_in_the_server_s_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    server_file().parent.mkdir()
+    server_file().write_text(
+        '# ours\n[robots]\nleft = "192.0.2.7:7420"  # its own name\n[store]\nurl = "x"\n'
+    )
+    assert desk.pin("exo-01", Address("192.0.2.7", 7420, "a" * 64)) == "left"
+    line = f'"left" = {{ address = "192.0.2.7:7420", pin = "{"a" * 64}" }}'
+    assert server_file().read_text("utf-8") == f'# ours\n[robots]\n{line}\n[store]\nurl = "x"\n'
+    server_file().write_text("[robots.exo-01]\naddress = '192.0.2.7'\n")
+    with pytest.raises(ClientError, match="by hand"):
+        desk.pin("exo-01", Address("192.0.2.7", 7420, "a" * 64))
+
+
+def test_a_name_and_a_key_are_known_once(tmp_path: Path) -> None:
+    folder, der = AccessFolder(tmp_path, {}), der_of(keys.pair("anna")[1].read_bytes())
+    changes.add(folder, "anna", der, Role.VIEWER)
+    for name, said in (
+        ("anna", "anna is known already"),
+        ("eve", "known already, as anna"),
+        ("../x", "no name"),
+    ):
+        with pytest.raises(KeyProblem, match=said):
+            changes.add(folder, name, der, Role.MAINTAINER)
+    (who,) = known_in(folder).by_key.values()
+    assert who.role is Role.VIEWER
+
+
+def test_who_is_removed_is_nobody_and_the_table_is_as_before(tmp_path: Path) -> None:
+    folder, der = AccessFolder(tmp_path, {}), der_of(keys.pair("anna")[1].read_bytes())
+    changes.add(folder, "eve", der_of(keys.pair("eve")[1].read_bytes()), Role.VIEWER)
+    before = folder.table.read_text("utf-8")
+    changes.add(folder, "anna", der, Role.VIEWER)
+    changes.remove(folder, "anna")
+    assert folder.table.read_text("utf-8") == before
+    assert [one.name for one in known_in(folder).by_key.values()] == ["eve"]
+    with pytest.raises(KeyProblem, match="there is no anna; known are eve"):
+        changes.remove(folder, "anna")
