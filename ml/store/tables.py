@@ -175,6 +175,7 @@ JOURNAL: Final = Table(
             field("n", pa.int64()),
             *(field(name, pa.string()) for name in ("hash", "who", "what", "entry")),  # entry: JSON, whole
             *_ORIGIN,
+            field("witness", pa.string()),  # JSON: the same as the robot signed it, where it has
         ]
     ),
     indexed=3,

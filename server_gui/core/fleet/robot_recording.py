@@ -48,7 +48,7 @@ class RobotRecording:
                 if not isinstance(event.snapshot.kernel, msgspec.UnsetType):
                     self._learn(versions=self._facts.versions | session_facts.kernel(event.snapshot.kernel))
             case Journalled():
-                self._recorder.journal(self._robot, event.journal.entries)
+                self._recorder.journal(self._robot, event.journal.entries, event.head)
             case Described():
                 self._described(event.description)
             case Looked() if event.parameters is not None and not self._facts.parameters:

@@ -7,7 +7,7 @@ import msgspec
 
 from gateway.client import Batch, ClockOffset, ConnectionState
 from gateway.wire.component import Snapshot
-from gateway.wire.control import JournalEntries
+from gateway.wire.control import JournalEntries, SignedHead
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import ParameterValues
 from gateway.wire.resource import ResourceSnapshot
@@ -68,9 +68,13 @@ class Resources:
 
 @dataclass(frozen=True, slots=True)
 class Journalled:
-    """The newest entries of the robot's journal, oldest first; most have come before."""
+    """The newest entries of the robot's journal, oldest first; most have come before.
+
+    `head` is one of them as the robot has signed it, where it has a key.
+    """
 
     journal: JournalEntries
+    head: SignedHead | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import msgspec
 
+from gateway.wire.control import SignedHead
 from gateway.wire.resource import ResourceSnapshot
 from ml.store.labels import Label
 from server_gui.core.recording.rows import Record
@@ -99,8 +100,11 @@ def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot)
     return Record("resources", fields)
 
 
-def journal(robot: str, entry: Mapping[str, Any]) -> Record:
-    """Return a row of `journal`: one entry of the robot's own journal, whole, with its hash."""
+def journal(robot: str, entry: Mapping[str, Any], head: SignedHead | None = None) -> Record:
+    """Return a row of `journal`: one entry of the robot's own journal, whole, with its hash.
+
+    `head` is the same as the robot has signed it.
+    """
     fields = {
         "robot": robot,
         "utc": entry.get("utc_ns"),
@@ -109,6 +113,7 @@ def journal(robot: str, entry: Mapping[str, Any]) -> Record:
         "who": entry.get("who"),
         "what": entry.get("what"),
         "entry": _json(dict(entry)),
+        "witness": None if head is None else _json(msgspec.to_builtins(head)),
     }
     return Record("journal", fields)
 
