@@ -46,8 +46,8 @@ models say of each robot is recorded too.""",
 )
 _PROMOTERS: Final = """## `[promoters]`
 
-Whose models a rule may stop a robot by: NAME = "SHA-256", the line that `gwrms models key` says on their desk.
-Without it, no rule stops a robot ([who promoted it](models.md#who-promoted-it))."""
+Whose models a rule may stop a robot by: NAME = "SHA-256", the line that `gwrms models key` says on
+their desk. Without it, no rule stops a robot ([who promoted it](models.md#who-promoted-it))."""
 
 
 def draw() -> str:
