@@ -124,6 +124,8 @@ SESSIONS: Final = Table(
             field("operator", pa.string()),
             field("notes", pa.string()),
             *_ORIGIN,
+            field("wearer", pa.string()),
+            field("consent", pa.string()),
         ]
     ),
     indexed=5,

@@ -36,6 +36,7 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
+    "how-to/privacy.md": ("root, and an empty disk", "a bucket of one's own", "what cannot be brought back"),
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
     "how-to/run-as-a-service.md": ("root, and systemd",),

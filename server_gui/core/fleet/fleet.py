@@ -13,6 +13,7 @@ from server_gui.core.fleet.robot_recording import RobotRecording
 from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import Feed, FollowSettings, Tell
 from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.records import NOBODY, Worn
 
 log = logging.getLogger(__name__)
 
@@ -64,13 +65,19 @@ class Fleet:
     """
 
     def __init__(
-        self, following: FollowSettings, recorder: Recorder, operator: str = "", notes: str = ""
+        self,
+        following: FollowSettings,
+        recorder: Recorder,
+        operator: str = "",
+        notes: str = "",
+        worn: Worn = NOBODY,
     ) -> None:
         self.subscribers: list[Subscriber] = []  # of the robots that join from now on
         self._following = following
         self._recorder = recorder
         self._operator = operator
         self._notes = notes
+        self._worn = worn
         self._members: dict[str, Member] = {}
         self._joining: asyncio.Queue[Member] = asyncio.Queue()
 
@@ -82,7 +89,7 @@ class Fleet:
 
     def follow(self, robot: str, address: Address) -> None:
         """Another robot, from now on."""
-        keeping = RobotRecording(robot, self._recorder, self._operator, self._notes)
+        keeping = RobotRecording(robot, self._recorder, self._operator, self._notes, self._worn)
         others = [functools.partial(subscriber, robot) for subscriber in self.subscribers]
         member = Member(robot, address, self._following, keeping, others)
         self._members = self._members | {robot: member}

@@ -17,7 +17,7 @@ from server_gui.core.follow.events import (
 )
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
-from server_gui.core.recording.records import Facts
+from server_gui.core.recording.records import NOBODY, Facts, Worn
 
 
 class RobotRecording:
@@ -27,12 +27,15 @@ class RobotRecording:
     same.
     """
 
-    def __init__(self, robot: str, recorder: Recorder, operator: str = "", notes: str = "") -> None:
+    def __init__(
+        self, robot: str, recorder: Recorder, operator: str = "", notes: str = "", worn: Worn = NOBODY
+    ) -> None:
         self.session = ""
         self._robot = robot
         self._recorder = recorder
         self._operator = operator
         self._notes = notes
+        self._worn = worn
         self._facts = Facts()
         self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
         self._linked = False
@@ -61,7 +64,7 @@ class RobotRecording:
 
     def _described(self, description: Description) -> None:
         self._recorder.describe(self._robot, description)
-        found = session_facts.facts(description, self._operator, self._notes)
+        found = session_facts.facts(description, self._operator, self._notes, self._worn)
         same = (description.boot_id, found.configuration_hash, description.version)
         if same != self._same:
             self._same, self._facts = same, found

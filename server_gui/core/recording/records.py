@@ -16,6 +16,16 @@ from server_gui.core.recording.rows import Record
 MORE: Final = ("disk", "network", "thermal", "throttling", "kernel")  # of a snapshot, in one column
 
 
+class Worn(msgspec.Struct, frozen=True):
+    """Who wears the robot, by whatever name the study gives them, and what they have agreed to."""
+
+    wearer: str = ""
+    consent: str = ""
+
+
+NOBODY: Final = Worn()
+
+
 class Facts(msgspec.Struct, frozen=True):
     """What was so when a session began.
 
@@ -28,6 +38,7 @@ class Facts(msgspec.Struct, frozen=True):
     versions: dict[str, str] = {}
     operator: str = ""
     notes: str = ""
+    worn: Worn = NOBODY
 
 
 class Session(msgspec.Struct, frozen=True):
@@ -54,6 +65,8 @@ class Session(msgspec.Struct, frozen=True):
             "versions": _json(facts.versions),
             "operator": facts.operator,
             "notes": facts.notes,
+            "wearer": facts.worn.wearer,
+            "consent": facts.worn.consent,
         }
         return Record("sessions", fields)
 
