@@ -44,8 +44,8 @@ def worn(rows: Iterable[dict[str, object]], labels: Iterable[dict[str, object]],
         if said := str(row.get("wearer") or ""):
             people.setdefault(_name(row), set()).add(person(said))
     for row in holding(labels):
-        if said := wearer(str(row["label"])):
-            people.setdefault(_name(row), set()).add(person(said))
+        if worn_by := wearer(str(row["label"])):
+            people.setdefault(_name(row), set()).add(person(worn_by))
     mine = {session: who for session, who in people.items() if person(name) in who}
     shared = sorted(session for session, who in mine.items() if len(who) > 1)
     return Worn(tuple(sorted(mine)), tuple(shared))
